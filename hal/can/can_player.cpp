@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 namespace stageid {
 namespace {
@@ -110,6 +111,7 @@ std::string CanPlayer::arm(const CanCommand& command) {
   ramp_samples_ = command.c;
   trace_.clear();
   trace_.reserve(samples_ * row_bytes());
+  reserved_ = true;
   status_ = CanResident::armed;
   return "";
 }
@@ -151,16 +153,18 @@ std::string CanPlayer::begin_download(const CanCommand& command) {
 
 void CanPlayer::work(std::int64_t now_ns, CanTransport& transport) {
   send_chunks(transport);
-  if (status_ == CanResident::armed && now_ns - last_heard_ns_ > kHostSilence_ns) {
+  const bool silent = now_ns - last_heard_ns_ > kHostSilence_ns;
+  if (reserved_ && !busy() && silent) {
+    if (status_ == CanResident::armed)
+      static_cast<void>(stage_.request(SupervisorCommand::disable));
     abandon();
-    static_cast<void>(stage_.request(SupervisorCommand::disable));
   }
   if (!busy()) return;
   if (stage_.state() != NodeState::measuring) {  // quick stop, panel or watchdog
     finish(CanResident::failed);
     return;
   }
-  if (now_ns - last_heard_ns_ > kHostSilence_ns) {
+  if (silent) {
     stage_.fail(FaultCause::watchdog);
     finish(CanResident::failed);
     return;
@@ -192,7 +196,7 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
   if (!gives_measurement(next)) {
     finish(CanResident::failed);
   } else if (played_ >= samples_ + ramp_samples_) {
-    stage_.end_run();
+    stage_.end_run_and_reserve();
     finish(CanResident::done);
   }
 }
@@ -211,10 +215,8 @@ void CanPlayer::finish(CanResident status) {
 
 void CanPlayer::abandon() {
   if (busy()) status_ = CanResident::failed;
-  if (status_ == CanResident::armed) {
-    status_ = CanResident::idle;
-    stage_.release();
-  }
+  if (status_ == CanResident::armed) status_ = CanResident::idle;
+  if (std::exchange(reserved_, false)) stage_.release();
   download_next_ = download_end_ = 0;
 }
 

@@ -35,7 +35,7 @@ class CanPlayer {
 
   /// Plays the samples that are due and sends requested chunks.
   void work(std::int64_t now_ns, CanTransport& transport);
-  /// If the host is silent for a second while the node is armed or playing, it is considered dead.
+  /// A host that is silent for a second is considered dead: the run ends, and the stage is no longer reserved.
   void host_was_heard(std::int64_t now_ns) noexcept { last_heard_ns_ = now_ns; }
   void abandon();
 
@@ -70,6 +70,7 @@ class CanPlayer {
   std::uint16_t trigger_sequence_ = 0;
   std::int64_t began_ns_ = 0;
   std::int64_t last_heard_ns_ = 0;
+  bool reserved_ = false;  // from arm until the host ends it, also while it downloads the trace
   Outcome outcome_ = Outcome::ok;
   std::vector<double> r_;
   std::vector<double> u_;

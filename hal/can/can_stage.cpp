@@ -60,6 +60,7 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   link_.forget_session();
   samples_bad_ = 0;
   conflict_ = false;
+  stopped_by_ = PeerStatus::good;
   std::fill(answers_.begin(), answers_.end(), CanFrame{});
   not_carried_ = false;
   const CanLink::Other take_value = [this](const CanFrame& frame) { take(frame); };
@@ -140,6 +141,8 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   }
   give(inputs);
   status_ = judge(inputs);
+  if (meaning(status_).reaction == PeerReaction::stop && stopped_by_ == PeerStatus::good)
+    stopped_by_ = status_;
   const Outcome outcome = meaning(status_).outcome;
   samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
   if (wall_ && frames_seen_ != 0) stamp(inputs);
@@ -316,12 +319,13 @@ std::string CanStage::trouble() const {
           "{}: {} frames were dropped because the send queue is full; the bus is too slow",
           transport_->name(bus), transport_->health(bus).send_refused);
   const CanState& node = link_.state();
-  const PeerMeaning& said = meaning(status_);
-  const bool of_the_node = status_ <= PeerStatus::unknown_code;
+  const PeerStatus status = stopped_by_ == PeerStatus::good ? status_ : stopped_by_;
+  const PeerMeaning& said = meaning(status);
+  const bool of_the_node = status <= PeerStatus::unknown_code;
   if (of_the_node && node.state != NodeState::measuring)
     return fmt::format("the node is in state {}{}", to_string(node.state),
                        link_.text().empty() ? "" : ": " + link_.text());
-  if (said.reaction == PeerReaction::stop || status_ == PeerStatus::setpoints_missed)
+  if (said.reaction == PeerReaction::stop || status == PeerStatus::setpoints_missed)
     return said.words;
   if (!complete())
     return fmt::format(

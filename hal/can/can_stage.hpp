@@ -103,6 +103,8 @@ class CanStage final : public CyclicStage {
   bool conflict_ = false;          // two different answers to one sample
   std::uint64_t samples_bad_ = 0;  // of this run
   PeerStatus status_ = PeerStatus::good;
+  // The status that stopped the run; it may be good again while the excitation is ramped down.
+  PeerStatus stopped_by_ = PeerStatus::good;
   std::int64_t arrival_ns_ = 0;   // of the last measurement's first frame
   std::uint16_t node_us_ = 0;     // its time by the node, modulo 2^16
   std::int64_t stamped_ns_ = 0;   // arrival of the last one that was stamped

@@ -88,6 +88,7 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
   if (first.y.size() != info_.sensors.size())
     throw std::invalid_argument("modbus stage: Inputs::y must have one entry per sensor");
   trouble_ = Trouble::none;
+  stopped_by_ = PeerStatus::good;
   if (!link_.connected()) {
     link_.connect();
     description_ = read_description(link_, info_);
@@ -226,6 +227,10 @@ PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
   }
   const PeerStatus status = stageid::judge(report);
   if (status != PeerStatus::good) trouble_ = Trouble::node;
+  if (meaning(status).reaction == PeerReaction::stop && stopped_by_ == PeerStatus::good) {
+    stopped_by_ = status;
+    node_status_at_stop_ = node_status_;
+  }
   return status;
 }
 
@@ -249,7 +254,14 @@ void ModbusStage::end_run() {
     give_supervisor_command(link_, SupervisorCommand::disable);
 }
 
+std::string ModbusStage::describe_report(PeerStatus status, std::uint32_t node_status) const {
+  return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
+                     meaning(status).words, to_string(state_of(node_status)),
+                     to_string(cause_of(node_status)));
+}
+
 std::string ModbusStage::trouble() const {
+  if (stopped_by_ != PeerStatus::good) return describe_report(stopped_by_, node_status_at_stop_);
   switch (trouble_) {
     case Trouble::none:
       return "";
@@ -261,9 +273,7 @@ std::string ModbusStage::trouble() const {
           "check the unit",
           to_string(link_.address()));
     case Trouble::node:
-      return fmt::format("{}: {} (state {}, cause: {})", to_string(link_.address()),
-                         meaning(status_).words, to_string(state_of(node_status_)),
-                         to_string(cause_of(node_status_)));
+      return describe_report(status_, node_status_);
     case Trouble::not_carried:
       return "a command is not finite or exceeds the range of the node's actuator scale";
   }

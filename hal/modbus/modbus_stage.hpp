@@ -56,6 +56,7 @@ class ModbusStage final : public CyclicStage {
   PeerStatus judge_reply() noexcept;
   PeerStatus take_measurement(Inputs& inputs) noexcept;
   std::uint32_t measured(int address) const noexcept;
+  std::string describe_report(PeerStatus status, std::uint32_t node_status) const;
 
   StageInfo info_;
   ModbusLink link_;
@@ -76,6 +77,9 @@ class ModbusStage final : public CyclicStage {
   PeerStatus status_ = PeerStatus::good;
   ModbusLink::Trouble link_trouble_;
   std::uint32_t node_status_ = 0;
+  // The report of the node that stopped the run; it may be good again while the excitation is ramped down.
+  PeerStatus stopped_by_ = PeerStatus::good;
+  std::uint32_t node_status_at_stop_ = 0;
 };
 
 }  // namespace stageid

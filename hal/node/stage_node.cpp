@@ -263,6 +263,14 @@ void StageNode::end_run() {
   machine_.end_measuring();
 }
 
+void StageNode::end_run_and_reserve() {
+  const std::lock_guard lock(mutex_);
+  if (machine_.state() != NodeState::measuring) return;
+  come_to_rest();
+  machine_.end_measuring();
+  reserved_ = true;
+}
+
 void StageNode::fail(FaultCause cause) {
   const std::lock_guard lock(mutex_);
   machine_.fail(cause);

@@ -93,6 +93,8 @@ class StageNode {
                                         std::span<double> u, Inputs& inputs);
   /// measuring -> operation_enabled, forces zero.
   void end_run();
+  /// The same, but the stage remains reserved for the host of the run, with the same key.
+  void end_run_and_reserve();
 
   /// Reports a failure outside of the stage (bus, heartbeat): safe stop, then fault.
   void fail(FaultCause cause);

@@ -166,6 +166,19 @@ void WriteBlocks(benchmark::State& state) {
 }
 BENCHMARK(WriteBlocks)->Unit(benchmark::kMicrosecond)->Iterations(2000);
 
+/// The yardstick on a shared machine: the loop is compared with it in the same run.
+void MatrixTimesVector(benchmark::State& state) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(32, 32, 0.03);
+  Eigen::VectorXd x = Eigen::VectorXd::Ones(32);
+  Eigen::VectorXd y(32);
+  for (auto _ : state) {
+    y.noalias() = a * x;
+    benchmark::DoNotOptimize(y.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(MatrixTimesVector);
+
 /// Does nothing, at once.
 class IdleStage final : public CyclicStage {
  public:

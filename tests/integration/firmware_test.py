@@ -8,23 +8,23 @@ firmware_test.py STAGEID SOURCE_DIR WORK_DIR
 import json
 import pathlib
 import re
-import shutil
-import socket
 import struct
 import subprocess
 import sys
 import time
 import unittest
 
-PROGRAM, SOURCE, WORK = sys.argv[1:4]
-FIRMWARE = pathlib.Path(SOURCE) / "docs/examples/firmware"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+from example_firmware import CAN, MODBUS, ExampleFirmware
+from peers import ModbusClient, number, words
+
+PROGRAM, SOURCE, WORK = sys.argv[1], *map(pathlib.Path, sys.argv[2:4])
 WATCHDOG_S = 2.6
 DELAY_S = 1.0  # of a busy machine
 
 ENABLE, DISABLE, QUICK_STOP, RESET = 1, 2, 3, 4
 BEGIN, END = 1, 2
 DISABLED, ENABLED, MEASURING, FAULT = 1, 4, 5, 8
+LIMIT = 2
 BUSY = "exception 6"
 
 
@@ -32,80 +32,14 @@ def run(*words):
     return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=50)
 
 
-def words(*numbers):
-    return [word for number in numbers for word in (number >> 16 & 0xFFFF, number & 0xFFFF)]
-
-
-def number(registers, index=0):
-    return registers[index] << 16 | registers[index + 1]
-
-
-class Client:
-    """One connection, with one request at a time."""
-
-    def __init__(self, port):
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
-        self.transaction = 0
-
-    def close(self):
-        self.socket.close()
-
-    def receive(self, count):
-        data = b""
-        while len(data) < count:
-            part = self.socket.recv(count - len(data))
-            if not part:
-                raise ConnectionError("the node has closed the connection")
-            data += part
-        return data
-
-    def send(self, pdu, unit=1):
-        self.transaction += 1
-        self.socket.sendall(struct.pack(">HHHB", self.transaction, 0, len(pdu) + 1, unit) + pdu)
-        transaction, protocol, length, answered = struct.unpack(">HHHB", self.receive(7))
-        assert (transaction, protocol, answered) == (self.transaction, 0, unit)
-        return self.receive(length - 1)
-
-    def ask(self, pdu, unit=1):
-        """The registers of the reply, or its exception."""
-        reply = self.send(pdu, unit)
-        if reply[0] & 0x80:
-            return f"exception {reply[1]}"
-        return list(struct.unpack(f">{reply[1] // 2}H", reply[2:])) if pdu[0] in (3, 4, 23) else []
-
-    def read(self, first, count):
-        return self.ask(struct.pack(">BHH", 3, first, count))
-
-    def write(self, first, values):
-        return self.ask(struct.pack(f">BHHB{len(values)}H", 16, first, len(values), 2 * len(values), *values))
-
-    def exchange(self, first, values, read_first, count):
-        return self.ask(struct.pack(f">BHHHHB{len(values)}H", 23, read_first, count, first, len(values),
-                                    2 * len(values), *values))
-
-    def state(self):
-        return number(self.read(208, 2))
-
-    def command(self, code):
-        """1 accepted, 2 refused"""
-        echo = number(self.read(214, 2))
-        return number(self.exchange(2, words(code, echo + 1), 214, 4), 2)
-
-    def run_command(self, code, sequence, key=0):
-        return self.exchange(16, words(code, sequence, 0, 3, key), 300, 16)
-
-    def setpoint(self, key, sequence, u=(0, 0)):
-        return self.exchange(24, words(key, sequence, *u), 300, 16)
-
-
 class Firmware(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.work = pathlib.Path(WORK)
-        shutil.rmtree(cls.work, ignore_errors=True)
-        shutil.copytree(FIRMWARE, cls.work)
-        sources = ["modbus_tcp_node.c", "stage_node.c", "stage_plant.c"]
-        subprocess.run(["cc", *FLAGS, "-o", "node", *sources, "-lm"], cwd=cls.work, check=True)
+        cls.work = WORK
+        cls.example = ExampleFirmware(SOURCE, WORK)
+        cls.stage_text = (WORK / "stage.yaml").read_text()
+        cls.example.build("node", MODBUS)
+        cls.example.build("drifting_node", MODBUS, plant=SOURCE / "tests/integration/drifting_plant.c")
 
     def setUp(self):
         self.nodes = []
@@ -130,9 +64,9 @@ class Firmware(unittest.TestCase):
                 return node, int(found.group(1))
         self.fail("the node does not start")
 
-    def firmware(self):
-        node, port = self.start(self.work / "node", 0, int(1000 * WATCHDOG_S))
-        text = (FIRMWARE / "stage.yaml").read_text()
+    def firmware(self, name="node"):
+        node, port = self.start(self.work / name, 0, int(1000 * WATCHDOG_S))
+        text = self.stage_text
         for example, test in (("port: 1502", f"port: {port}"), ("response_s: 0.2", "response_s: 1"),
                               ("worst_reply_s: 0.5", "worst_reply_s: 1.5")):
             self.assertIn(example, text)
@@ -141,7 +75,7 @@ class Firmware(unittest.TestCase):
         return node, port
 
     def client(self, port):
-        self.clients.append(Client(port))
+        self.clients.append(ModbusClient(port))
         return self.clients[-1]
 
     def identify(self, name, *options, between=lambda process: None):
@@ -156,7 +90,9 @@ class Firmware(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         done = run("--json", "fit", frf, "-o", model, "--rigid-body", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
-        return [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
+        found_hz = [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
+        self.example.check_modes(self, found_hz)
+        return found_hz
 
     def wait_for(self, client, state, seconds):
         end = time.monotonic() + seconds
@@ -171,23 +107,13 @@ class Firmware(unittest.TestCase):
                 return
         self.fail("the node ended")
 
-    def check_modes(self, found):
-        true_hz = [float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{", (FIRMWARE / "stage_plant.c").read_text())]
-        self.assertEqual(len(true_hz), 5)
-        self.assertEqual(len(found), 5, found)
-        for expected, measured in zip(sorted(true_hz), sorted(found)):
-            self.assertLess(abs(measured / expected - 1.0), 1e-4)
-
     def test_the_can_node_compiles(self):
         # can_firmware_test.py runs it, in a machine with CAN.
-        sources = sorted(path.name for path in self.work.glob("*can*.c"))
-        self.assertEqual(len(sources), 4)
-        subprocess.run(["cc", *FLAGS, "-o", "can_node", *sources, "stage_plant.c", "-lm"], cwd=self.work, check=True)
+        self.example.build("can_node", ["socketcan_node.c", *CAN])
 
     def test_measures_the_modes_and_refuses_a_second_host(self):
         _, port = self.firmware()
         undisturbed = self.identify("undisturbed")
-        self.check_modes(undisturbed)
         intruder = self.client(port)
 
         def intrude(process):
@@ -220,7 +146,20 @@ class Firmware(unittest.TestCase):
         done = run("run", self.work / "experiment.yaml", "-o", self.work / "refused.slog")
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("--reset-fault", done.stderr)
-        self.check_modes(self.identify("after", "--reset-fault"))
+        self.identify("after", "--reset-fault")
+
+    def test_the_limits_hold_without_setpoints(self):
+        """A host that is silent for less than the watchdog, and a stage that moves meanwhile."""
+        for seed, motion, longest_s in ((1, "out of the window", 0.25 + DELAY_S), (2, "too fast", DELAY_S)):
+            with self.subTest(motion):
+                node, port = self.firmware("drifting_node")
+                host = self.client(port)
+                self.assertEqual(host.command(ENABLE), 1)
+                key = number(host.run_command(BEGIN, 5, seed=seed), 4)
+                host.setpoint(key, 1, (1 << 20, 1 << 20))
+                self.wait_for(host, FAULT, longest_s)
+                self.check_forces_are_zero(node, FAULT, LIMIT)
+                self.assertEqual(number(host.setpoint(key, 2), 6), 8 | FAULT << 8 | LIMIT << 16)
 
     def test_a_lost_heartbeat_stops_the_stage(self):
         node, port = self.firmware()

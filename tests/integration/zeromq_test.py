@@ -5,7 +5,6 @@ started again, with a second host, under garbage.
     zeromq_test.py STAGEID SOURCE_DIR WORK_DIR
 """
 
-import binascii
 import contextlib
 import csv
 import json
@@ -13,6 +12,7 @@ import pathlib
 import random
 import re
 import resource
+import signal
 import shutil
 import socket
 import struct
@@ -21,24 +21,25 @@ import sys
 import time
 import unittest
 
+from example_firmware import CAN, ExampleFirmware
+from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
+                   can_command, sealed)
+
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
-FIRMWARE = SOURCE / "docs/examples/firmware"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
-COMMAND, STATE, UPLOAD_CHUNK = 0x080, 0x200, 0x300
-HELLO, START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD = 1, 2, 3, 16, 18, 19, 20
+UPLOAD_CHUNK = 0x300
 MEASURING = "state 5,"
+CONTROLLER = "  memset(u_n, 0, STAGE_ACTUATORS * sizeof *u_n);\n"
+FEED_FORWARD = ("  static unsigned n;\n  u_n[0] = 0.05 + 0.02 * sin(0.0157079632679489662 * n++) - 10.0 * y_m[0];\n"
+                "  u_n[1] = -10.0 * y_m[1];\n")
 
 
-def message(identifier, head, payload, length):
-    """A sealed frame in its 72 bytes."""
-    body = payload.ljust(length - 8, b"\0")
-    seal = struct.pack("<H", binascii.crc_hqx(struct.pack("<H", identifier) + head + body, 0xFFFF))
-    return struct.pack("<HHI", identifier, length, 0) + (head + seal + body).ljust(64, b"\0")
+def message(identifier, data):
+    """A frame in its 72 bytes."""
+    return struct.pack("<HHI", identifier, len(data), 0) + data.ljust(64, b"\0")
 
 
-def command(code, sequence, a=0, b=0, c=0, d=0, host=0x01020304, session=0):
-    payload = struct.pack("<QQIIIIB", a, b, c, d, host, session, 2)
-    return message(COMMAND, struct.pack("<HBBH", sequence, code, 0, 0), payload, 48)
+def command(*words, **more):
+    return message(CAN_COMMAND, can_command(*words, **more))
 
 
 def free_port():
@@ -51,70 +52,30 @@ def resident_bytes(process):
     return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
-class Peer:
-    """One connection of ZMTP 3.0, by hand: it can also send what libzmq would not."""
-
-    def __init__(self, port=None, connection=None, kind=b"DEALER"):
-        self.socket = connection or socket.create_connection(("127.0.0.1", port), timeout=10)
-        self.socket.settimeout(10)
-        self.socket.sendall(b"\xff" + bytes(8) + b"\x7f\x03\0" + b"NULL".ljust(20, b"\0") + bytes(32))
-        self.receive(64)
-        ready = b"\x05READY" + b"\x0bSocket-Type" + struct.pack(">I", len(kind)) + kind
-        self.socket.sendall(bytes([4, len(ready)]) + ready)
-        self.frame()
-
-    def receive(self, count):
-        data = b""
-        while len(data) < count:
-            part = self.socket.recv(count - len(data))
-            if not part:
-                raise ConnectionError("the node has closed the connection")
-            data += part
-        return data
-
-    def frame(self):
-        flags, size = self.receive(2)
-        if flags & 2:
-            size = int.from_bytes(bytes([size]) + self.receive(7), "big")
-        return self.receive(size)
-
-    def send(self, *parts):
-        for i, part in enumerate(parts):
-            more = int(i + 1 < len(parts))
-            size = bytes([more, len(part)]) if len(part) < 256 else bytes([more | 2]) + struct.pack(">Q", len(part))
-            self.socket.sendall(size + part)
-
+class Peer(ZeroMqPeer):
     def state_after(self, text):
         """The answer to a command: (answer, rejected)."""
         self.send(text)
         while True:
             got = self.frame()
-            if struct.unpack_from("<H", got)[0] == STATE and got[8:10] == text[8:10]:
+            if struct.unpack_from("<H", got)[0] == CAN_STATE and got[8:10] == text[8:10]:
                 return got[8 + 10], struct.unpack_from("<I", got, 8 + 20)[0]
-
-    def close(self):
-        self.socket.close()
 
 
 class ZeroMq(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        shutil.rmtree(WORK, ignore_errors=True)
-        shutil.copytree(FIRMWARE, WORK)
+        cls.example = ExampleFirmware(SOURCE, WORK)
         subprocess.run([PROGRAM, "config", "header", "stage_zeromq.yaml", "-o", "stage.h"], cwd=WORK, check=True,
                        stdout=subprocess.DEVNULL)
-        sources = ["zeromq_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
-        for name, define in (("node", []), ("slow_node", ["-DSAMPLES_PER_TICK=1"])):
-            subprocess.run(["cc", *FLAGS, *define, "-o", name, *sources, "-lzmq", "-lm"], cwd=WORK, check=True)
+        sources = ["zeromq_node.c", *CAN]
+        cls.example.build("node", sources, "-lzmq")
+        cls.example.build("slow_node", sources, "-lzmq", "-DSAMPLES_PER_TICK=1")
         # A loop of the node with a feed-forward: a constant, and a sine of 0.5 Hz, which is a line of the excitation.
         text = (WORK / "can_resident.c").read_text()
-        none = "  memset(u_n, 0, STAGE_ACTUATORS * sizeof *u_n);\n"
-        assert none in text
-        loop = ("  static unsigned n;\n  u_n[0] = 0.05 + 0.02 * sin(0.0157079632679489662 * n++) - 10.0 * y_m[0];\n"
-                "  u_n[1] = -10.0 * y_m[1];\n")
-        (WORK / "feed_forward.c").write_text("#include <math.h>\n" + text.replace(none, loop))
-        subprocess.run(["cc", *FLAGS, "-o", "forward_node", *[s.replace("can_resident", "feed_forward") for s in sources],
-                        "-lzmq", "-lm"], cwd=WORK, check=True)
+        assert CONTROLLER in text
+        (WORK / "feed_forward.c").write_text("#include <math.h>\n" + text.replace(CONTROLLER, FEED_FORWARD))
+        cls.example.build("forward_node", [s.replace("can_resident", "feed_forward") for s in sources], "-lzmq")
 
     def setUp(self):
         self.port = free_port()
@@ -185,12 +146,7 @@ class ZeroMq(unittest.TestCase):
         done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
         found = sorted(mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"])
-        true_hz = sorted(float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{", (WORK / "stage_plant.c").read_text()))
-        self.assertEqual(len(true_hz), 5)
-        self.assertEqual(len(found), 5, found)
-        errors = [abs(measured / expected - 1.0) for expected, measured in zip(true_hz, found)]
-        print(f"largest error of a frequency: {max(errors):.1e}", file=sys.stderr)
-        self.assertLess(max(errors), 1e-4)
+        self.example.check_modes(self, found)
 
     def test_nobody_is_there(self):
         self.ends(self.start(), 1, "no node answered")
@@ -247,7 +203,7 @@ class ZeroMq(unittest.TestCase):
 
     # 10 000 commands and 20 000 chunks that are sealed but forged, 100 000 random messages, 20 connections of no ZeroMQ.
     def test_forged_and_random_messages_change_nothing(self):
-        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 8"))
+        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
         self.node()
         self.ends(self.start("long"), 0)
         quiet = self.call("log", "convert", "run.slog", "-o", "quiet.csv")
@@ -255,18 +211,17 @@ class ZeroMq(unittest.TestCase):
         node = self.node_again("slow_node")
         host = self.start("long")
         self.wait_for(node, MEASURING)
-        dice = random.Random(5)
+        dice, sizes = random.Random(5), (0, 1, 8, 71, 72, 72, 73, 300)
         peer = Peer(self.port)
         before = peer.state_after(command(HELLO, 1))[1]
         forged = [command(code, 7, 3, 0, 800, 0, session=dice.getrandbits(32))
                   for code in (START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD)]
-        chunk = message(UPLOAD_CHUNK, struct.pack("<HBBH", 0, 0, 4, 56), bytes(56), 64)
+        chunk = message(UPLOAD_CHUNK, sealed(UPLOAD_CHUNK, struct.pack("<HBBH", 0, 0, 4, 56), bytes(56), 64))
         for i in range(10_000):
-            peer.send(forged[i % len(forged)])
-            peer.send(chunk)
-            peer.send(chunk)
+            burst = [(forged[i % len(forged)],), (chunk,), (chunk,)]
             for _ in range(10):
-                peer.send(*(dice.randbytes(dice.choice((0, 1, 8, 71, 72, 72, 73, 300))) for _ in range(dice.choice((1, 1, 2)))))
+                burst.append([dice.randbytes(dice.choice(sizes)) for _ in range(dice.choice((1, 1, 2)))])
+            peer.socket.sendall(b"".join(peer.encode(*parts) for parts in burst))
             if i % 500 == 0:
                 with socket.create_connection(("127.0.0.1", self.port)) as other:
                     other.sendall(dice.randbytes(200))
@@ -307,11 +262,48 @@ class ZeroMq(unittest.TestCase):
         (WORK / "run.slog").unlink(missing_ok=True)
         return self.node(name)
 
+    @contextlib.contextmanager
+    def behind_a_hub(self, nodes, name="node"):
+        """Nodes, a run of a host, and the hub between them."""
+        ports = []
+        hub_port = self.port
+        for _ in range(nodes):
+            self.port = free_port()
+            ports.append(self.port)
+            self.node(name)
+        with socket.create_server(("127.0.0.1", hub_port)) as server:
+            server.settimeout(10)
+            host = self.start()
+            with contextlib.closing(ZeroMqHub(server, ports)) as hub:
+                yield host, hub
+
+    def test_two_nodes_behind_one_address_are_refused(self):
+        with self.behind_a_hub(2) as (host, _):
+            self.ends(host, 1, "two nodes answer")
+        self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
+
+    def end_under_a_flood(self, code, text, number=None):
+        with self.behind_a_hub(1, "slow_node") as (host, hub):
+            self.wait_for(self.nodes[0], MEASURING)
+            self.nodes[0].send_signal(signal.SIGSTOP)
+            if number:
+                host.send_signal(number)
+            hub.flooded.set()
+            began = time.monotonic()
+            self.ends(host, code, text)
+            self.assertLess(time.monotonic() - began, 10.0)
+
+    def test_a_frozen_node_is_noticed_on_a_wire_that_is_never_silent(self):
+        self.end_under_a_flood(1, "no node answered")
+
+    def test_ctrl_c_ends_a_run_on_a_wire_that_is_never_silent(self):
+        self.end_under_a_flood(130, "interrupted", signal.SIGINT)
+
     def test_garbage_instead_of_a_node(self):
         with socket.create_server(("127.0.0.1", self.port)) as server:
             server.settimeout(10)
             host = self.start()
-            peer = Peer(connection=server.accept()[0], kind=b"ROUTER")
+            peer = Peer(accepted=server.accept()[0], kind=b"ROUTER")
             dice = random.Random(6)
             for _ in range(2000):
                 peer.send(dice.randbytes(dice.choice((0, 8, 71, 72, 72, 72, 73, 3000))))
@@ -324,13 +316,11 @@ class ZeroMq(unittest.TestCase):
         self.ends(self.start(), 2, "ZeroMQ carries resident experiments over a single bus; set mode: resident")
 
     def test_a_header_of_another_stage_is_refused(self):
+        other = ExampleFirmware(SOURCE, WORK / "other")
         header = (WORK / "stage.h").read_text()
-        other = WORK / "other"
-        shutil.copytree(FIRMWARE, other)
-        (other / "stage.h").write_text(re.sub(r"FINGERPRINT 0x\w+", "FINGERPRINT 0x1u", header))
-        sources = ["zeromq_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
-        subprocess.run(["cc", *FLAGS, "-o", "node", *sources, "-lzmq", "-lm"], cwd=other, check=True)
-        done = subprocess.run([other / "node"], capture_output=True, text=True, timeout=10)
+        (other.folder / "stage.h").write_text(re.sub(r"FINGERPRINT 0x\w+", "FINGERPRINT 0x1u", header))
+        other.build("node", ["zeromq_node.c", *CAN], "-lzmq")
+        done = subprocess.run([other.folder / "node"], capture_output=True, text=True, timeout=10)
         self.assertEqual(done.returncode, 1)
         self.assertIn("another stage", done.stderr)
 

@@ -6,11 +6,8 @@
 To be run inside the machine of vmrun.sh, which has vcan0.
 """
 
-import binascii
 import json
 import pathlib
-import re
-import shutil
 import struct
 import subprocess
 import sys
@@ -19,21 +16,27 @@ import unittest
 
 from can_machine import FRAME, node_state, raw_socket, wait_for_state
 
-PROGRAM, SOURCE = sys.argv[1:3]
-FIRMWARE = pathlib.Path(SOURCE) / "docs/examples/firmware"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "integration"))
+from example_firmware import CAN, ExampleFirmware  # noqa: E402
+from peers import CAN_COMMAND, CAN_STATE, START, can_command, sealed  # noqa: E402
+
+PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 WORK = pathlib.Path("/tmp/can_firmware")
 WATCHDOG_S = 2.0
 DELAY_S = 5.0  # of a machine in a machine
 
 
+SETPOINT, LIMIT = 0x100, 2
+
+
+def send(identifier, data):
+    with raw_socket("vcan0") as raw:
+        raw.send(FRAME.pack(identifier, len(data), 1, 0, 0, data))
+
+
 def send_setpoint(run, sequence):
     """A setpoint for two actuators, in a frame of 16 bytes."""
-    head = struct.pack("<HBBH", sequence, 0, run, 0x1234)
-    values = bytes([0, 0, 0x10] * 2 + [0, 0])
-    data = head + struct.pack("<H", binascii.crc_hqx(b"\x00\x01" + head + values, 0xFFFF)) + values
-    with raw_socket("vcan0") as raw:
-        raw.send(FRAME.pack(0x100, len(data), 1, 0, 0, data))
+    send(SETPOINT, sealed(SETPOINT, struct.pack("<HBBH", sequence, 0, run, 0x1234), bytes([0, 0, 0x10] * 2), 16))
 
 
 def rejected():
@@ -41,16 +44,17 @@ def rejected():
     with raw_socket("vcan0") as raw:
         while True:
             data = raw.recv(FRAME.size)
-            if len(data) == FRAME.size and FRAME.unpack(data)[0] == 0x200:
+            if len(data) == FRAME.size and FRAME.unpack(data)[0] == CAN_STATE:
                 return struct.unpack_from("<I", FRAME.unpack(data)[5], 20)[0]
 
 
 class Firmware(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        shutil.copytree(FIRMWARE, WORK)
-        sources = ["socketcan_node.c", "can_frame.c", "can_node.c", "can_resident.c", "stage_plant.c"]
-        subprocess.run(["cc", *FLAGS, "-o", "can_node", *sources, "-lm"], cwd=WORK, check=True)
+        cls.example = ExampleFirmware(SOURCE, WORK)
+        sources = ["socketcan_node.c", *CAN]
+        cls.example.build("can_node", sources)
+        cls.example.build("drifting_node", sources, plant=SOURCE / "tests/integration/drifting_plant.c")
         stage = (WORK / "stage_can.yaml").read_text().replace("interface: can0", "interface: vcan0")
         stage = stage.replace("can:\n", "can:\n  reply_timeout_s: 0.1\n", 1)
         experiment = (WORK / "experiment.yaml").read_text()
@@ -59,7 +63,10 @@ class Firmware(unittest.TestCase):
             (WORK / f"{mode}.yaml").write_text(experiment.replace("stage.yaml", f"stage_{mode}.yaml"))
 
     def setUp(self):
-        self.node = subprocess.Popen([WORK / "can_node", "vcan0", str(int(1000 * WATCHDOG_S))],
+        self.start_node("can_node")
+
+    def start_node(self, name):
+        self.node = subprocess.Popen([WORK / name, "vcan0", str(int(1000 * WATCHDOG_S))],
                                      stdout=subprocess.PIPE, text=True)
         self.assertIn("state 1", self.node.stdout.readline())
 
@@ -84,12 +91,7 @@ class Firmware(unittest.TestCase):
         done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
         found = sorted(mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"])
-        true_hz = sorted(float(hz) for hz in re.findall(r"\{(\d+\.\d+), 0\.\d+, \{",
-                                                        (FIRMWARE / "stage_plant.c").read_text()))
-        self.assertEqual(len(true_hz), 5)
-        self.assertEqual(len(found), 5, found)
-        for expected, measured in zip(true_hz, found):
-            self.assertLess(abs(measured / expected - 1.0), 1e-4)
+        self.example.check_modes(self, found)
 
     def test_streaming(self):
         self.check_modes("streaming")
@@ -110,6 +112,17 @@ class Firmware(unittest.TestCase):
         done = self.call("run", "streaming.yaml", "-o", "refused.slog")
         self.assertEqual(done.returncode, 1, done.stderr)
         self.check_modes("resident", "--reset-fault")
+
+    def test_the_limits_hold_without_setpoints(self):
+        for seed, motion in ((1, "out of the window"), (2, "too fast")):
+            with self.subTest(motion):
+                self.tearDown()
+                self.start_node("drifting_node")
+                began = time.monotonic()
+                send(CAN_COMMAND, can_command(START, 1, seed))
+                states = [self.node.stdout.readline() for _ in range(2)]
+                self.assertLess(time.monotonic() - began, WATCHDOG_S)
+                self.assertRegex(states[1], f"^state 8, cause {LIMIT}, forces 0 0 N$")
 
     def test_a_second_host_is_refused(self):
         first = self.start("streaming", "first.slog", "--pace", "0.1")

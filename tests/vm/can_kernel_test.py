@@ -12,6 +12,7 @@ where the clock is the bus'; here everything must only end.
 import signal
 import subprocess
 import sys
+import time
 import unittest
 
 from can_equality_test import Decoding, Equality  # noqa: F401, found by unittest
@@ -19,6 +20,7 @@ from can_machine import SHORT, CanTest, counts, node_state, send_error, shell, w
 
 ERROR_CONTROLLER, ERROR_BUS_OFF, TX_PASSIVE = 0x4, 0x40, 0x20
 FOREVER = "x1000000000"
+FLOODED_S = 15  # of a machine in a machine; the deadlines are 20 ms
 
 
 class FrameFaults(CanTest):
@@ -60,9 +62,7 @@ def wait_for_rest():
     raise AssertionError(f"forces still act: {state}")
 
 
-class Interventions(CanTest):
-    """Something happens to a process or an interface in the middle of a run."""
-
+class RunningTest(CanTest):
     def setUp(self):
         self.name = self.machine.configure("b")
 
@@ -70,6 +70,49 @@ class Interventions(CanTest):
         process = self.machine.start(self.name, "run", *arguments)
         self.machine.wait_until_running(process)
         return process
+
+
+class OthersOnTheBus(RunningTest):
+    def test_node_frozen_on_a_bus_that_is_never_silent(self):
+        """Two senders without a pause, one of them with the identifier of measurements."""
+        for interrupted in (False, True):
+            with self.subTest(interrupted=interrupted), self.machine.node(self.name) as node:
+                process = self.begin()
+                flood = [subprocess.Popen(["cangen", "vcan0", "-f", "-g", "0", "-i", "-I", i, "-L", "16", "-D", "r"])
+                         for i in ("180", "7FF")]
+                try:
+                    node.send_signal(signal.SIGSTOP)
+                    if interrupted:
+                        process.send_signal(signal.SIGINT)
+                    began = time.monotonic()
+                    if interrupted:
+                        self.ends(process, 130, "interrupted; the measured data are kept")
+                    else:
+                        self.ends(process, 1, "the last one: ")
+                    self.assertLess(time.monotonic() - began, FLOODED_S)
+                finally:
+                    for sender in flood:
+                        sender.kill()
+                        sender.wait()
+                node.send_signal(signal.SIGCONT)
+                self.assertIn(wait_for_rest(), ("switch on disabled", "fault"))
+
+    def test_two_nodes_are_refused(self):
+        with self.machine.node(self.name), self.machine.node(self.name):
+            code, _, err = self.machine.run(self.name)
+            self.assertEqual(code, 1)
+            self.assertIn("can: vcan0: two nodes answer", err)
+            self.assertFalse((self.machine.at / "run.slog").exists(), "nothing was measured: no log")
+
+    def test_a_node_that_joins_a_run_ends_it(self):
+        with self.machine.node(self.name):
+            process = self.begin()
+            with self.machine.node(self.name):
+                self.ends(process, 1, "or a second node answers instead")
+
+
+class Interventions(RunningTest):
+    """Something happens to a process or an interface in the middle of a run."""
 
     def test_node_killed(self):
         with self.machine.node(self.name) as node:

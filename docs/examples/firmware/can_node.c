@@ -1,5 +1,6 @@
 #include "can_node.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { VERSION = 2, SATURATED = 0x80, STATE_US = 100000, SILENCE_US = 1000000 };
@@ -20,7 +21,7 @@ void can_draw_key(struct can_node* node) {
 
 /* The key of the host that has the stage; 0: none. */
 static uint32_t holder(const struct can_node* node) {
-  return node->state == MEASURING || node->resident == ARMED ? node->session : 0;
+  return node->state == MEASURING || node->reserved ? node->session : 0;
 }
 
 static void send_state(struct can_node* node, const struct can_command* answered, int accepted, const char* text) {
@@ -67,13 +68,14 @@ void can_safe_stop(struct can_node* node, enum stage_state next, enum stage_caus
   stage_hardware_stop();
   if (node->resident == PLAYING) node->resident = FAILED;
   if (node->resident == ARMED) node->resident = IDLE;
+  node->reserved = 0;
   node->state = next;
   node->cause = cause;
 }
 
 static uint32_t to_count(double value, uint8_t* kind) {
   const double limit = largest_count;
-  if (!(value == value)) return (uint32_t)no_value;
+  if (isnan(value)) return (uint32_t)no_value;
   if (value > limit || value < -limit) *kind |= SATURATED;
   if (value > limit) return (uint32_t)largest_count;
   if (value < -limit) return (uint32_t)-largest_count;
@@ -89,31 +91,22 @@ static void make_answer(struct can_node* node, uint16_t sequence) {
   can_seal(&node->answer, MEASUREMENT, 3 * STAGE_SENSORS, sequence, kind, (uint8_t)node->session, (uint16_t)node->now_us);
 }
 
-/* u[n] -> y[n+1]. Returns the outcome. */
-uint32_t can_move(struct can_node* node, const double u_n[STAGE_ACTUATORS]) {
-  int i;
-  for (i = 0; i < STAGE_ACTUATORS; ++i)
-    if (!(u_n[i] <= STAGE_FORCE_LIMIT_N && u_n[i] >= -STAGE_FORCE_LIMIT_N)) {
-      can_safe_stop(node, FAULT, u_n[i] == u_n[i] ? LIMIT : NOT_FINITE);
-      return 9;
-    }
-  stage_hardware_exchange(u_n, node->y_m);
-  ++node->sample;
-  for (i = 0; i < STAGE_SENSORS; ++i)
-    if (!(node->y_m[i] <= STAGE_WINDOW_M && node->y_m[i] >= -STAGE_WINDOW_M)) {
-      can_safe_stop(node, FAULT, node->y_m[i] == node->y_m[i] ? LIMIT : NOT_FINITE);
-      return 9;
-    }
-  return 0;
+int can_move(struct can_node* node, const double u_n[STAGE_ACTUATORS]) {
+  const enum stage_cause cause = stage_move(u_n, node->y_m);
+  if (cause != NO_CAUSE) can_safe_stop(node, FAULT, cause);
+  else ++node->sample;
+  node->sample_us = node->now_us;
+  return cause == NO_CAUSE;
 }
 
 void can_begin(struct can_node* node, uint64_t seed) {
-  stage_hardware_start(seed, node->y_m);
+  stage_hardware_start(seed);
+  stage_hardware_measure(node->y_m);
   node->state = MEASURING;
   node->sample = 0;
   node->last_sequence = 0;
   node->gaps = node->repeated = 0;
-  node->setpoint_us = node->now_us;
+  node->setpoint_us = node->sample_us = node->now_us;
 }
 
 const char* can_enable(struct can_node* node) {
@@ -230,13 +223,9 @@ static void take_setpoint(struct can_node* node, const struct can_message* messa
   for (i = 0; i < STAGE_ACTUATORS; ++i) {
     const uint32_t bits = (uint32_t)can_take(message->data + CAN_HEADER + 3 * i, 3);
     const int32_t count = (int32_t)bits - (bits > 0x7FFFFF ? 0x1000000 : 0);
-    if (count == no_value) {
-      can_safe_stop(node, FAULT, NOT_FINITE);
-      return;
-    }
-    u_n[i] = count * (CAN_FORCE_RANGE_N / 8388608.0);
+    u_n[i] = count == no_value ? NAN : count * (CAN_FORCE_RANGE_N / 8388608.0);
   }
-  if (can_move(node, u_n) != 0) return;
+  if (!can_move(node, u_n)) return;
   make_answer(node, sequence);
   can_send(&node->answer);
 }
@@ -253,11 +242,18 @@ void can_node_tick(struct can_node* node, uint32_t now_us, int interlock_closed)
   node->now_us = now_us;
   node->interlock_closed = interlock_closed;
   if (powered && !interlock_closed) can_safe_stop(node, FAULT, INTERLOCK);
-  if (resident && now_us - node->heard_us > SILENCE_US)
-    can_safe_stop(node, node->resident == ARMED ? SWITCH_ON_DISABLED : FAULT,
-              node->resident == ARMED ? NO_CAUSE : HOST_SILENT);
+  if (node->reserved && now_us - node->heard_us > SILENCE_US) {
+    node->reserved = 0;
+    if (node->resident == ARMED) can_safe_stop(node, SWITCH_ON_DISABLED, NO_CAUSE);
+    if (node->resident == PLAYING) can_safe_stop(node, FAULT, HOST_SILENT);
+  }
   if (!resident && node->state == MEASURING && now_us - node->setpoint_us > node->watchdog_us)
     can_safe_stop(node, FAULT, HOST_SILENT);
+  if (node->state == MEASURING) {
+    const enum stage_cause cause = stage_watch(1e-6 * (now_us - node->sample_us), node->y_m);
+    node->sample_us = now_us;
+    if (cause != NO_CAUSE) can_safe_stop(node, FAULT, cause);
+  }
   can_play(node);
   can_send_chunks(node);
   if (node->state != node->shown_state || now_us - node->state_us >= STATE_US) send_state(node, NULL, 0, NULL);

@@ -4,7 +4,7 @@
 #define CAN_NODE_H
 
 #include "can_frame.h"
-#include "stage_node.h"
+#include "stage_limits.h"
 
 /* 1.25 times the limits, as the host assumes without actuator_range_n and sensor_range_m. */
 #define CAN_FORCE_RANGE_N (1.25 * STAGE_FORCE_LIMIT_N)
@@ -21,8 +21,8 @@ struct can_node {
   enum stage_state state, shown_state;
   enum stage_cause cause;
   enum can_resident resident;
-  uint32_t boot, random, now_us, state_us, setpoint_us, heard_us, watchdog_us;
-  int interlock_closed;
+  uint32_t boot, random, now_us, state_us, setpoint_us, sample_us, heard_us, watchdog_us;
+  int interlock_closed, reserved; /* reserved: from arm until stop or silence */
   /* Run: key, and the command that began it. */
   uint32_t session, trace_session, host;
   uint16_t begun_sequence, last_sequence, trigger_sequence;
@@ -49,7 +49,7 @@ struct can_command {
 
 void can_node_init(struct can_node* node, uint32_t boot, uint32_t watchdog_us);
 void can_node_receive(struct can_node* node, const struct can_message* message);
-/* Watchdogs, resident samples, downloads, states: call it at least once per millisecond. */
+/* Watchdogs, limits, resident samples, downloads, states: call it at least once per millisecond. */
 void can_node_tick(struct can_node* node, uint32_t now_us, int interlock_closed);
 
 /* The bus. Returns 0 if the queue is full; the frame is then not sent. */
@@ -59,8 +59,8 @@ int can_send(const struct can_message* message);
 const char* can_enable(struct can_node* node);
 void can_draw_key(struct can_node* node);
 void can_begin(struct can_node* node, uint64_t seed);
-/* u[n] -> y[n+1]. Returns the outcome. */
-uint32_t can_move(struct can_node* node, const double u_n[STAGE_ACTUATORS]);
+/* u[n] -> y[n+1]. Returns 0 if the stage was stopped. */
+int can_move(struct can_node* node, const double u_n[STAGE_ACTUATORS]);
 void can_safe_stop(struct can_node* node, enum stage_state next, enum stage_cause cause);
 
 const char* can_upload(struct can_node* node, const struct can_command* command);

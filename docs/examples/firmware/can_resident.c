@@ -63,9 +63,10 @@ const char* can_arm(struct can_node* node, const struct can_command* command) {
     return "the memory contains a different waveform; upload it";
   if (command->b == 0 || command->b > CAN_TRACE_BYTES / ROW_BYTES) return "the run exceeds the trace memory";
   if ((refusal = can_enable(node)) != NULL) return refusal;
-  if (node->resident != ARMED) can_draw_key(node);
+  if (!node->reserved) can_draw_key(node);
   node->trace_session = node->session;
   node->resident = ARMED;
+  node->reserved = 1;
   node->seed_high = (uint32_t)(command->a >> 32);
   node->seed_low = (uint32_t)command->a;
   node->samples = command->b;
@@ -132,7 +133,7 @@ static void play_sample(struct can_node* node) {
     can_put(row, 0, 4); /* outcome of y[n]: a bad one ends the run before its row */
     node->trace_bytes += ROW_BYTES;
   }
-  if (can_move(node, u_n) != 0) return;
+  if (!can_move(node, u_n)) return;
   if (node->sample < node->samples + node->ramp) return;
   stage_hardware_stop();
   node->state = OPERATION_ENABLED;

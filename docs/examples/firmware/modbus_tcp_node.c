@@ -1,5 +1,5 @@
 /* Runs the node on a computer, over Modbus TCP on the loopback interface:
- *   cc -std=c99 -O2 -o node modbus_tcp_node.c stage_node.c stage_plant.c -lm
+ *   cc -std=c99 -O2 -o node modbus_tcp_node.c stage_*.c -lm
  *   ./node PORT [WATCHDOG_MS]      PORT 0: a free one
  * On a microcontroller, the loop in main() becomes that of its TCP stack or serial line. */
 #define _POSIX_C_SOURCE 200809L

@@ -1,5 +1,5 @@
 /* Runs the CAN node on a computer with SocketCAN:
- *   cc -std=c99 -O2 -o can_node socketcan_node.c can_*.c stage_plant.c -lm
+ *   cc -std=c99 -O2 -o can_node socketcan_node.c can_*.c stage_limits.c stage_plant.c -lm
  *   ./can_node INTERFACE [WATCHDOG_MS] */
 #define _DEFAULT_SOURCE
 #include <fcntl.h>

@@ -1,5 +1,6 @@
 #include "stage_node.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Addresses of the register map. */
@@ -44,8 +45,6 @@ static uint32_t to_count(double value) {
   return (uint32_t)(int32_t)(value < 0.0 ? value - 0.5 : value + 0.5);
 }
 
-static double magnitude(double value) { return value < 0.0 ? -value : value; }
-
 static uint32_t hash(const char* text) { /* FNV-1a */
   uint32_t value = 2166136261u;
   for (; *text != '\0'; ++text) value = (value ^ (uint8_t)*text) * 16777619u;
@@ -59,15 +58,19 @@ static uint32_t draw_key(struct stage_node* node) { /* xorshift: never 0 */
   return node->random;
 }
 
+/* A sensor that is NaN has no value; without `y_m`, none has. */
 static void set_measurement(struct stage_node* node, uint32_t sequence, uint32_t outcome, const double* y_m) {
+  uint32_t valid = 0; /* up to 32 sensors */
   int i;
   set(node, MEASUREMENT_SEQUENCE, sequence);
   set(node, MEASUREMENT_STATUS,
       outcome | (uint32_t)node->state << 8 | (uint32_t)node->cause << 16 | node->missed << 24);
-  set(node, VALID, 0);
-  set(node, VALID + 2, y_m != NULL ? (1u << STAGE_SENSORS) - 1u : 0); /* up to 31 sensors */
-  for (i = 0; i < STAGE_SENSORS; ++i)
-    set(node, MEASUREMENT + 2 * i, y_m != NULL ? to_count(y_m[i] / STAGE_POSITION_SCALE_M) : 0);
+  for (i = 0; i < STAGE_SENSORS; ++i) {
+    const int has_value = y_m != NULL && !isnan(y_m[i]);
+    if (has_value) valid |= 1u << i;
+    set(node, MEASUREMENT + 2 * i, has_value ? to_count(y_m[i] / STAGE_POSITION_SCALE_M) : 0);
+  }
+  set(node, VALID + 2, valid);
 }
 
 void stage_node_init(struct stage_node* node, uint32_t boot_id, uint32_t watchdog_ms) {
@@ -96,6 +99,11 @@ static void safe_stop(struct stage_node* node, enum stage_state next, enum stage
   node->cause = cause;
 }
 
+static void obey_limits(struct stage_node* node, enum stage_cause cause) {
+  if (cause != NO_CAUSE) safe_stop(node, FAULT, cause);
+  node->sample_ms = node->now_ms;
+}
+
 static int powered(const struct stage_node* node) {
   return node->state == OPERATION_ENABLED || node->state == MEASURING;
 }
@@ -112,85 +120,60 @@ void stage_node_tick(struct stage_node* node, uint32_t now_ms, int interlock_clo
     safe_stop(node, FAULT, HEARTBEAT_LOST);
   } else if (node->state == MEASURING && now_ms - node->setpoint_ms > node->watchdog_ms) {
     safe_stop(node, FAULT, HOST_SILENT);
+  } else if (node->state == MEASURING) { /* one more, because times are rounded down */
+    obey_limits(node, stage_watch(1e-3 * (now_ms - node->sample_ms + 1), node->y_m));
   }
 }
 
+/* Returns whether the command is accepted. */
 static int take_command(struct stage_node* node, uint32_t command) {
-  switch (command) {
-    case ENABLE:
-      if (node->state == FAULT || !node->interlock_closed) return 0;
-      if (node->state == SWITCH_ON_DISABLED) node->state = OPERATION_ENABLED;
-      return 1;
-    case DISABLE:
-      if (node->state == FAULT || node->state == MEASURING) return 0;
-      node->state = SWITCH_ON_DISABLED;
-      return 1;
-    case QUICK_STOP:
-      if (node->state == FAULT) return 0;
-      safe_stop(node, SWITCH_ON_DISABLED, NO_CAUSE);
-      return 1;
-    case RESET_FAULT:
-      if (!node->interlock_closed) return 0;
-      if (node->state == FAULT) safe_stop(node, SWITCH_ON_DISABLED, NO_CAUSE);
-      return 1;
-  }
-  return 0;
+  const int fault = node->state == FAULT;
+  if (command < ENABLE || command > RESET_FAULT) return 0;
+  if (!node->interlock_closed && (command == ENABLE || command == RESET_FAULT)) return 0;
+  if (fault && command != RESET_FAULT) return 0;
+  if (node->state == MEASURING && command == DISABLE) return 0;
+  if (command == ENABLE && node->state == SWITCH_ON_DISABLED) node->state = OPERATION_ENABLED;
+  if (command == DISABLE || command == QUICK_STOP || fault) safe_stop(node, SWITCH_ON_DISABLED, NO_CAUSE);
+  return 1;
 }
 
 static int take_run_command(struct stage_node* node, uint32_t connection) {
-  double y_m[STAGE_SENSORS];
   const uint32_t command = get(node, RUN_COMMAND);
   if (command != RUN_BEGIN && command != RUN_END) return ILLEGAL_VALUE;
   if (command == RUN_BEGIN) {
     if (node->state == MEASURING) return BUSY;
     if (node->state != OPERATION_ENABLED) return DEVICE_FAILURE;
-    stage_hardware_start((uint64_t)get(node, RUN_SEED) << 32 | get(node, RUN_SEED + 2), y_m);
+    stage_hardware_start((uint64_t)get(node, RUN_SEED) << 32 | get(node, RUN_SEED + 2));
+    stage_hardware_measure(node->y_m);
     node->state = MEASURING;
     node->session = draw_key(node);
     node->owner = connection;
-    node->setpoint_ms = node->now_ms;
+    node->setpoint_ms = node->sample_ms = node->now_ms;
   } else if (node->state == MEASURING) {
-    stage_hardware_stop();
-    node->state = OPERATION_ENABLED;
+    safe_stop(node, OPERATION_ENABLED, NO_CAUSE);
   }
   node->missed = 0;
   set(node, SETPOINT_SEQUENCE, 0);
-  set_measurement(node, 0, OUTCOME_OK, command == RUN_BEGIN ? y_m : NULL);
+  set_measurement(node, 0, OUTCOME_OK, command == RUN_BEGIN ? node->y_m : NULL);
   return 0;
 }
 
-/* u[n] -> y[n+1]. A force beyond its limit is not applied, and not clamped either. */
-static uint32_t move(struct stage_node* node, double y_m[STAGE_SENSORS]) {
-  double u_n[STAGE_ACTUATORS];
-  int i;
-  for (i = 0; i < STAGE_ACTUATORS; ++i) {
-    u_n[i] = STAGE_FORCE_SCALE_N * signed_count(get(node, SETPOINT + 2 * i));
-    if (magnitude(u_n[i]) > STAGE_FORCE_LIMIT_N) {
-      safe_stop(node, FAULT, LIMIT);
-      return OUTCOME_FAULT;
-    }
-  }
-  stage_hardware_exchange(u_n, y_m);
-  for (i = 0; i < STAGE_SENSORS; ++i)
-    if (!(magnitude(y_m[i]) <= STAGE_WINDOW_M)) {
-      safe_stop(node, FAULT, y_m[i] == y_m[i] ? LIMIT : NOT_FINITE);
-      return OUTCOME_LIMIT;
-    }
-  return OUTCOME_OK;
-}
-
+/* u[n] -> y[n+1] */
 static void take_setpoint(struct stage_node* node) {
-  double y_m[STAGE_SENSORS];
+  double u_n[STAGE_ACTUATORS];
   uint32_t outcome = OUTCOME_FAULT;
+  int i;
   const uint32_t sequence = get(node, SETPOINT_SEQUENCE);
   const uint32_t ahead = sequence - get(node, MEASUREMENT_SEQUENCE);
   if (ahead == 0 || ahead > 0x7FFFFFFFu) return; /* repeated or older: the last measurement is the answer */
   node->missed = ahead - 1 < 255 - node->missed ? node->missed + ahead - 1 : 255;
   if (node->state == MEASURING) {
+    for (i = 0; i < STAGE_ACTUATORS; ++i) u_n[i] = STAGE_FORCE_SCALE_N * signed_count(get(node, SETPOINT + 2 * i));
+    obey_limits(node, stage_move(u_n, node->y_m));
     node->setpoint_ms = node->now_ms;
-    outcome = move(node, y_m);
+    outcome = node->state == MEASURING ? OUTCOME_OK : OUTCOME_LIMIT;
   }
-  set_measurement(node, sequence, outcome, outcome == OUTCOME_FAULT ? NULL : y_m);
+  set_measurement(node, sequence, outcome, outcome == OUTCOME_FAULT ? NULL : node->y_m);
 }
 
 /* Whether this write may reach the registers of the run. */
@@ -242,7 +225,7 @@ static int write_registers(struct stage_node* node, uint32_t connection, unsigne
 }
 
 static int read_registers(struct stage_node* node, uint32_t connection, unsigned first, unsigned count,
-                          uint8_t* reply, size_t* bytes) {
+                          uint8_t* reply) {
   unsigned i;
   if (first + count > STAGE_REGISTERS) return ILLEGAL_ADDRESS;
   set(node, HEARTBEAT_ECHO, get(node, HEARTBEAT));
@@ -255,46 +238,50 @@ static int read_registers(struct stage_node* node, uint32_t connection, unsigned
     reply[2 + 2 * i] = (uint8_t)(node->registers[first + i] >> 8);
     reply[3 + 2 * i] = (uint8_t)node->registers[first + i];
   }
-  *bytes = 2 + 2 * (size_t)count;
   return 0;
 }
 
-static int answer(struct stage_node* node, uint32_t connection, const uint8_t* request, size_t bytes, uint8_t* reply,
-                  size_t* reply_bytes) {
+static int reads(int function) { return function == 3 || function == 4 || function == 23; }
+static int writes(int function) { return function == 6 || function == 16 || function == 23; }
+
+static int answer(struct stage_node* node, uint32_t connection, const uint8_t* request, size_t bytes, uint8_t* reply) {
   const int function = request[0];
-  const size_t head = function == 23 ? 10 : function == 16 ? 6 : 5;
-  unsigned count;
+  uint8_t pdu[STAGE_LARGEST_PDU] = {0}; /* a request that is too short ends with zeros */
+  const uint8_t* at = pdu + 1;
+  unsigned first = 0, count = 1, to_read = 0;
   int refused;
-  if (function != 3 && function != 4 && function != 6 && function != 16 && function != 23) return ILLEGAL_FUNCTION;
-  if (bytes < head) return ILLEGAL_VALUE;
-  memcpy(reply + 1, request + 1, 4); /* the reply to functions 6 and 16 */
-  *reply_bytes = 5;
-  if (function == 6)
-    return bytes == 5 ? write_registers(node, connection, word(request + 1), 1, request + 3) : ILLEGAL_VALUE;
-  count = word(request + 3); /* functions 3, 4 and 23: registers to read */
-  if (count < 1 || count > (function == 16 ? 123 : 125)) return ILLEGAL_VALUE;
-  if (function == 3 || function == 4)
-    return bytes == 5 ? read_registers(node, connection, word(request + 1), count, reply, reply_bytes)
-                      : ILLEGAL_VALUE;
-  {
-    const uint8_t* write = request + head - 5; /* address, count, bytes */
-    const unsigned written = word(write + 2);
-    if (written < 1 || written > (function == 16 ? 123 : 121) || write[4] != 2 * written || bytes != head + 2 * written)
-      return ILLEGAL_VALUE;
-    refused = write_registers(node, connection, word(write), written, write + 5);
+  if (!reads(function) && !writes(function)) return ILLEGAL_FUNCTION;
+  if (bytes > sizeof pdu) return ILLEGAL_VALUE;
+  memcpy(pdu, request, bytes);
+  memcpy(reply + 1, pdu + 1, 4); /* the reply to a write */
+  if (reads(function)) {
+    to_read = word(at + 2);
+    if (to_read < 1 || to_read > 125) return ILLEGAL_VALUE;
+    at += 4;
   }
-  if (refused != 0 || function == 16) return refused;
-  return read_registers(node, connection, word(request + 1), count, reply, reply_bytes);
+  if (writes(function)) {
+    first = word(at);
+    at += 2;
+    if (function != 6) { /* which writes one register */
+      count = word(at);
+      if (count < 1 || count > (reads(function) ? 121 : 123) || at[2] != 2 * count) return ILLEGAL_VALUE;
+      at += 3;
+    }
+    at += 2 * count;
+  }
+  if (at != pdu + bytes) return ILLEGAL_VALUE;
+  if (writes(function) && (refused = write_registers(node, connection, first, count, at - 2 * count)) != 0)
+    return refused;
+  return reads(function) ? read_registers(node, connection, word(pdu + 1), to_read, reply) : 0;
 }
 
 size_t stage_node_answer(struct stage_node* node, uint32_t connection, const uint8_t* request, size_t bytes,
                          uint8_t reply[STAGE_LARGEST_PDU]) {
-  size_t reply_bytes = 0;
   int refused;
   if (bytes == 0) return 0;
   reply[0] = request[0];
-  refused = answer(node, connection, request, bytes, reply, &reply_bytes);
-  if (refused == 0) return reply_bytes;
+  refused = answer(node, connection, request, bytes, reply);
+  if (refused == 0) return reads(request[0]) ? 2 + (size_t)reply[1] : 5;
   reply[0] = request[0] | 0x80;
   reply[1] = (uint8_t)refused;
   return 2;

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "stage_node.h"
+#include "stage_limits.h"
 
 enum { MODES = 5 };
 static const struct {
@@ -15,7 +15,7 @@ static const struct {
     {47.0, 0.01, {0.4, 0.3}, {0.3, -0.4}},
 };
 static double a[MODES][2][2], b[MODES][2]; /* of displacement and velocity per mode */
-static double x[MODES][2], force_n[STAGE_ACTUATORS];
+static double x[MODES][2], position_m[STAGE_SENSORS], force_n[STAGE_ACTUATORS];
 static uint64_t random_state;
 
 /* Uniform noise. Without any, the rounding to counts would repeat in every period and look like distortion. */
@@ -35,22 +35,22 @@ static void discretize(int m) {
   b[m][1] = d;
 }
 
-static void measure(double y_m[STAGE_SENSORS]) {
+static void sample(void) {
   int i, m;
   for (i = 0; i < STAGE_SENSORS; ++i)
-    for (y_m[i] = noise_m(), m = 0; m < MODES; ++m) y_m[i] += modes[m].sensor[i] * x[m][0];
+    for (position_m[i] = noise_m(), m = 0; m < MODES; ++m) position_m[i] += modes[m].sensor[i] * x[m][0];
 }
 
-void stage_hardware_start(uint64_t seed, double y_m[STAGE_SENSORS]) {
+void stage_hardware_start(uint64_t seed) {
   int m;
   for (m = 0; m < MODES; ++m) discretize(m);
   memset(x, 0, sizeof x);
   random_state = seed;
   stage_hardware_stop();
-  measure(y_m);
+  sample();
 }
 
-void stage_hardware_exchange(const double u_n[STAGE_ACTUATORS], double y_m[STAGE_SENSORS]) {
+void stage_hardware_apply(const double u_n[STAGE_ACTUATORS]) {
   int i, m;
   memcpy(force_n, u_n, sizeof force_n);
   for (m = 0; m < MODES; ++m) {
@@ -60,8 +60,11 @@ void stage_hardware_exchange(const double u_n[STAGE_ACTUATORS], double y_m[STAGE
     x[m][0] = a[m][0][0] * q + a[m][0][1] * v + b[m][0] * f;
     x[m][1] = a[m][1][0] * q + a[m][1][1] * v + b[m][1] * f;
   }
-  measure(y_m);
+  sample();
 }
+
+/* Setpoints are the clock of this stage: it does not move between them. */
+void stage_hardware_measure(double y_m[STAGE_SENSORS]) { memcpy(y_m, position_m, sizeof position_m); }
 
 void stage_hardware_stop(void) { memset(force_n, 0, sizeof force_n); }
 

@@ -1,6 +1,6 @@
 /* Runs the CAN node behind ZeroMQ, for a rapid-prototyping controller or any computer without CAN FD. Resident only.
  *   stageid config header stage_zeromq.yaml -o stage.h
- *   cc -std=c99 -O2 -o zeromq_node zeromq_node.c can_*.c stage_plant.c -lzmq -lm
+ *   cc -std=c99 -O2 -o zeromq_node zeromq_node.c can_*.c stage_limits.c stage_plant.c -lzmq -lm
  *   ./zeromq_node tcp://0.0.0.0:5555 */
 #define _DEFAULT_SOURCE
 #include <stdio.h>
@@ -12,7 +12,7 @@
 #include "can_node.h"
 #include "stage.h"
 
-enum { HOSTS = 8, LARGEST_NAME = 32, MESSAGES_AT_ONCE = 256 };
+enum { HOSTS = 8, LARGEST_NAME = 32, MESSAGES_AT_ONCE = 256, TICK_US = 1000 };
 
 /* As on a bus, every host receives every frame. The one that was silent for longest makes place for a new one. */
 struct host {
@@ -100,7 +100,7 @@ int main(int count, char** arguments) {
     waiting.socket = bus;
     waiting.events = ZMQ_POLLIN;
     zmq_poll(&waiting, 1, 1);
-    can_node_tick(&node, now_us(), 1);
+    if (now_us() - node.now_us >= TICK_US) can_node_tick(&node, now_us(), 1);
     for (i = 0; i < MESSAGES_AT_ONCE && receive(); ++i) {
     }
     if (shown_state == (int)node.state) continue;

@@ -314,6 +314,36 @@ TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
   EXPECT_NO_THROW(first->download(rows));
 }
 
+// Otherwise another host's arm would overwrite a trace that its owner has not downloaded yet.
+TEST(CanOwnership, AStageStaysReservedBetweenTheRunsOfAResidentExperiment) {
+  CanRig rig;
+  const auto first = resident(rig);
+  const auto second = resident(rig);
+  first->upload(waveforms(1));
+  first->arm({});
+  rig.serve_ms(100);
+  ASSERT_EQ(first->poll().status, JobStatus::done);
+  const std::string held = "another host measures with this stage";
+  EXPECT_THAT(refusal([&] { second->upload(waveforms(1)); }), HasSubstr(held));
+  Host streaming(rig);
+  EXPECT_THAT(refusal([&] { streaming.start(); }), HasSubstr(held));
+  NoRows rows;
+  EXPECT_EQ(first->download(rows).done, 100U);
+  first->upload(waveforms(2));
+  first->arm({});
+  rig.serve_ms(100);
+  EXPECT_EQ(first->poll().status, JobStatus::done);
+  first->stop();
+  second->upload(waveforms(1));
+  second->arm({});
+  rig.serve_ms(100);
+  EXPECT_EQ(second->poll().status, JobStatus::done);
+  rig.serve_ms(1100);  // without a stop
+  EXPECT_EQ(rig.node().session(), 0U);
+  streaming.start();
+  EXPECT_EQ(streaming.exchange(), Outcome::ok);
+}
+
 TEST(CanOwnership, OthersDoNotKeepASilentHostsRunAlive) {
   CanRig rig;
   const auto first = resident(rig);

@@ -164,6 +164,9 @@ TEST_P(CanPeer, HasTheReactionOfTheTable) {
     EXPECT_EQ(exchange(3), Outcome::ok);
   } else {
     EXPECT_THAT(stage.trouble(), testing::Not(testing::IsEmpty()));
+    // At a limit the excitation is ramped down; the node may be good again meanwhile.
+    if (wanted.outcome == Outcome::limit) static_cast<void>(exchange(3));
+    EXPECT_THAT(stage.trouble(), testing::Not(testing::IsEmpty()));
   }
 }
 
@@ -294,7 +297,13 @@ TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
   ASSERT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::ok);
   lying.say = row.say;
   EXPECT_EQ(stage->exchange({1, 0, u}, inputs, {}), wanted.outcome) << stage->trouble();
-  EXPECT_THAT(stage->trouble(), testing::Not(testing::IsEmpty()));
+  const std::string trouble = stage->trouble();
+  EXPECT_THAT(trouble, testing::Not(testing::IsEmpty()));
+  if (wanted.outcome != Outcome::limit) return;
+  // The excitation is ramped down; the node may be good again meanwhile.
+  lying.say = nullptr;
+  EXPECT_EQ(stage->exchange({2, 0, u}, inputs, {}), Outcome::ok);
+  EXPECT_EQ(stage->trouble(), trouble);
 }
 
 INSTANTIATE_TEST_SUITE_P(

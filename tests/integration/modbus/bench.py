@@ -1,14 +1,17 @@
 """A `stageid node` and a `stageid run` in processes of their own, and what stands between them."""
+import contextlib
 import dataclasses
-import os
 import pathlib
 import re
-import select
 import signal
 import subprocess
+import sys
 import time
 
 from pymodbus.client import ModbusTcpClient
+
+sys.path.append(str(pathlib.Path(__file__).parents[1]))
+from peers import ModbusRelay, SharedLine  # noqa: E402
 
 STATUS, STATE, CAUSE, BOOT_ID = 200, 208, 210, 204
 STATES = ['not ready', 'switch on disabled', 'ready', 'switched on', 'operation enabled', 'measuring', 'quick stop',
@@ -41,11 +44,13 @@ class Bench:
         self.experiment_text = (pathlib.Path(source) / 'configs/experiment/small_stage_modbus.yaml').read_text()
         self.processes = []
         self.nodes = 0
+        self.exit = contextlib.ExitStack()  # of what is no process
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
+        self.exit.close()
         for process in self.processes:
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
@@ -64,6 +69,10 @@ class Bench:
         while not all(end.exists() for end in ends):
             time.sleep(0.01)
         return ends
+
+    def shared_line(self, frames):
+        """Two ends of a line on which other units talk, too."""
+        return self.exit.enter_context(contextlib.closing(SharedLine(frames))).ends
 
     def node(self, *options, tcp=True, own_watchdog=False):
         """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves, or its own."""
@@ -84,6 +93,10 @@ class Bench:
         found = re.search(r'127\.0\.0\.1:(\d+)', said.read_text())
         return process, int(found.group(1)) if found else None
 
+    def relay(self, port, alter):
+        """The port of a wire to that node."""
+        return self.exit.enter_context(contextlib.closing(ModbusRelay(port, alter))).port
+
     def stage(self, name, backend='modbus', door='tcp: {port: 1502}', supervisor=None, unit=1):
         text = re.sub(r'# The supervisor.*?(?=actuators:)', '', self.stage_text, flags=re.S)
         text = re.sub(r'modbus:\n(  .*\n)+', '', text)
@@ -99,9 +112,15 @@ class Bench:
         path.write_text(text)
         return path
 
-    def experiment(self, stage, name='experiment'):
+    def experiment(self, stage, name='experiment', short=False):
+        text = self.experiment_text.replace('../stage/small_stage_modbus.yaml', str(stage))
+        if short:
+            for old, new in (('axes: [a1, a2, a3]', 'axes: [a1]'), ('period_s: 10', 'period_s: 2.5'),
+                             ('transient_periods: 2', 'transient_periods: 1'), ('  periods: 3', '  periods: 1')):
+                assert old in text
+                text = text.replace(old, new)
         path = self.work / f'{name}.yaml'
-        path.write_text(self.experiment_text.replace('../stage/small_stage_modbus.yaml', str(stage)))
+        path.write_text(text)
         return path
 
     def start_run(self, experiment, log, *options):

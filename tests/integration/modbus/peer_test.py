@@ -83,12 +83,9 @@ class ModbusTest(unittest.TestCase):
         stage = self.bench.stage('held_stage', door=f'tcp: {{port: {port}}}')
         stage.write_text(stage.read_text().replace(
             'stuck_sensor_s', 'between_runs: hold\nrealtime: {misses_allowed: 1000}\nstuck_sensor_s'))
-        experiment = self.bench.experiment(stage, 'held')
-        text = experiment.read_text()
-        for old, new in (('period_s: 10', 'period_s: 2.5'), ('transient_periods: 2', 'transient_periods: 1'),
-                         ('  periods: 3', '  periods: 1'), ('realizations: 1', 'realizations: 2')):
-            text = text.replace(old, new)
-        experiment.write_text(text)
+        experiment = self.bench.experiment(stage, 'held', short=True)
+        experiment.write_text(experiment.read_text().replace('axes: [a1]', 'axes: [a1, a2, a3]').replace(
+            'realizations: 1', 'realizations: 2'))
         return experiment
 
     def test_a_held_stage_is_in_one_run_of_the_node_from_first_to_last(self):
@@ -180,6 +177,32 @@ class ModbusTest(unittest.TestCase):
         self.assertEqual(client.read_holding_registers(STATE, 2, slave=9).exception_code, 11)
         self.assertEqual(client.read_coils(0, 1, slave=1).exception_code, 1)
         self.assertEqual(number(port, STATE), 1, 'the node must have come through unharmed')
+
+    def test_a_second_host_is_refused_and_the_first_one_completes(self):
+        _, port = self.bench.node()
+        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
+        experiment = self.bench.experiment(stage, short=True)
+        first = self.bench.start_run(experiment, self.bench.work / 'first.slog', '--pace', 1)
+        self.assertEqual(wait_for_state(port, {'measuring'}), 'measuring')
+        second = self.bench.run('run', experiment, '-o', self.bench.work / 'second.slog')
+        self.assertEqual(second.returncode, 1, second.stderr)
+        self.assertIn('another host measures with this stage', second.stderr)
+        out, err = first.communicate(timeout=60)
+        self.assertIn(first.returncode, (0, 3), err)  # late cycles on a busy machine
+        self.assertIn('1 of 1 run complete', out)
+        self.assertIn(' 0 missing', out)
+
+    def test_a_run_completes_beside_a_crowd(self):
+        _, port = self.bench.node()
+        for half_a_header in [True] * 16 + [False] * 200:
+            client = socket.create_connection(('127.0.0.1', port))
+            self.addCleanup(client.close)
+            if half_a_header:
+                client.sendall(bytes(5))
+        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
+        done = self.bench.run('run', self.bench.experiment(stage), '-o', self.bench.work / 'run.slog', '--pace', 0)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn('3 of 3 runs complete', done.stdout)
 
     def test_a_node_ends_beside_clients_that_stall(self):
         node, port = self.bench.node()

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
@@ -210,6 +211,31 @@ TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
     EXPECT_THAT(result.err, HasSubstr("; braked, "));
     const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
     EXPECT_GT(info["runs"][0]["health"]["marked"], 0);
+    // The applied forces, not the commands of the controller.
+    const std::unique_ptr<LogReader> log = open_log(at(file + ".slog"));
+    LogSamples all;
+    log->read(0, 0, log->runs()[0].samples, all);
+    EXPECT_LE(all.actuators.cwiseAbs().maxCoeff(), 40.0);
+  }
+}
+
+TEST_F(Workflow, AFaultWhileAGoodRunIsRampedDownIsToldAndTheRunIsKept) {
+  const std::tuple<const char*, int, const char*> cases[] = {
+      {"kind: sensor_offset, channel: s1, value: 6e-4", 4, "sensor s1: jumped"},
+      {"kind: interlock", 1, "reports: fault"}};
+  for (const auto& [fault, exit_code, cause] : cases) {
+    const std::string file = "landing" + std::to_string(exit_code);
+    const std::string config =
+        stage(file + ".yaml",
+              "noise:", std::string("faults: [{") + fault + ", from_cycle: 2505}]\nnoise:");
+    const ProgramResult result = run({"run", config, "-o", name(file + ".slog")});
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(cause));
+    const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
+    ASSERT_EQ(info["runs"].size(), 1U);
+    EXPECT_TRUE(info["runs"][0]["complete"]);
+    EXPECT_EQ(info["runs"][0]["samples"], 2500);
+    EXPECT_EQ(info["runs"][0]["health"]["marked"], 0);
   }
 }
 
