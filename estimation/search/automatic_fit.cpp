@@ -21,6 +21,7 @@
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
@@ -29,17 +30,6 @@
 
 namespace stageid {
 namespace {
-
-constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
-constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
-constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
-// A trial from nothing that is this many times as costly as the model after a third of its iterations is given up.
-constexpr double kHopeless = 10.0;
-constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
-constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
-constexpr int kMostGrown = 40;              // modes; more are placed at once before growing
-constexpr int kIterationsOfMany = 6;        // with free poles: those hidden by noise never settle
-constexpr double kSettledOfMany = 0.02;     // the same per pole for many modes, root mean square
 
 /// Grows and prunes a model, and records every decision.
 class AutomaticFit {
@@ -92,7 +82,12 @@ class AutomaticFit {
   /// @param surplus modes to grow beyond the requested number
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
-    if (best_.status == FitStatus::singular || selection_.keep_modes) return;
+    if (best_.status == FitStatus::singular) return;
+    if (selection_.keep_modes) {
+      structure_.open = {.rigid_body = structure_.open.rigid_body};
+      restructure();
+      return;
+    }
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) {
       reduce();
@@ -107,7 +102,7 @@ class AutomaticFit {
     restructure();
     if (!at_rounding()) {  // else the last fit is sufficient
       quick_.max_iterations = options_.max_iterations;
-      quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
+      quick_.deviation_tolerance = settled();
       adopt(fit_additive_model(frf_, best_.model, quick_));
     }
     say("{}, reached by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
@@ -121,22 +116,31 @@ class AutomaticFit {
   /// Releases the weights of the search; the last fit computes its own.
   void release_weights() { quick_.user_weights = {}; }
 
-  FitResult finish() {
+  FitResult finish(FitEvidence& evidence) {
     release_weights();
     sort_modes(best_.model);
     const bool cut_short = limit_reached();
     options_.limit->begin_completion();
     FitOptions last = options_;
     last.judge_modes = selection_.keep_modes;
-    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
+    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled());
     last.shrink_hidden = many();
+    evidence.number = mode_number();
     FitResult result = many() ? fit_additive_model(frf_, best_.model, last)
-                              : ranked_fit(frf_, best_.model, last, mode_number());
+                              : ranked_fit(frf_, best_.model, last, evidence);
     if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
       result.decisions.push_back(ranks);
-    watch_.tell(result);
-    if (cut_short) tell_limit(frf_, options_, result);
     sort_modes(result);
+    if (many())
+      evidence.number = ModeNumber::given;  // the hidden ones are held
+    else if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy())
+      evidence.alike = alike_modes(frf_, last, result);
+    evidence.growth_ended = watch_.finding();
+    evidence.delay_explains_more = watch_.by_delay();
+    if (cut_short) {
+      evidence.limit = options_.limit->status();
+      evidence.limit_message = limit_message(frf_, options_, result);
+    }
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
@@ -153,12 +157,12 @@ class AutomaticFit {
 
   bool many() const { return selection_.exactly > kMostGrown; }
 
-  /// Newton decrement at which every free pole is within kSettledOfMany of its standard deviation.
-  double settled_of_many() const {
+  /// Newton decrement at which every free pole is within kSettled of its standard deviation.
+  double settled() const {
     double free = 0.0;
     for (const Submodel& s : best_.model.submodels)
       if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
-    return kSettledOfMany * std::sqrt(free);
+    return kSettled * std::sqrt(free);
   }
 
   /// Fits `model` with all poles free, then holds those of modes hidden by noise at the result.
@@ -236,9 +240,9 @@ class AutomaticFit {
       if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
-      for (; done < all.size(); done += kMergesAtOnce) {
+      for (; done < all.size(); done += kTried) {
         const auto first = all.begin() + static_cast<std::ptrdiff_t>(done);
-        const auto count = static_cast<std::ptrdiff_t>(std::min(kMergesAtOnce, all.size() - done));
+        const auto count = static_cast<std::ptrdiff_t>(std::min(kTried, all.size() - done));
         if (take_best(sample, {first, first + count})) break;
       }
       if (done >= all.size()) return;
@@ -330,7 +334,7 @@ class AutomaticFit {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
       const std::size_t most =
-          std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
+          std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
           residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
       FitResult before = best_;
@@ -483,6 +487,15 @@ std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& asked) {
+  FitEvidence evidence;
+  FitResult fit = searched_fit(frf, structure, selection, asked, evidence);
+  judge(frf, evidence, fit);
+  return fit;
+}
+
+FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
+                       const ModeSelection& selection, const FitOptions& asked,
+                       FitEvidence& evidence) {
   check(frf);
   if (selection.exactly < 0 || selection.most < 1)
     throw std::invalid_argument("fit: the number of modes must be positive");
@@ -503,7 +516,7 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
   };
   const auto finish = [&] {
     begun.release_weights();
-    return best->finish();
+    return best->finish(evidence);
   };
   const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
   const bool too_many_to_grow = placed && selection.exactly > kMostGrown;

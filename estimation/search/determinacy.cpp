@@ -10,7 +10,6 @@
 #include "estimation/model/poles.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/undetermined_modes.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
@@ -44,10 +43,10 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   for (const PoleEstimate& pole : pole_estimates(beta.a[i], covariance.block(first, first, n, n))) {
     const double f = pole.natural_frequency_hz;
     const double std_hz = pole.natural_frequency_std_hz.value_or(0.0);
-    if (!(std_hz < kOpenFrequency * f))
+    if (!(std_hz < f))
       return fmt::format("its pole at {:.4g} Hz has a standard deviation of {:.2g} Hz", f, std_hz);
     const double damping_std = pole.damping_ratio_std.value_or(0.0);
-    if (!(damping_std < kOpenDamping * pole.damping_ratio))
+    if (!(damping_std < pole.damping_ratio))
       return fmt::format(
           "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard deviation of {:.2g}",
           pole.damping_ratio, f, damping_std);

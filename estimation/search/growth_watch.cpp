@@ -10,13 +10,10 @@
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 namespace {
-
-// In a row. A measured aircraft, which is nonlinear, has five before the search converges.
-constexpr int kMostSpurious = 6;
 
 /// Whether mode `i` overlaps another. Broad modes do not count: they are not resonances that contain a narrow one.
 bool overlaps_another(const AdditiveModel& model, std::size_t i) {
@@ -81,13 +78,6 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
       "the plant: try --damping general, --direct-term full or --delay estimate",
       spurious_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
   return true;
-}
-
-void GrowthWatch::tell(FitResult& result) const {
-  if (!ended()) return;
-  result.findings.push_back(finding_);
-  if (!by_delay_ || !result.trustworthy()) return;
-  result.distrust(FitStatus::unexplained, finding_);
 }
 
 bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions& searched,
