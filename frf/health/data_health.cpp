@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
@@ -36,6 +38,11 @@ constexpr double kLeastCoherence = 0.9;
 constexpr double kMovedTogether = 0.5;  // coherence of two sensors beside the excitation
 constexpr double kUnexplained = 0.9;  // of the power of C y, most of which leaks from a limit cycle
 constexpr double kCertain = 1e6;      // evidence if there is no noise
+
+/// Whether it is about the whole log, not about the recording of one realization.
+bool is_of_log(const Finding& f) {
+  return f.severity == Severity::unchecked || f.cause == Cause::unknown_stage;
+}
 
 }  // namespace
 
@@ -357,9 +364,7 @@ std::vector<Finding> Examination::examine_other() {
   if (const std::optional<ExcitationDelay> delay = align_excitation(record_, nominal_))
     findings_.push_back(to_finding(*delay));
   check_realization();
-  std::erase_if(findings_, [](const Finding& f) {
-    return f.severity == Severity::unchecked || f.cause == Cause::unknown_stage;
-  });
+  std::erase_if(findings_, is_of_log);
   return std::move(findings_);
 }
 
@@ -369,17 +374,11 @@ bool Examination::follows_stage() {
          follows_controller(record_, *nominal_);
 }
 
-/// Merges the findings `own` of the first realization with those of the others: what only some have names them. If the
-/// first has no finding, only those are examined whose response lies apart, or whose signals violate u = r - C y.
-void Examination::check_others(std::vector<Finding>& own) {
-  std::erase_if(own, [&](const Finding& f) {
-    const bool of_log = f.severity == Severity::unchecked || f.cause == Cause::unknown_stage;
-    if (of_log) findings_.push_back(f);
-    return of_log;
-  });
+/// Adds the findings of the other realizations to `own`, those of the first one. If that has none, only those are
+/// examined whose response lies apart, or whose signals violate u = r - C y.
+void Examination::add_others(std::vector<Finding>& own) {
   const auto& apart = record_.differences.outlying;
   const bool clean = own.empty();
-  for (Finding& f : own) f.realizations = {record_.realization};
   for (RealizationRecord& other : record_.others) {
     HealthRecord record;
     static_cast<RealizationRecord&>(record) = std::move(other);
@@ -400,19 +399,28 @@ void Examination::check_others(std::vector<Finding>& own) {
       same->realizations.push_back(realization);
     }
   }
+}
+
+/// Merges the findings `own` of the first realization with those of the others: what only some have names them.
+void Examination::check_others(std::vector<Finding> own) {
+  const auto of_log = std::stable_partition(own.begin(), own.end(), std::not_fn(is_of_log));
+  std::move(of_log, own.end(), std::back_inserter(findings_));
+  own.erase(of_log, own.end());
+  for (Finding& f : own) f.realizations = {record_.realization};
+  add_others(own);
+  const auto in_all = [this](const Finding& f) {
+    return f.realizations.size() > record_.others.size();
+  };
   // What the recording does not explain is a difference at the stage, or the stage is unknown.
-  for (const RealizationChange& change : record_.differences.changes) {
-    Finding f = to_finding(change);
-    const bool explained = std::any_of(own.begin(), own.end(), [&](const Finding& one) {
-      return one.severity == Severity::fault &&
-             std::find(one.realizations.begin(), one.realizations.end(), change.realization) !=
-                 one.realizations.end() &&
-             one.realizations.size() <= record_.others.size();
-    });
-    if (!explained) findings_.push_back(std::move(f));
-  }
+  for (const RealizationChange& change : record_.differences.changes)
+    if (std::none_of(own.begin(), own.end(), [&](const Finding& f) {
+          return f.severity == Severity::fault && !in_all(f) &&
+                 std::find(f.realizations.begin(), f.realizations.end(), change.realization) !=
+                     f.realizations.end();
+        }))
+      findings_.push_back(to_finding(change));
   for (Finding& f : own) {
-    if (f.realizations.size() > record_.others.size())
+    if (in_all(f))
       f.realizations.clear();
     else
       f.what += fmt::format(", in {} only", named_realizations(f.realizations));
@@ -436,8 +444,7 @@ std::vector<Finding> Examination::examine() {
       of_log.erase(late);
     }
     check_realization();
-    std::vector<Finding> own = std::exchange(findings_, std::move(of_log));
-    check_others(own);
+    check_others(std::exchange(findings_, std::move(of_log)));
     check_stage();
     check_inputs();
     if (!any_fault(findings_))  // a stuck channel would look like a transient

@@ -24,6 +24,7 @@ constexpr Index kMostLines = 400;
 constexpr double kWorthSearching = 1.5;  // of the misfit that noise alone has
 constexpr double kOutlying = 4.0;        // of the median misfit of the realizations
 constexpr double kLeastChangeShare = 0.3;
+constexpr double kMostLeft = 0.5;  // of the misfit, after all changes
 constexpr double kChangeDeviations = 6.0;
 constexpr double kLeastGainChange = 0.02;
 constexpr double kLeastSkewChange_s = 2e-6;
@@ -65,7 +66,8 @@ class Comparison {
 
   std::vector<Candidate> run() {
     std::vector<Candidate> found;
-    if (!(misfit() > kWorthSearching) && !local_misfit()) return found;
+    const double before = misfit();
+    if (!(before > kWorthSearching) && !local_misfit()) return found;
     for (Index i = 0; i < n_y_ + n_u_; ++i) {
       std::optional<Candidate> best;
       const auto offer = [&](const std::optional<Candidate>& one) {
@@ -82,6 +84,8 @@ class Comparison {
       undo(*best);
       found.push_back(*best);
     }
+    // Changed channels explain most of what differs. A disturbance is explained only here and there.
+    if (misfit() > kMostLeft * before) found.clear();
     return found;
   }
 
@@ -127,33 +131,61 @@ class Comparison {
            explained > kChangeDeviations * kChangeDeviations * std::max(0.5, rest / dof);
   }
 
+  /// Some lines of a part, compared with the reference.
+  struct Sums {
+    VectorXcd cross;
+    double misfit = 0.0;
+    double length = 0.0;
+    double bend = 0.0;
+    double power = 0.0;
+
+    double gain() const { return length > 0.0 ? cross.sum().real() / length : 1.0; }
+  };
+
+  /// Of all lines, or of those with an even or odd index.
+  Sums sums_of(const Part& part, Index first = 0, Index step = 1) const {
+    Sums sums;
+    sums.cross = VectorXcd::Zero(G_.cols());
+    over(part, [&](Index c, Index k) {
+      if (k % step != first) return;
+      sums.cross[k] += weight_(c, k) * std::conj(reference_(c, k)) * G_(c, k);
+      const double square = weight_(c, k) * std::norm(reference_(c, k));
+      sums.length += square;
+      sums.bend += square * omega_[k] * omega_[k];
+      sums.power += weight_(c, k) * std::norm(G_(c, k));
+      sums.misfit += weight_(c, k) * std::norm(G_(c, k) - reference_(c, k));
+    });
+    return sums;
+  }
+
+  /// Of the misfit, by a gain and a skew.
+  double explained(const Sums& sums, double gain, double skew_s) const {
+    return sums.misfit -
+           (sums.power - 2.0 * gain * along(sums.cross, skew_s) + gain * gain * sums.length);
+  }
+
   template <typename Offer>
   void try_part(const Part& part, const Offer& offer) const {
-    const double before = misfit_of(part);
-    if (!(before > kWorthSearching * entries(part))) return;
-    VectorXcd cross = VectorXcd::Zero(G_.cols());
-    double length = 0.0;
-    double power = 0.0;
-    double bend = 0.0;
-    over(part, [&](Index c, Index k) {
-      cross[k] += weight_(c, k) * std::conj(reference_(c, k)) * G_(c, k);
-      const double square = weight_(c, k) * std::norm(reference_(c, k));
-      length += square;
-      bend += square * omega_[k] * omega_[k];
-      power += weight_(c, k) * std::norm(G_(c, k));
-    });
-    if (!(length > 0.0)) return;
-    const double gain = cross.sum().real() / length;
-    const double by_gain = before - (power - gain * gain * length);
-    if (std::abs(gain - 1.0) > kLeastGainChange && significant(part, before, by_gain))
-      offer(std::optional<Candidate>(
-          {RealizationChange::Kind::gain, part, {}, gain, 1.0 / std::sqrt(2.0 * length), by_gain}));
+    const Sums all = sums_of(part);
+    if (!(all.misfit > kWorthSearching * entries(part)) || !(all.length > 0.0)) return;
+    // What one half of the lines tells must explain the other. A few lines with much noise explain only themselves.
+    const Sums even = sums_of(part, 0, 2);
+    const Sums odd = sums_of(part, 1, 2);
+    const auto offer_if = [&](RealizationChange::Kind kind, double value, double length,
+                              double confirmed) {
+      if (significant(part, all.misfit, confirmed))
+        offer(std::optional<Candidate>(
+            {kind, part, {}, value, 1.0 / std::sqrt(2.0 * length), confirmed}));
+    };
+    if (std::abs(all.gain() - 1.0) > kLeastGainChange)
+      offer_if(RealizationChange::Kind::gain, all.gain(), all.length,
+               explained(even, odd.gain(), 0.0) + explained(odd, even.gain(), 0.0));
     if (sample_s_ == 0.0) return;
-    const double skew_s = best_skew(cross);
-    const double by_skew = before - (power - 2.0 * along(cross, skew_s) + length);
-    if (std::abs(skew_s) > kLeastSkewChange_s && significant(part, before, by_skew))
-      offer(std::optional<Candidate>(
-          {RealizationChange::Kind::skew, part, {}, skew_s, 1.0 / std::sqrt(2.0 * bend), by_skew}));
+    const double skew_s = best_skew(all.cross);
+    if (std::abs(skew_s) > kLeastSkewChange_s)
+      offer_if(
+          RealizationChange::Kind::skew, skew_s, all.bend,
+          explained(even, 1.0, best_skew(odd.cross)) + explained(odd, 1.0, best_skew(even.cross)));
   }
 
   double along(const VectorXcd& cross, double skew_s) const {

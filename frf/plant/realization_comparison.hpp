@@ -15,8 +15,10 @@ namespace stageid {
 /// G^[m] from it, with weights w = 1 / (2 v), v the noise of one realization. If the weighted square of D exceeds
 /// 1.5 times its expectation, D is searched for the change of one channel (row or column), or of all, that explains
 /// most: a factor, a delay of up to 4 samples, or the exchange of two. It is undone, and the search is repeated.
-/// A change is accepted on three conditions:
-///   - It explains 30 % of the misfit of its entries, an exchange half of both.
+/// A change is accepted on four conditions:
+///   - It explains 30 % of the misfit of its entries, an exchange half of both. A factor or a delay is estimated from
+///     every second line for this, and explains the others.
+///   - All changes together explain half of the misfit.
 ///   - It is 6 standard deviations from none, of the noise and of what it leaves unexplained. Distortions and drifts
 ///     have other phases and sizes on every line.
 ///   - It is large enough to matter: 2 % for a factor, 2 us for a delay.

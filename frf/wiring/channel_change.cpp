@@ -94,6 +94,12 @@ void undo(const ChannelChange& change, HealthRecord& record) {
   }
 }
 
+ChannelChange inverse(ChannelChange change) {
+  if (change.kind == ChannelChange::Kind::gain) change.value = 1.0 / change.value;
+  if (change.kind == ChannelChange::Kind::skew) change.value = -change.value;
+  return change;
+}
+
 std::string channel_names(const ChannelChange& change, const LogInfo& info) {
   const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
   if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";

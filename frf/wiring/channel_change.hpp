@@ -25,6 +25,9 @@ struct ChannelChange {
 /// Undoes the change in the record's spectra.
 void undo(const ChannelChange& change, HealthRecord& record);
 
+/// undo() of it restores what undo() of the change altered.
+ChannelChange inverse(ChannelChange change);
+
 /// "a3", "a3 a7", "all sensors".
 std::string channel_names(const ChannelChange& change, const LogInfo& info);
 

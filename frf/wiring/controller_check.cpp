@@ -48,7 +48,7 @@ class Search {
   Search(HealthRecord& record, const NominalStage& nominal);
   ControllerCheck run();
   /// Whether there is nothing to search for.
-  bool follows();
+  bool holds();
   double unexplained_motion() const;
 
  private:
@@ -56,8 +56,10 @@ class Search {
   std::optional<Candidate> best() const;
   double row_cost(Index row) const;
   bool sensors_follow() const;
-  bool follows(Index row) const { return follows(row, 1); }
-  bool follows(Index first, Index rows) const;
+  bool commands_follow(Index first, Index rows) const;
+  /// Whether two signals of these actuators, functions of a line, are equal up to a factor.
+  template <typename One, typename Other>
+  bool proportional(Index first, Index rows, const One& one, const Other& other) const;
   /// Tries E - d X with X of `direction`, rows x E.
   template <typename Direction>
   void try_direction(ChannelChange change, double cost, Index first, Index rows,
@@ -146,36 +148,36 @@ double Search::row_cost(Index row) const {
       [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
 }
 
+template <typename One, typename Other>
+bool Search::proportional(Index first, Index rows, const One& one, const Other& other) const {
+  double along = 0.0;
+  double of_one = 0.0;
+  double of_other = 0.0;
+  for (const Line& line : lines_) {
+    const Eigen::MatrixXcd A = one(line).middleRows(first, rows);
+    const Eigen::MatrixXcd B = other(line).middleRows(first, rows);
+    const auto w = line.weight.segment(first, rows);
+    along += (w.asDiagonal() * A.conjugate().cwiseProduct(B).real()).sum();
+    of_one += (w.asDiagonal() * A.cwiseAbs2()).sum();
+    of_other += (w.asDiagonal() * B.cwiseAbs2()).sum();
+  }
+  return along * along > 0.5 * of_one * of_other;
+}
+
 /// Whether u of these actuators is r - C y up to a factor. Otherwise an actuator with other motion would be explained
 /// by a factor that makes it vanish.
-bool Search::follows(Index first, Index rows) const {
-  double along = 0.0;
-  double recorded = 0.0;
-  double asked = 0.0;
-  for (const Line& line : lines_) {
-    const auto U = line.U.middleRows(first, rows);
-    const Eigen::MatrixXcd V = U - line.E.middleRows(first, rows);
-    const auto w = line.weight.segment(first, rows);
-    along += (w.asDiagonal() * U.conjugate().cwiseProduct(V).real()).sum();
-    recorded += (w.asDiagonal() * U.cwiseAbs2()).sum();
-    asked += (w.asDiagonal() * V.cwiseAbs2()).sum();
-  }
-  return along * along > 0.5 * recorded * asked;
+bool Search::commands_follow(Index first, Index rows) const {
+  return proportional(
+      first, rows, [](const Line& line) { return line.U; },
+      [](const Line& line) { return Eigen::MatrixXcd(line.U - line.E); });
 }
 
 /// The same for all sensors: whether C y is r - u up to a factor.
 bool Search::sensors_follow() const {
-  double along = 0.0;
-  double recorded = 0.0;
-  double asked = 0.0;
-  for (const Line& line : lines_) {
-    const Eigen::MatrixXcd FY = line.F * line.Y;
-    const Eigen::MatrixXcd V = FY + line.E;
-    along += (line.weight.asDiagonal() * FY.conjugate().cwiseProduct(V).real()).sum();
-    recorded += (line.weight.asDiagonal() * FY.cwiseAbs2()).sum();
-    asked += (line.weight.asDiagonal() * V.cwiseAbs2()).sum();
-  }
-  return along * along > 0.5 * recorded * asked;
+  const auto controlled = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
+  return proportional(0, record_.n_u(), controlled, [&](const Line& line) {
+    return Eigen::MatrixXcd(controlled(line) + line.E);
+  });
 }
 
 template <typename Direction>
@@ -262,7 +264,7 @@ void Search::try_actuators() {
   using Kind = ChannelChange::Kind;
   const std::complex<double> j(0.0, 1.0);
   const Index n_u = record_.n_u();
-  if (follows(0, n_u))
+  if (commands_follow(0, n_u))
     try_direction({Kind::gain, false}, total_, 0, n_u,
                   [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
   try_direction({Kind::skew, false}, total_, 0, n_u,
@@ -270,7 +272,7 @@ void Search::try_actuators() {
   for (Index a = 0; a < n_u; ++a) {
     const double cost = row_cost(a);
     if (!(cost > 0.0)) continue;
-    if (follows(a))
+    if (commands_follow(a, 1))
       try_direction({Kind::gain, false, a}, cost, a, 1,
                     [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });
     try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
@@ -331,7 +333,7 @@ bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChan
          });
 }
 
-bool Search::follows() {
+bool Search::holds() {
   refresh();
   for (Index a = 0; a < record_.n_u(); ++a) {
     double evidence = 0.0;
@@ -374,6 +376,14 @@ ControllerCheck Search::run() {
     refresh();
   }
   check.misfits = misfits();
+  // Then another controller, or a setpoint, is the cause.
+  if (!check.misfits.empty() && check.misfits.front().of_all) {
+    for (auto change = check.changes.rbegin(); change != check.changes.rend(); ++change)
+      undo(inverse(*change), record_);
+    check.changes.clear();
+    refresh();
+    check.misfits = misfits();
+  }
   return check;
 }
 
@@ -419,7 +429,7 @@ std::vector<ControllerMisfit> Search::misfits() const {
 }  // namespace
 
 bool follows_controller(HealthRecord& record, const NominalStage& nominal) {
-  return Search(record, nominal).follows();
+  return Search(record, nominal).holds();
 }
 
 double unexplained_motion(HealthRecord& record, const NominalStage& nominal) {

@@ -23,7 +23,8 @@ class Examination {
  private:
   void check_realization();
   std::vector<Finding> examine_other();
-  void check_others(std::vector<Finding>& own);
+  void add_others(std::vector<Finding>& own);
+  void check_others(std::vector<Finding> own);
   bool follows_stage();
   void check_cycles();
   void check_samples();

@@ -144,7 +144,8 @@ void Examination::check_recording() {
   if (!check.misfits.empty() && check.misfits.front().of_all) {
     if (find_suspected(0, record_.n_y())) return;
     find(Severity::doubt, Cause::controller, "",
-         "the loop was closed by a different controller than the configured one",
+         "the loop was closed by a different controller than the configured one, or a setpoint "
+         "moved",
          fmt::format("u - r + C y is {:.2g} of C y", check.misfits.front().relative),
          "give the stage file of this log: --stage");
     return;

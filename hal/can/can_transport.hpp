@@ -43,6 +43,26 @@ class CanTransport {
   virtual std::int64_t now_ns() const noexcept = 0;
 };
 
+/// A transport through another one. Derived classes change what they want.
+class CanThrough : public CanTransport {
+ public:
+  explicit CanThrough(CanTransport& inner) noexcept : inner_(inner) {}
+  std::size_t buses() const noexcept override { return inner_.buses(); }
+  const std::string& name(std::size_t bus) const noexcept override { return inner_.name(bus); }
+  std::size_t send(std::span<const CanFrame> frames) noexcept override {
+    return inner_.send(frames);
+  }
+  std::size_t receive(std::span<CanFrame> frames) noexcept override {
+    return inner_.receive(frames);
+  }
+  void wait(std::int64_t until_ns) noexcept override { inner_.wait(until_ns); }
+  const CanBusHealth& health(std::size_t bus) const noexcept override { return inner_.health(bus); }
+  std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
+
+ private:
+  CanTransport& inner_;
+};
+
 /// The worst state of all buses, and which bus.
 struct WorstBus {
   CanBusState state = CanBusState::active;

@@ -81,7 +81,7 @@ CanFault parse_can_fault(const std::string& text) {
 }
 
 FaultyCan::FaultyCan(CanTransport& inner, std::vector<CanFault> faults)
-    : inner_(inner), faults_(std::move(faults)) {}
+    : CanThrough(inner), faults_(std::move(faults)) {}
 
 const CanFault* FaultyCan::fault_of(std::uint64_t frame) const noexcept {
   for (const CanFault& fault : faults_)
@@ -93,7 +93,7 @@ std::size_t FaultyCan::send(std::span<const CanFrame> frames) noexcept {
   for (const CanFrame& frame : frames) {
     const CanFault* fault = carries_values(frame) ? fault_of(count_++) : nullptr;
     if (fault == nullptr) {
-      static_cast<void>(inner_.send({&frame, 1}));
+      static_cast<void>(CanThrough::send({&frame, 1}));
       release(true);
     } else {
       send_spoiled(frame, *fault);
@@ -107,7 +107,7 @@ void FaultyCan::send_spoiled(CanFrame frame, const CanFault& fault) noexcept {
     case CanFaultKind::lost:
       return;
     case CanFaultKind::repeated:
-      static_cast<void>(inner_.send({&frame, 1}));
+      static_cast<void>(CanThrough::send({&frame, 1}));
       break;
     case CanFaultKind::swapped:
       held_.push_back({frame, 0, true});
@@ -125,7 +125,7 @@ void FaultyCan::send_spoiled(CanFrame frame, const CanFault& fault) noexcept {
       frame.id ^= 0x001;
       break;
   }
-  static_cast<void>(inner_.send({&frame, 1}));
+  static_cast<void>(CanThrough::send({&frame, 1}));
 }
 
 void FaultyCan::release(bool one_has_passed) noexcept {
@@ -135,21 +135,21 @@ void FaultyCan::release(bool one_has_passed) noexcept {
       ++i;
       continue;
     }
-    static_cast<void>(inner_.send({&held_[i].frame, 1}));
+    static_cast<void>(CanThrough::send({&held_[i].frame, 1}));
     held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
 
 std::size_t FaultyCan::receive(std::span<CanFrame> frames) noexcept {
   release(false);
-  return inner_.receive(frames);
+  return CanThrough::receive(frames);
 }
 
 void FaultyCan::wait(std::int64_t until_ns) noexcept {
   std::int64_t until = until_ns;
   for (const Held& held : held_)
     if (!held.behind_next) until = std::min(until, held.due_ns);
-  inner_.wait(until);
+  CanThrough::wait(until);
   release(false);
 }
 

@@ -33,17 +33,13 @@ CanFault parse_can_fault(const std::string& text);
 
 /// Sends through another transport and applies the scripted faults to sent frames. Receiving is not
 /// affected.
-class FaultyCan final : public CanTransport {
+class FaultyCan final : public CanThrough {
  public:
   FaultyCan(CanTransport& inner, std::vector<CanFault> faults);
 
-  std::size_t buses() const noexcept override { return inner_.buses(); }
-  const std::string& name(std::size_t bus) const noexcept override { return inner_.name(bus); }
   std::size_t send(std::span<const CanFrame> frames) noexcept override;
   std::size_t receive(std::span<CanFrame> frames) noexcept override;
   void wait(std::int64_t until_ns) noexcept override;
-  const CanBusHealth& health(std::size_t bus) const noexcept override { return inner_.health(bus); }
-  std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
 
  private:
   struct Held {
@@ -55,7 +51,6 @@ class FaultyCan final : public CanTransport {
   void release(bool one_has_passed) noexcept;
   const CanFault* fault_of(std::uint64_t frame) const noexcept;
 
-  CanTransport& inner_;
   std::vector<CanFault> faults_;
   std::vector<Held> held_;
   std::uint64_t count_ = 0;

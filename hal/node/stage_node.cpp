@@ -187,6 +187,8 @@ std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, 
   bucket_ = 0;
   last_sample_ns_ = now_ns;
   hold_began_ns_.reset();
+  silent_samples_ = 0;
+  std::fill(command_.begin(), command_.end(), 0.0);
   std::copy(first.y.begin(), first.y.end(), y_.begin());
   controller_.reset();
   controller_.update(y_.data(), control_.data());
@@ -235,7 +237,8 @@ Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inpu
     return Outcome::fault;
   }
   last_sample_ns_ = now_ns;
-  Outcome outcome = stage_.exchange({sample_, now_ns, u}, inputs, {});
+  std::copy(u.begin(), u.end(), command_.begin());
+  Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
   // The host need not distinguish how the node stops; either way it stops by itself.
   if (outcome == Outcome::braking || outcome == Outcome::opened) outcome = Outcome::limit;
   ++sample_;
@@ -273,10 +276,17 @@ void StageNode::tick(std::int64_t now_ns) {
     machine_.fail(panel.cause);
     reason_ = panel.message;
   }
-  if (machine_.state() == NodeState::measuring && now_ns - last_sample_ns_ > watchdog_ns_)
+  if (machine_.state() == NodeState::measuring && now_ns - last_sample_ns_ > watchdog_ns_) {
     machine_.fail(FaultCause::watchdog);
+    silent_samples_ = samples_in(watchdog_ns_);
+  }
   if (machine_.state() == NodeState::quick_stop || machine_.state() == NodeState::fault_reaction)
     hold(now_ns);
+}
+
+std::int64_t StageNode::samples_in(std::int64_t time_ns) const {
+  return static_cast<std::int64_t>(1e-9 * static_cast<double>(time_ns) *
+                                   stage_.info().sample_rate_hz);
 }
 
 // Plays the samples due since the last tick, including those of a late tick.
@@ -286,13 +296,13 @@ void StageNode::hold(std::int64_t now_ns) {
     held_samples_ = 0;
   }
   const std::int64_t elapsed_ns = std::min(now_ns - *hold_began_ns_, hold_ns_);
-  const auto due = static_cast<std::int64_t>(1e-9 * static_cast<double>(elapsed_ns) *
-                                             stage_.info().sample_rate_hz);
+  const std::int64_t due = silent_samples_ + samples_in(elapsed_ns);
   Inputs inputs;
   inputs.y = y_;
   bool controlled = running_;
   for (; controlled && held_samples_ < due; ++held_samples_) {
-    std::copy(control_.begin(), control_.end(), command_.begin());
+    if (held_samples_ >= silent_samples_)
+      std::copy(control_.begin(), control_.end(), command_.begin());
     // The limits need the cycle: a loop that does not settle is opened.
     const std::uint64_t cycle = sample_ + static_cast<std::uint64_t>(held_samples_);
     const Outcome outcome = stage_.exchange({cycle, now_ns, command_}, inputs, {});
@@ -307,7 +317,13 @@ void StageNode::hold(std::int64_t now_ns) {
 
 void StageNode::come_to_rest() {
   stage_.stop();
-  if (stage_.emergency().cause.kind != LimitKind::none) reason_ = describe_stop(stage_);
+  const Emergency& emergency = stage_.emergency();
+  if (emergency.cause.kind != LimitKind::none)
+    reason_ =
+        machine_.cause() == FaultCause::watchdog
+            ? fmt::format("{}; its last force moved the stage too far; {}",
+                          to_string(machine_.cause()), emergency.braked ? "braked" : "not braked")
+            : describe_stop(stage_);
   running_ = false;
   hold_began_ns_.reset();
 }

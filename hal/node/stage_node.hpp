@@ -47,6 +47,9 @@ struct NodePanel {
 /// stage. Then forces become zero, and the state is fault until an explicit reset. A quick stop does the
 /// same but ends in switch_on_disabled.
 ///
+/// During the host's silence, the last force acts on, and the limits are watched. The samples of this time are
+/// played when the watchdog expires, because the setpoints are the clock of a simulated stage.
+///
 /// The node's controller is updated at every sample, so that taking over causes no step other than the end
 /// of the excitation.
 class StageNode {
@@ -105,6 +108,7 @@ class StageNode {
   std::uint32_t draw_key();
   bool lost(Outcome outcome) noexcept;
   void hold(std::int64_t now_ns);
+  std::int64_t samples_in(std::int64_t time_ns) const;
   void come_to_rest();
 
   // One lock for all state: the node's timing does not affect the host's.
@@ -123,9 +127,10 @@ class StageNode {
   std::uint64_t sample_ = 0;
   std::int64_t last_sample_ns_ = 0;
   std::optional<std::int64_t> hold_began_ns_;
-  std::int64_t held_samples_ = 0;
-  int bucket_ = 0;      // of missing measurements, while the node's own loop controls
-  std::string reason_;  // of the fault, if more is known than its cause
+  std::int64_t held_samples_ = 0;    // those of the silence included
+  std::int64_t silent_samples_ = 0;  // of the host, before the hold
+  int bucket_ = 0;                   // of missing measurements, while the node's own loop controls
+  std::string reason_;               // of the fault, if more is known than its cause
   std::vector<double> y_;
   std::vector<double> control_;  // C(y) of the node's controller
   std::vector<double> command_;

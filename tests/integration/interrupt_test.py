@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -196,6 +197,25 @@ class InterruptTest(unittest.TestCase):
                 return
             time.sleep(0.1)
         self.fail(f"{log}: no samples came")
+
+    def test_a_log_that_is_removed_ends_a_slow_run_within_a_second(self):
+        """At 50 Hz, a thousand samples would be twenty seconds."""
+        stage = (WORK / "configs/stage/small_stage_modbus.yaml").read_text()
+        stage = re.sub(r"supervisor:\n(  .*\n|    .*\n)+", "", stage).replace("backend: modbus", "backend: sim")
+        (WORK / "slow_stage.yaml").write_text(stage + "\nrealtime: {misses_allowed: 1000000}\n")
+        experiment = (WORK / "configs/experiment/small_stage_modbus.yaml").read_text()
+        (WORK / "slow.yaml").write_text(experiment.replace("../stage/small_stage_modbus.yaml", "slow_stage.yaml"))
+        folder = WORK / "removed"
+        folder.mkdir()
+        process = subprocess.Popen([PROGRAM, "run", "slow.yaml", "-o", "removed/slow.slog", "--pace", "1"], cwd=WORK,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(2.0)
+        shutil.rmtree(folder)
+        removed = time.monotonic()
+        _, error = process.communicate(timeout=60)
+        self.assertLess(time.monotonic() - removed, 5.0)  # 1 s, on a busy machine
+        self.assertEqual(process.returncode, 1, error)
+        self.assertIn("its directory was removed", error)
 
     def test_a_run_of_nohup_goes_on(self):
         code, error = run("run", SMALL, "-o", "nohup.slog", "--pace", "4", interrupt_after_s=1.0, by=signal.SIGHUP,

@@ -8,9 +8,11 @@ plugin_test.py STAGEID UDP_PEER SOURCE_DIR WORK_DIR
 import json
 import math
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
+import time
 import unittest
 
 PROGRAM, PEER, SOURCE, WORK = sys.argv[1:5]
@@ -42,8 +44,8 @@ class Plugin(unittest.TestCase):
             peer.wait()
             peer.stdout.close()
 
-    def peer(self, *cycles):
-        peer = subprocess.Popen([PEER, STAGE, *map(str, cycles)], stdout=subprocess.PIPE, text=True)
+    def peer(self, *options, stage=STAGE):
+        peer = subprocess.Popen([PEER, stage, *map(str, options)], stdout=subprocess.PIPE, text=True)
         self.peers.append(peer)
         return int(peer.stdout.readline())
 
@@ -82,9 +84,95 @@ class Plugin(unittest.TestCase):
         experiment = self.udp("silent", port)
         done = run("run", experiment, "-o", log)
         self.assertEqual(done.returncode, 1, done.stderr)
+        self.peers[0].kill()
+        self.peers[0].wait()
         self.peer(0, port)
         done = run("run", experiment, "-o", log, "--resume")
         self.assertEqual(done.returncode, 0, done.stderr)
+
+    # The stage of the stop matrix: 20 kg, 650 N, a window of 200 um (docs/benchmarks.md).
+    AXIS = """
+format: stageid-stage
+name: one axis
+backend: sim
+sample_rate_hz: 10000
+delay_s: 130e-6
+actuators: [{name: f, unit: N, position_m: [0, 0, 0], direction: [0, 0, 1], limit_n: 650}]
+sensors: [{name: s, unit: m, position_m: [0, 0, 0], direction: [0, 0, 1], window_m: 200e-6}]
+plant:
+  mass_kg: 20
+  inertia_kg_m2: [1, 1, 1]
+  suspension_hz: [0.3, 0.3, 0.3, 0.3, 0.3, 0.3]
+  suspension_damping: 0.1
+  plate: {length_x_m: 0.5, length_y_m: 0.5, first_mode_hz: 200, modes: 0, damping: [0.01]}
+noise: {sensor_m: 1e-9, force_n: 1e-3, seed: 1}
+controller:
+  z: {crossover_hz: 60, integrator_hz: 5, lead_zero_hz: 18, lead_pole_hz: 240, lowpass_hz: 600}
+"""
+    AXIS_EXPERIMENT = """
+format: stageid-experiment
+stage: axis_stage.yaml
+experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], period_s: 0.1, transient_periods: 1,
+             periods: 1000, realizations: 1, seed: 7}
+"""
+    WATCHDOG_S = 0.1
+
+    def axis(self, cycles=0):
+        """A run of 100 s, as fast as the device answers."""
+        stage, file, log = (self.work / name for name in ("axis_stage.yaml", "axis.yaml", "axis.slog"))
+        for old in self.work.glob("axis*"):
+            old.unlink()
+        stage.write_text(self.AXIS)
+        port = self.peer(cycles, 0, self.WATCHDOG_S, stage=stage)
+        stage.write_text(self.AXIS.replace(
+            "backend: sim", f"backend: plugin\nplugin: {{library: ./udp_stage.so, keys: {{port: {port}}}}}"))
+        file.write_text(self.AXIS_EXPERIMENT)
+        host = subprocess.Popen([PROGRAM, "run", file, "-o", log], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return host, log
+
+    def device_rests(self):
+        """The device has stopped by itself, within two windows."""
+        said = self.peers[-1].stdout.readline()
+        print(said, end="", file=sys.stderr)
+        found = re.match(r"the host stopped sending.*: (\d+) um, (\d+) N, (\S+) mm/s$", said)
+        self.assertTrue(found, said)
+        self.assertLess(int(found[1]), 400)
+        self.assertLessEqual(int(found[2]), 650)
+        self.assertLess(float(found[3]), 1.0)
+
+    def wait_for_samples(self, log):
+        while not log.exists() or log.stat().st_size < 100_000:
+            time.sleep(0.01)
+
+    def check_log(self, log, marked):
+        self.assertEqual(run("log", "verify", log).returncode, 0)
+        done = run("log", "info", log, "--json")
+        self.assertEqual([r["health"]["marked"] for r in json.loads(done.stdout)["runs"]], [marked])
+
+    def test_a_device_whose_host_is_killed_stops(self):
+        host, log = self.axis()
+        self.wait_for_samples(log)
+        host.kill()
+        host.communicate()
+        self.device_rests()
+        self.assertEqual(run("log", "recover", log, "-o", self.work / "axis_recovered.slog").returncode, 0)
+
+    def test_a_cut_wire_ends_the_run_and_the_device_stops(self):
+        host, log = self.axis(cycles=20_000)
+        _, said = host.communicate(timeout=60)
+        self.assertEqual(host.returncode, 1, said)
+        self.assertRegex(said, "link down")
+        self.device_rests()
+        self.check_log(log, 1)
+
+    def test_a_killed_device_ends_the_run(self):
+        host, log = self.axis()
+        self.wait_for_samples(log)
+        self.peers[-1].kill()
+        _, said = host.communicate(timeout=60)
+        self.assertEqual(host.returncode, 1, said)
+        self.assertRegex(said, "link down")
+        self.check_log(log, 1)
 
     def without_plant(self, name, port, **changes):
         """The stage file of a real stage: no plant, the gains of the controller in N/m and N m/rad."""
@@ -137,6 +225,25 @@ class Plugin(unittest.TestCase):
         done = run("identify", file, "-o", self.work / "all")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("truth", json.loads((self.work / "all/summary.json").read_text()))
+
+    def test_is_supervised_and_shown_like_any_other(self):
+        plant = (self.work / "plant.yaml")
+        plant.write_text(STAGE.read_text())
+        node = subprocess.Popen([PROGRAM, "node", plant, "--modbus-tcp", "0", "--modbus-fault", "interlock@12"],
+                                stdout=subprocess.PIPE, text=True)
+        self.peers.append(node)
+        door = re.search(r"127\.0\.0\.1:(\d+)", node.stdout.readline())[1]
+        file = self.udp("supervised", self.peer())
+        stage = self.work / "supervised_stage.yaml"
+        stage.write_text(stage.read_text() + f"supervisor: {{modbus: {{tcp: {{port: {door}}}}}, poll_period_s: 0.1, gravity_compensator_n: [10, 50],\n"
+                         "  temperature_k: [285, 325]}\n")
+        file.write_text(re.sub(r"realizations: \d+", "realizations: 60", file.read_text()))
+        log = self.work / "supervised.slog"
+        done = run("run", file, "-o", log, "--dashboard", "0")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("the interlock is open", done.stderr)
+        self.assertRegex(done.stderr, r"dashboard: http://127\.0\.0\.1:\d+/\?token=")
+        self.assertIn(run("log", "verify", log).returncode, (0, 3))
 
     def refused(self, name, plugin, *words):
         done = run("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")

@@ -6,11 +6,13 @@ started again, with a second host, under garbage.
 """
 
 import binascii
+import contextlib
 import csv
 import json
 import pathlib
 import random
 import re
+import resource
 import shutil
 import socket
 import struct
@@ -43,6 +45,10 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def resident_bytes(process):
+    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Peer:
@@ -239,7 +245,7 @@ class ZeroMq(unittest.TestCase):
         self.assertIn("another host", err)
         self.ends(first, 0)
 
-    # 10 000 commands and 20 000 chunks that are sealed but forged, 50 000 random messages, 20 connections of no ZeroMQ.
+    # 10 000 commands and 20 000 chunks that are sealed but forged, 100 000 random messages, 20 connections of no ZeroMQ.
     def test_forged_and_random_messages_change_nothing(self):
         (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 8"))
         self.node()
@@ -259,7 +265,7 @@ class ZeroMq(unittest.TestCase):
             peer.send(forged[i % len(forged)])
             peer.send(chunk)
             peer.send(chunk)
-            for _ in range(5):
+            for _ in range(10):
                 peer.send(*(dice.randbytes(dice.choice((0, 1, 8, 71, 72, 72, 73, 300))) for _ in range(dice.choice((1, 1, 2)))))
             if i % 500 == 0:
                 with socket.create_connection(("127.0.0.1", self.port)) as other:
@@ -267,13 +273,33 @@ class ZeroMq(unittest.TestCase):
             if i % 100 == 0:  # what the node answered must not fill its queue for this peer
                 answer, rejected = peer.state_after(command(HELLO, 1000 + i // 100))
                 self.assertEqual(answer, 1)
-        self.assertGreater(rejected - before, 50_000)
+        self.assertGreater(rejected - before, 100_000)
         self.assertIsNone(host.poll(), "the run lasts longer than the attack")
         peer.close()
         self.ends(host, 0)
         loud = self.call("log", "convert", "run.slog", "-o", "loud.csv")
         self.assertEqual(loud.returncode, 0, loud.stderr)
         self.assertEqual((WORK / "quiet.csv").read_bytes(), (WORK / "loud.csv").read_bytes(), "a sample differs")
+
+    def test_a_thousand_idle_and_a_hundred_slow_clients_change_nothing(self):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))  # the node inherits it
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        node = self.node("slow_node")
+        before = resident_bytes(node.pid)
+        host = self.start()
+        self.wait_for(node, MEASURING)
+        with contextlib.ExitStack() as clients:
+            for _ in range(1000):
+                clients.enter_context(socket.create_connection(("127.0.0.1", self.port), timeout=10))
+            slow = [Peer(self.port) for _ in range(100)]  # they never read what the node sends to those who gave a command
+            for peer in slow:
+                clients.callback(peer.close)
+                peer.send(command(HELLO, 1))
+            self.ends(host, 0)
+            (WORK / "run.slog").unlink()
+            self.ends(self.start(), 0)
+            self.assertLess(resident_bytes(node.pid) - before, 64 << 20)
 
     def node_again(self, name):
         self.nodes[-1].kill()

@@ -72,11 +72,13 @@ void conclude(const MeasuredStage& stage, const RunExperimentOptions& options,
         counted(health.marked, "sample is", "samples are"));
   if (health.irregular > 0 && result.exit_code == kNotTrustworthy)
     result.message += fmt::format(
-        "; {} the jitter limit of {:.3g} us{} ('jitter_s' in the stage file): use a real-time "
-        "kernel, or a node with a clock",
+        "; {} the jitter limit of {:.3g} us{} ('jitter_s' in the stage file): {}, or use a node "
+        "with a clock",
         counted(health.irregular, "exceeds", "exceed"),
         1e6 * (options.jitter_rms_s > 0.0 ? options.jitter_rms_s : options.jitter_s),
-        options.jitter_rms_s > 0.0 ? " rms" : "");
+        options.jitter_rms_s > 0.0 ? " rms" : "",
+        options.real_time.policy == RealTimePolicy::off ? "set realtime: {policy: try}"
+                                                        : "use a real-time kernel");
   stage.explain(result);
 }
 

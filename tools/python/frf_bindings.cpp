@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 #include <utility>
+#include <variant>
 
 #include "acquisition/formats/open_log.hpp"
 #include "frf/file/frf_file.hpp"
@@ -86,17 +87,24 @@ std::vector<std::shared_ptr<LogReader>> logs_of(const py::object& given) {
   return logs;
 }
 
-/// None is the default. An empty list is refused: it would mean "all", too.
+/// One, several, or None for the default.
 template <typename T>
-std::vector<T> chosen(const char* what, const std::optional<std::vector<T>>& given) {
-  if (given && given->empty())
+using Choice = std::optional<std::variant<T, std::vector<T>>>;
+
+/// Empty: the default. An empty list is refused: it would mean "all", too.
+template <typename T>
+std::vector<T> chosen(const char* what, const Choice<T>& given) {
+  if (!given) return {};
+  if (const T* one = std::get_if<T>(&*given)) return {*one};
+  const auto& several = std::get<std::vector<T>>(*given);
+  if (several.empty())
     throw std::invalid_argument(
         fmt::format("{}: empty list. Give at least one, or None for the default", what));
-  return given.value_or(std::vector<T>{});
+  return several;
 }
 
-FrfHandle frf(const py::object& given, const Names& inputs, const Names& outputs,
-              const std::optional<std::vector<int>>& realizations,
+FrfHandle frf(const py::object& given, const Choice<std::string>& inputs,
+              const Choice<std::string>& outputs, const Choice<int>& realizations,
               std::optional<int> transient_periods, const std::string& method,
               const std::string& covariance, const std::string& periods, int covariance_lines,
               bool health, const std::optional<std::filesystem::path>& stage,
@@ -123,11 +131,11 @@ FrfHandle frf(const py::object& given, const Names& inputs, const Names& outputs
 }
 
 FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_hz,
-                 const Names& inputs, const Names& outputs) {
+                 const Choice<std::string>& inputs, const Choice<std::string>& outputs) {
   FrfEstimate frf = band_hz ? select_band(of.frf, (*band_hz)[0], (*band_hz)[1]) : of.frf;
   if (inputs || outputs)
-    frf = select_channels(frf, inputs.value_or(frf.inputs.names),
-                          outputs.value_or(frf.outputs.names));
+    frf = select_channels(frf, inputs ? chosen("inputs", inputs) : frf.inputs.names,
+                          outputs ? chosen("outputs", outputs) : frf.outputs.names);
   return FrfHandle(std::move(frf));
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <atomic>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -13,22 +15,26 @@
 
 #include "acquisition/loop/measurement_loop.hpp"
 #include "hal/can/can_node.hpp"
-#include "hal/can/can_pair.hpp"
 #include "hal/can/can_resident_stage.hpp"
 #include "hal/can/can_stage.hpp"
+#include "hal/can/can_zeromq.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 #include "hal/node/stage_node.hpp"
 #include "hal/plugin/plugin_stage.hpp"
+#include "tests/hal/can/router_can.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/can_pair.hpp"
 #include "tests/support/stages/stop_case.hpp"
 
 // One measurement of the stage of stop_case.hpp over each kind of link, with peers in this process.
 namespace stageid::test {
 
-enum class StopLink : std::uint8_t { sim, can, resident, modbus, plugin };
+enum class StopLink : std::uint8_t { sim, can, resident, modbus, plugin, zeromq };
 
 inline const char* to_string(StopLink link) {
-  constexpr std::array kNames = {"sim", "CAN streaming", "CAN resident", "Modbus", "plugin"};
+  constexpr std::array kNames = {"sim",    "CAN streaming", "CAN resident",
+                                 "Modbus", "plugin",        "ZeroMQ resident"};
   return kNames[static_cast<std::size_t>(link)];
 }
 
@@ -42,6 +48,7 @@ struct Stopped {
   double largest_m = 0.0;
   double largest_n = 0.0;
   double speed_m_s = 0.0;   // when the forces were cut
+  double coasted_m = 0.0;   // largest excursion in the second after that
   double stopping_s = 0.0;  // from the fault until the forces were cut, as the stage counts time
   std::uint64_t first_marked = 0;
   std::uint64_t marked = 0;
@@ -56,6 +63,7 @@ struct Stopped {
 inline constexpr int kStopPeriod = 1000;
 inline constexpr std::uint64_t kStopSamples = 10'000;
 inline constexpr double kStopRamp_s = 0.1;
+inline constexpr int kRest_ms = 2500;  // more than the host's silence and the hold of a node
 
 /// 10 N rms between 10 Hz and 1 kHz: healthy motions of 7 um and 1.1 mm/s.
 inline LoopExcitation healthy_excitation() {
@@ -77,6 +85,7 @@ inline void take_motion(const WatchedStage& watch, const WaferStageSpec& spec, S
   result.largest_m = watch.largest_m;
   result.largest_n = watch.largest_n;
   result.speed_m_s = watch.speed_m_s();
+  result.coasted_m = watch.coasted_m();
   result.stopping_s = (static_cast<double>(watch.cycles) - kFaultCycle) / spec.info.sample_rate_hz;
 }
 
@@ -140,34 +149,33 @@ inline Stopped stop_in_process(const WaferStageSpec& spec, bool as_plugin) {
 }
 
 /// A bus that can be cut, in both directions.
-class CutCan final : public CanTransport {
+class CutCan final : public CanThrough {
  public:
-  CutCan(CanTransport& inner, const bool& cut) : inner_(inner), cut_(cut) {}
-  std::size_t buses() const noexcept override { return inner_.buses(); }
-  const std::string& name(std::size_t bus) const noexcept override { return inner_.name(bus); }
+  CutCan(CanTransport& inner, const bool& cut) : CanThrough(inner), cut_(cut) {}
   std::size_t send(std::span<const CanFrame> frames) noexcept override {
-    return cut_ ? frames.size() : inner_.send(frames);
+    return cut_ ? frames.size() : CanThrough::send(frames);
   }
   std::size_t receive(std::span<CanFrame> frames) noexcept override {
-    const std::size_t count = inner_.receive(frames);
+    const std::size_t count = CanThrough::receive(frames);
     return cut_ ? 0 : count;
   }
-  void wait(std::int64_t until_ns) noexcept override { inner_.wait(until_ns); }
-  const CanBusHealth& health(std::size_t bus) const noexcept override { return inner_.health(bus); }
-  std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
 
  private:
-  CanTransport& inner_;
   const bool& cut_;
 };
+
+inline CanSpec stop_can_spec(const std::string& interface) {
+  CanSpec can;
+  can.buses.push_back({interface, 10e6, 80e6, {0}, {0}});  // virtual: 10 kHz fit
+  can.actuator_range_n = {1.25 * kStopForce};
+  can.sensor_range_m = {1.25 * kStopWindow};
+  return can;
+}
 
 /// The node behind CAN, in the same thread.
 class CanStopRig {
  public:
-  CanStopRig(const WaferStageSpec& spec, double pace) : spec_(spec) {
-    can_.buses.push_back({"pair0", 10e6, 80e6, {0}, {0}});  // virtual: 10 kHz fit
-    can_.actuator_range_n = {1.25 * kStopForce};
-    can_.sensor_range_m = {1.25 * kStopWindow};
+  CanStopRig(const WaferStageSpec& spec, double pace) {
     auto watched = std::make_unique<WatchedStage>(spec);
     watch_ = watched.get();
     node_ = std::make_unique<StageNode>(std::move(watched), spec.limits, spec.controller,
@@ -184,12 +192,13 @@ class CanStopRig {
       front_->serve(0);
     }
   }
-  const WatchedStage& watch() const { return *watch_; }
-  const StageNode& node() const { return *node_; }
+  const WatchedStage& at_rest() {
+    pass_ms(kRest_ms);
+    return *watch_;
+  }
 
  private:
-  WaferStageSpec spec_;
-  CanSpec can_;
+  CanSpec can_ = stop_can_spec("pair0");
   CanPair pair_{{"pair0"}};
   bool cut_ = false;
   const WatchedStage* watch_ = nullptr;
@@ -197,7 +206,58 @@ class CanStopRig {
   std::unique_ptr<CanNode> front_;
 };
 
-inline constexpr int kRest_ms = 2500;  // more than the host's silence and the hold of a node
+/// The node behind ZeroMQ, in a thread of its own on the clock of this computer.
+class ZeroMqStopRig {
+ public:
+  ZeroMqStopRig(const WaferStageSpec& spec, double pace)
+      : can_(stop_can_spec("ipc://" + (directory_ / "node").string())),
+        router_(can_.buses[0].interface),
+        host_(can_.buses[0].interface) {
+    auto watched = std::make_unique<WatchedStage>(spec);
+    watch_ = watched.get();
+    node_ = std::make_unique<StageNode>(std::move(watched), spec.limits, spec.controller,
+                                        NodePanel{}, NodeOptions{.watchdog_s = can_.watchdog_s});
+    front_ = std::make_unique<CanNode>(*node_, can_layout(can_, spec.info), router_, pace);
+    thread_ = std::thread([this] {
+      while (!stop_) front_->serve(router_.now_ns() + 1'000'000);
+    });
+  }
+  ~ZeroMqStopRig() { end(); }
+  ZeroMqStopRig(const ZeroMqStopRig&) = delete;
+  ZeroMqStopRig& operator=(const ZeroMqStopRig&) = delete;
+
+  std::unique_ptr<CanTransport> host_bus() { return std::make_unique<CutCan>(host_, cut_); }
+  const CanSpec& can() const { return can_; }
+  void cut() { cut_ = true; }
+  static void pass_ms(int milliseconds) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+  }
+  const WatchedStage& at_rest() {
+    for (int i = 0; i < kRest_ms && node_->state() > NodeState::operation_enabled &&
+                    node_->state() != NodeState::fault;
+         ++i)
+      pass_ms(1);
+    end();
+    return *watch_;
+  }
+
+ private:
+  void end() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+  TemporaryDirectory directory_;
+  CanSpec can_;
+  RouterCan router_;
+  ZeroMqCan host_;
+  bool cut_ = false;
+  const WatchedStage* watch_ = nullptr;
+  std::unique_ptr<StageNode> node_;
+  std::unique_ptr<CanNode> front_;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
 
 inline Stopped stop_over_can(const WaferStageSpec& spec, LinkEvent event) {
   CanStopRig rig(spec, 0.0);
@@ -207,19 +267,20 @@ inline Stopped stop_over_can(const WaferStageSpec& spec, LinkEvent event) {
                if (event != LinkEvent::none) rig.cut();
                return event != LinkEvent::host_killed;
              });
-  rig.pass_ms(kRest_ms);
-  take_motion(rig.watch(), spec, result);
+  take_motion(rig.at_rest(), spec, result);
   return result;
 }
 
-inline Stopped stop_resident(const WaferStageSpec& spec, LinkEvent event) {
+/// @tparam Rig CanStopRig or ZeroMqStopRig
+template <typename Rig>
+Stopped stop_resident(const WaferStageSpec& spec, LinkEvent event, double pace) {
   struct Outcomes final : TraceSink {
     void rows(std::uint64_t, std::span<const double>, std::span<const Outcome> found) override {
       for (const Outcome outcome : found) marked += outcome != Outcome::ok ? 1 : 0;
     }
     std::uint64_t marked = 0;
   } trace;
-  CanStopRig rig(spec, 1.0);
+  Rig rig(spec, pace);
   Stopped result;
   CanResidentStage stage(spec.info, rig.can(), rig.host_bus(), CanHostOptions{});
   try {
@@ -246,9 +307,8 @@ inline Stopped stop_resident(const WaferStageSpec& spec, LinkEvent event) {
     result.reason = StopReason::fault;
     result.message = error.what();
   }
-  rig.pass_ms(kRest_ms);
   result.marked = trace.marked;
-  take_motion(rig.watch(), spec, result);
+  take_motion(rig.at_rest(), spec, result);
   return result;
 }
 
@@ -286,7 +346,10 @@ inline Stopped stop_over(StopLink link, const WaferStageSpec& spec, LinkEvent ev
     case StopLink::can:
       return stop_over_can(spec, event);
     case StopLink::resident:
-      return stop_resident(spec, event);
+      return stop_resident<CanStopRig>(spec, event, 1.0);
+    case StopLink::zeromq:
+      // Without an event, it need not last as long as the run.
+      return stop_resident<ZeroMqStopRig>(spec, event, event == LinkEvent::none ? 0.0 : 1.0);
     case StopLink::modbus:
       return stop_over_modbus(spec, event);
     case StopLink::sim:

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -60,9 +63,9 @@ TEST_P(StopMatrix, StaysInsideTwoWindows) {
   const auto& [link, c] = GetParam();
   const Stopped stopped = stop_over(link, spec_of(c), c.event);
   if (std::getenv("STAGEID_STOP_TABLE") != nullptr)
-    fmt::print("| {} | {} | {:.0f} | {:.0f} | {:.3g} | {:.1f} | {} | {} | {} |\n", c.name,
-               to_string(link), 1e6 * stopped.largest_m, stopped.largest_n, 1e3 * stopped.speed_m_s,
-               1e3 * stopped.stopping_s, stopped.marked,
+    fmt::print("| {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.3g} | {:.1f} | {} | {} | {} |\n", c.name,
+               to_string(link), 1e6 * stopped.largest_m, 1e6 * stopped.coasted_m, stopped.largest_n,
+               1e3 * stopped.speed_m_s, 1e3 * stopped.stopping_s, stopped.marked,
                stopped.host_lost ? "-" : std::to_string(stopped.exit_code()), stopped.message);
   EXPECT_LT(stopped.largest_m, c.largest_m);
   EXPECT_LE(stopped.largest_n, kStopForce);
@@ -80,7 +83,7 @@ TEST_P(StopMatrix, StaysInsideTwoWindows) {
   }
   EXPECT_THAT(stopped.message, HasSubstr(cause_over(link, c)));
   // The trace of a node ends before the sample that stopped it.
-  if (link != StopLink::resident) {
+  if (link != StopLink::resident && link != StopLink::zeromq) {
     EXPECT_GT(stopped.marked, 0U);
   }
 }
@@ -124,15 +127,55 @@ std::string name_of(const testing::TestParamInfo<StopMatrix::ParamType>& at) {
   return name;
 }
 
+enum class Strategy : std::uint8_t { ramp, cut, brake };
+
+WaferStageSpec with_strategy(WaferStageSpec spec, Strategy strategy) {
+  if (strategy == Strategy::ramp) {  // nothing is predicted, so the loop stays closed
+    spec.limits.motion = {};
+    spec.limits.hard_window_m = Eigen::VectorXd::Constant(1, 1.0);
+  }
+  if (strategy == Strategy::cut) spec.limits.motion.force_per_acceleration.setZero();
+  return spec;
+}
+
+class StopStrategies : public testing::TestWithParam<Case> {};
+
+// Excursion until a second after the forces were cut.
+TEST_P(StopStrategies, TheBrakeIsTheOnlyOneThatStopsEverything) {
+  const Case& c = GetParam();
+  std::array<Stopped, 3> by;
+  for (std::size_t i = 0; i < by.size(); ++i)
+    by[i] = stop_over(StopLink::sim, with_strategy(spec_of(c), static_cast<Strategy>(i)), c.event);
+  const auto excursion = [](const Stopped& stopped) {
+    return std::max(stopped.largest_m, stopped.coasted_m);
+  };
+  if (std::getenv("STAGEID_STOP_TABLE") != nullptr) {
+    fmt::print("| {} |", c.name);
+    for (const Stopped& stopped : by)
+      fmt::print(" {:.0f}, {:.3g} mm/s, {:.0f} |", 1e6 * stopped.largest_m, 1e3 * stopped.speed_m_s,
+                 1e6 * excursion(stopped));
+    fmt::print("\n");
+  }
+  const Stopped& brake = by[static_cast<std::size_t>(Strategy::brake)];
+  for (const Stopped& stopped : by) EXPECT_LE(excursion(brake), 1.5 * excursion(stopped));
+  EXPECT_LT(brake.largest_m, 2.0 * kStopWindow);
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, StopStrategies, kFaults, [](const auto& at) {
+  std::string name;
+  for (const char letter : std::string(at.param.name))
+    if (std::isalnum(static_cast<unsigned char>(letter)) != 0) name += letter;
+  return name;
+});
 INSTANTIATE_TEST_SUITE_P(Faults, StopMatrix,
                          testing::Combine(testing::Values(StopLink::sim, StopLink::plugin,
                                                           StopLink::can, StopLink::resident,
-                                                          StopLink::modbus),
+                                                          StopLink::modbus, StopLink::zeromq),
                                           kFaults),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Links, StopMatrix,
                          testing::Combine(testing::Values(StopLink::can, StopLink::resident,
-                                                          StopLink::modbus),
+                                                          StopLink::modbus, StopLink::zeromq),
                                           kLinkEvents),
                          name_of);
 

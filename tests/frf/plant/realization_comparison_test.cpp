@@ -65,6 +65,29 @@ TEST(RealizationComparison, FindsNothingInCleanAndDistortedLogs) {
       }
 }
 
+// Motion of the stage itself disturbs the lowest lines, where the response is largest, by far more than the noise.
+TEST(RealizationComparison, ADisturbanceOfAFewLinesIsNoScale) {
+  constexpr Eigen::Index kLines = 100;
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 1.0, 100.0);
+  frf.outputs.names = {"y1", "y2"};
+  frf.inputs.names = {"u1", "u2"};
+  frf.sample_rate_hz = 1000.0;
+  frf.response.resize(4, kLines);
+  for (Eigen::Index k = 0; k < kLines; ++k)
+    frf.response.col(k).setConstant(1.0 / (frf.frequency_hz[k] * frf.frequency_hz[k]));
+  frf.noise_variance = Eigen::MatrixXd::Constant(4, kLines, 1e-10);
+  RealizationComparison comparison(2, 2, kLines);
+  for (int m = 0; m < 2; ++m) {
+    comparison.begin(m);
+    for (Eigen::Index k = 0; k < kLines; ++k)
+      comparison.add((m == 1 && k == 0 ? 3.0 : 1.0) * frf.response.col(k).reshaped(2, 2), k);
+  }
+  const RealizationDifferences found = comparison.find(frf);
+  EXPECT_TRUE(found.changes.empty()) << found.changes.front().channel;
+  EXPECT_EQ(found.outlying, std::vector<int>{1});
+}
+
 TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
   struct Fault {
     std::function<void(LogSamples&)> by;

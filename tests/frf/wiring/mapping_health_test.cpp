@@ -193,6 +193,22 @@ TEST(MovingSetpoint, IsNotADeadSensor) {
   EXPECT_THAT(finding->what, HasSubstr("moving setpoint"));
 }
 
+// A factor would explain a part of what differs.
+TEST(AnotherController, IsNoWrongScale) {
+  const MemoryLog log = closed_loop_log();
+  NominalStage nominal = small_nominal();
+  nominal.controller = [](double hz) {
+    return Eigen::MatrixXcd((hz > 30.0 ? -3.0 : -2.0) *
+                            test::small_stage().controller(2.0 * std::numbers::pi * hz));
+  };
+  const std::vector<Finding> found = health_of(log, nominal);
+  EXPECT_EQ(first_with(found, Cause::scale), nullptr);
+  const Finding* finding = first_with(found, Cause::controller);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_THAT(finding->what, HasSubstr("different controller"));
+  EXPECT_THAT(finding->what, HasSubstr("setpoint"));
+}
+
 /// The sensors show only noise, and u = r - C y.
 MemoryLog log_without_response() {
   MemoryLog log = closed_loop_log(1, 0.3);

@@ -18,21 +18,12 @@ constexpr double kDrift = 100e-6;
 constexpr double kOffset_ns = 3e12;
 
 /// The end of a node whose clock has another offset and is fast.
-class DriftingEnd final : public CanTransport {
+class DriftingEnd final : public CanThrough {
  public:
-  explicit DriftingEnd(CanTransport& end) : end_(end) {}
-  std::size_t buses() const noexcept override { return end_.buses(); }
-  const std::string& name(std::size_t bus) const noexcept override { return end_.name(bus); }
-  std::size_t send(std::span<const CanFrame> frames) noexcept override { return end_.send(frames); }
-  std::size_t receive(std::span<CanFrame> frames) noexcept override { return end_.receive(frames); }
-  void wait(std::int64_t until_ns) noexcept override { end_.wait(until_ns); }
-  const CanBusHealth& health(std::size_t bus) const noexcept override { return end_.health(bus); }
+  using CanThrough::CanThrough;
   std::int64_t now_ns() const noexcept override {
-    return std::llround(kOffset_ns + (1.0 + kDrift) * static_cast<double>(end_.now_ns()));
+    return std::llround(kOffset_ns + (1.0 + kDrift) * static_cast<double>(CanThrough::now_ns()));
   }
-
- private:
-  CanTransport& end_;
 };
 
 /// The node works at its ticks only, one per period of its clock.
@@ -47,7 +38,7 @@ class TickingNode {
     pair_.when_host_waits([this] { serve(); }, 1'000);
   }
 
-  CanPair& pair() { return pair_; }
+  test::CanPair& pair() { return pair_; }
   std::unique_ptr<CanStage> host(bool node_clock) {
     CanSpec spec = rig_.spec();
     spec.node_clock = node_clock;
@@ -73,7 +64,7 @@ class TickingNode {
   }
 
   CanRig rig_;
-  CanPair pair_{{"pair0"}};
+  test::CanPair pair_{{"pair0"}};
   DriftingEnd end_;
   StageNode node_;
   CanNode front_;

@@ -50,7 +50,7 @@ TEST(SocketCan, RefusesInterfacesThatAreNotThere) {
 }
 
 TEST(CanTransport, TheWorstBusCounts) {
-  CanPair pair({"one", "two", "three"});
+  test::CanPair pair({"one", "two", "three"});
   EXPECT_EQ(worst_bus(pair.host()).state, CanBusState::active);
   pair.set_state(1, CanBusState::passive);
   pair.set_state(2, CanBusState::warning);

@@ -197,14 +197,9 @@ class Hub {
  public:
   explicit Hub(CanTransport& bus) : bus_(bus) {}
 
-  class End final : public CanTransport {
+  class End final : public CanThrough {
    public:
-    explicit End(Hub& hub) : hub_(hub) {}
-    std::size_t buses() const noexcept override { return hub_.bus_.buses(); }
-    const std::string& name(std::size_t bus) const noexcept override { return hub_.bus_.name(bus); }
-    std::size_t send(std::span<const CanFrame> frames) noexcept override {
-      return hub_.bus_.send(frames);
-    }
+    explicit End(Hub& hub) : CanThrough(hub.bus_) {}
     std::size_t receive(std::span<CanFrame> frames) noexcept override {
       std::size_t count = 0;
       for (; count < frames.size() && !queue.empty(); queue.pop_front())
@@ -212,14 +207,7 @@ class Hub {
       return count;
     }
     void wait(std::int64_t) noexcept override {}
-    const CanBusHealth& health(std::size_t bus) const noexcept override {
-      return hub_.bus_.health(bus);
-    }
-    std::int64_t now_ns() const noexcept override { return hub_.bus_.now_ns(); }
     std::deque<CanFrame> queue;
-
-   private:
-    Hub& hub_;
   };
 
   void pump() {

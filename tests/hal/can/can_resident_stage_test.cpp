@@ -20,29 +20,22 @@ using test::CanRig;
 constexpr int kPeriod = 400;
 
 /// Loses every n-th frame in both directions, of any kind.
-class LossyCan final : public CanTransport {
+class LossyCan final : public CanThrough {
  public:
   LossyCan(std::unique_ptr<CanTransport> inner, unsigned lost_of_hundred)
-      : inner_(std::move(inner)), lost_of_hundred_(lost_of_hundred) {}
-  std::size_t buses() const noexcept override { return inner_->buses(); }
-  const std::string& name(std::size_t bus) const noexcept override { return inner_->name(bus); }
+      : CanThrough(*inner), inner_(std::move(inner)), lost_of_hundred_(lost_of_hundred) {}
   std::size_t send(std::span<const CanFrame> frames) noexcept override {
     for (const CanFrame& frame : frames)
-      if (!lost()) static_cast<void>(inner_->send({&frame, 1}));
+      if (!lost()) static_cast<void>(CanThrough::send({&frame, 1}));
     return frames.size();
   }
   std::size_t receive(std::span<CanFrame> frames) noexcept override {
-    const std::size_t count = inner_->receive(frames);
+    const std::size_t count = CanThrough::receive(frames);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count; ++i)
       if (!lost()) frames[kept++] = frames[i];
     return kept;
   }
-  void wait(std::int64_t until_ns) noexcept override { inner_->wait(until_ns); }
-  const CanBusHealth& health(std::size_t bus) const noexcept override {
-    return inner_->health(bus);
-  }
-  std::int64_t now_ns() const noexcept override { return inner_->now_ns(); }
   void cut() { lost_of_hundred_ = 100; }
   void mend() { lost_of_hundred_ = 0; }
 

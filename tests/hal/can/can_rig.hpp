@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "hal/can/can_node.hpp"
-#include "hal/can/can_pair.hpp"
 #include "hal/can/can_stage.hpp"
 #include "hal/can/faulty_can.hpp"
 #include "hal/node/stage_node.hpp"
+#include "tests/support/stages/can_pair.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test {

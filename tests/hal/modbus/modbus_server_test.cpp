@@ -21,6 +21,7 @@
 #include "hal/stage/stage.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"
+#include "tests/support/process/resident_bytes.hpp"
 
 namespace stageid {
 namespace test_modbus_server {
@@ -131,6 +132,7 @@ const Bytes kReadRequest = tcp_frame(1, 1, Bytes{3, 0, 0, 0, 100});
 // The owner's run, a supervisor with heartbeat, and other clients. The owner's exchanges are answered within its
 // response time, the heartbeat is watched, and the run ends normally.
 TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
+  const std::size_t before = test::resident_bytes();
   test::ModbusBench bench;
   ModbusStage owner(test::ModbusBench::info(), bench.address(), test::kQuickTiming);
   std::vector<double> y(1);
@@ -168,6 +170,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   std::size_t open = 0;
   for (const int client : clients.all) open += hung_up(client, MSG_DONTWAIT) ? 0U : 1U;
   EXPECT_LE(open, ModbusServer::kMostClients) << "places are bounded";
+  EXPECT_LT(test::resident_bytes() - before, std::size_t{8} << 20);
   owner.stop();
   EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);
   bench.stop();

@@ -112,15 +112,30 @@ TEST_F(StageNodeTest, AHostThatFallsSilentLeadsToASafeStop) {
   EXPECT_EQ(node_->state(), NodeState::fault_reaction);
   EXPECT_EQ(node_->cause(), FaultCause::watchdog);
   EXPECT_EQ(node_->trouble(), "the host stopped sending");
+  EXPECT_EQ(fake_->commands.size(), 21U) << "the last force has acted on";
+  EXPECT_EQ(fake_->commands.back()[0], 1.0);
   tick_for(50);
   EXPECT_EQ(fake_->stops, 0) << "held in closed loop meanwhile";
-  EXPECT_EQ(fake_->commands.size(), 51U) << "a sample a millisecond";
+  EXPECT_EQ(fake_->commands.size(), 71U) << "a sample a millisecond";
   EXPECT_NEAR(fake_->commands.back()[0], -kGain_n_per_m * 2e-3, 1e-12);
   EXPECT_EQ(advance(9.0), Outcome::fault) << "too late, the host has lost the stage";
   tick_for(60);
   EXPECT_EQ(node_->state(), NodeState::fault);
   EXPECT_EQ(fake_->stops, 1);
-  EXPECT_EQ(fake_->commands.size(), 101U);
+  EXPECT_EQ(fake_->commands.size(), 121U);
+}
+
+TEST_F(StageNodeTest, TheLimitsAreWatchedWhileTheHostIsSilent) {
+  measure();
+  EXPECT_EQ(advance(1.0), Outcome::ok);
+  fake_->measurement = {30e-3};  // beyond the hard window
+  tick_for(21);
+  EXPECT_EQ(fake_->commands.size(), 2U) << "not for the rest of the silence";
+  EXPECT_EQ(fake_->stops, 1);
+  EXPECT_EQ(node_->state(), NodeState::fault);
+  EXPECT_EQ(node_->cause(), FaultCause::watchdog);
+  EXPECT_EQ(node_->trouble(),
+            "the host stopped sending; its last force moved the stage too far; not braked");
 }
 
 TEST_F(StageNodeTest, AFaultIsLeftByAResetOnly) {

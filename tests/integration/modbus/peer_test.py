@@ -10,6 +10,7 @@ import json
 import pathlib
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -179,6 +180,22 @@ class ModbusTest(unittest.TestCase):
         self.assertEqual(client.read_holding_registers(STATE, 2, slave=9).exception_code, 11)
         self.assertEqual(client.read_coils(0, 1, slave=1).exception_code, 1)
         self.assertEqual(number(port, STATE), 1, 'the node must have come through unharmed')
+
+    def test_a_node_ends_beside_clients_that_stall(self):
+        node, port = self.bench.node()
+        clients = [socket.create_connection(('127.0.0.1', port)) for _ in range(16)]
+        for number_of, client in enumerate(clients):
+            self.addCleanup(client.close)
+            client.setblocking(False)
+            try:
+                # Half a header, or requests whose replies are not read.
+                client.send(bytes(5) if number_of % 2 else struct.pack('>HHHBBHH', 1, 0, 6, 1, 3, 0, 100) * 5000)
+            except BlockingIOError:
+                pass
+        began = time.monotonic()
+        node.terminate()
+        self.assertEqual(node.wait(10), 0)
+        self.assertLess(time.monotonic() - began, 2.0)
 
     def test_two_starts_have_two_boot_ids(self):
         ids = [number(self.bench.node()[1], BOOT_ID) for _ in range(2)]

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -60,7 +61,11 @@ inline WaferStageSpec stop_stage_spec(double controller_gain = 1.0) {
 class WatchedStage final : public CyclicStage {
  public:
   explicit WatchedStage(const WaferStageSpec& spec)
-      : stage_(spec), rate_hz_(spec.info.sample_rate_hz), now_m_(spec.info.sensors.size()) {
+      : stage_(spec),
+        rate_hz_(spec.info.sample_rate_hz),
+        suspension_rad_s_(2.0 * std::numbers::pi * spec.suspension_hz[2]),
+        damping_(spec.suspension_damping),
+        now_m_(spec.info.sensors.size()) {
     before_m_ = now_m_;
   }
   const StageInfo& info() const noexcept override { return stage_.info(); }
@@ -76,6 +81,18 @@ class WatchedStage final : public CyclicStage {
   }
   void stop() noexcept override { stage_.stop(); }
 
+  /// Largest excursion in the second after the forces were cut, on the suspension alone.
+  double coasted_m() const {
+    double x = now_m_[0];
+    double v = (now_m_[0] - before_m_[0]) * rate_hz_;
+    double largest = std::abs(x);
+    for (double t = 0.0; t < 1.0; t += 1.0 / rate_hz_) {
+      v -= (suspension_rad_s_ * x + 2.0 * damping_ * v) * suspension_rad_s_ / rate_hz_;
+      x += v / rate_hz_;
+      largest = std::max(largest, std::abs(x));
+    }
+    return largest;
+  }
   /// Of the fastest sensor in the last sample.
   double speed_m_s() const {
     double speed = 0.0;
@@ -92,6 +109,8 @@ class WatchedStage final : public CyclicStage {
  private:
   SimulatedStage stage_;
   double rate_hz_;
+  double suspension_rad_s_;
+  double damping_;
   std::vector<double> now_m_;
   std::vector<double> before_m_;
 };

@@ -5,14 +5,17 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 #include <vector>
 
 #include "hal/stage/stage.hpp"
+#include "tests/support/process/resident_bytes.hpp"
 
 namespace stageid {
 namespace test_dashboard_server {
@@ -133,6 +136,42 @@ TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   for (const int socket : sockets) ::close(socket);
   ASSERT_TRUE(result) << "no answer";
   EXPECT_EQ(result->body, "<p>page</p>");
+}
+
+TEST_F(DashboardServerTest, AThousandIdleAndAHundredSlowClientsDelayNobody) {
+  rlimit files{};
+  ::getrlimit(RLIMIT_NOFILE, &files);
+  files.rlim_cur = std::min<rlim_t>(files.rlim_max, 4096);
+  ::setrlimit(RLIMIT_NOFILE, &files);
+  serve();
+  const std::size_t before = test::resident_bytes();
+  std::vector<std::unique_ptr<RawWatcher>> slow;
+  for (int i = 0; i < 100; ++i)
+    slow.push_back(
+        std::make_unique<RawWatcher>(port_, RawWatcher::Request{"GET / HTTP/1.1\r\nX: "}));
+  std::vector<int> idle;
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port_));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  for (int i = 0; i < 1000; ++i) {  // none waits for its turn in the short queue of the port
+    idle.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0));
+    ::connect(idle.back(), reinterpret_cast<sockaddr*>(&to), sizeof to);
+  }
+  const auto began = std::chrono::steady_clock::now();
+  httplib::Client other = client();
+  other.set_read_timeout(30s);
+  const httplib::Result page = other.Get("/");
+  const httplib::Result abort =
+      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain");
+  const auto took = std::chrono::steady_clock::now() - began;
+  for (const int socket : idle) ::close(socket);
+  EXPECT_LT(took, 20s) << "a thread is taken for two seconds, and a connection is repeated";
+  ASSERT_TRUE(page) << "no answer";
+  EXPECT_EQ(page->body, "<p>page</p>");
+  ASSERT_TRUE(abort) << "no answer";
+  EXPECT_EQ(aborts_, 1);
+  EXPECT_LT(test::resident_bytes() - before, std::size_t{32} << 20);
 }
 
 TEST_F(DashboardServerTest, KeepsNoMoreOfARequestThanABrowserSends) {

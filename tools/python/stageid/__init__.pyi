@@ -251,8 +251,8 @@ class Frf:
         self,
         *,
         band_hz: Sequence[float] | None = None,
-        inputs: Sequence[str] | None = None,
-        outputs: Sequence[str] | None = None,
+        inputs: str | Sequence[str] | None = None,
+        outputs: str | Sequence[str] | None = None,
     ) -> Frf:
         """Selects lines and channels; None: all.
 
@@ -261,7 +261,7 @@ class Frf:
         band_hz
             (low, high) in Hz, inclusive.
         inputs, outputs
-            Names, in the requested order.
+            One name, or several in the requested order.
 
         Raises
         ------
@@ -564,9 +564,9 @@ def read_log(file: File) -> Log:
 def frf(
     logs: Log | File | Sequence[Log | File],
     *,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
-    realizations: Sequence[int] | None = None,
+    inputs: str | Sequence[str] | None = None,
+    outputs: str | Sequence[str] | None = None,
+    realizations: int | Sequence[int] | None = None,
     transient_periods: int | None = None,
     method: Literal["periodic", "lpm"] = "periodic",
     covariance: Literal["diagonal", "full"] = "diagonal",
@@ -585,11 +585,11 @@ def frf(
     logs
         A Log, a file name, or a list of these.
     inputs
-        Names of actuators. None: those that are excited.
+        One name or several, of actuators. None: those that are excited.
     outputs
-        Names of sensors. None: all.
+        One name or several, of sensors. None: all.
     realizations
-        Realizations to use, counted from 1. None: all complete ones.
+        One realization or several, counted from 1. None: all complete ones.
     transient_periods
         Number of periods to discard. None: the value of the log ('lpm': 0).
     method

@@ -1,9 +1,9 @@
-#include "hal/can/can_pair.hpp"
+#include "tests/support/stages/can_pair.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace stageid {
+namespace stageid::test {
 
 struct CanPair::Wire {
   std::vector<std::string> names;
@@ -91,4 +91,4 @@ void CanPair::set_state(std::size_t bus, CanBusState state) noexcept {
   wire_->health[bus].state = state;
 }
 
-}  // namespace stageid
+}  // namespace stageid::test

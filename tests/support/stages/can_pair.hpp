@@ -9,7 +9,7 @@
 
 #include "hal/can/can_transport.hpp"
 
-namespace stageid {
+namespace stageid::test {
 
 /// Buses within one process and one thread with a simulated clock. Each end receives what the other sends,
 /// and waiting runs the other side instead of passing time. It makes tests of all layers above the kernel
@@ -37,4 +37,4 @@ class CanPair {
   std::unique_ptr<End> node_;
 };
 
-}  // namespace stageid
+}  // namespace stageid::test
