@@ -14,7 +14,7 @@ namespace stageid {
 inline constexpr int kGrowthIterations = 12;
 /// Times as many for delays per channel and for springs, whose start is farther away.
 inline constexpr int kFartherAway = 3;
-/// A trial from nothing that is this many times as costly as the model after a third of its iterations is given up.
+/// A new search is given up if, after a third of its iterations, its cost is this many times that of the model.
 inline constexpr double kHopeless = 10.0;
 /// Alternatives tried before the search concludes that none is better: missing modes, merges, pairs.
 inline constexpr std::size_t kTried = 4;

@@ -84,7 +84,7 @@ class Comparison {
       undo(*best);
       found.push_back(*best);
     }
-    // Changed channels explain most of what differs. A disturbance is explained only here and there.
+    // Changed channels explain most of the misfit, a disturbance only that of some lines.
     if (misfit() > kMostLeft * before) found.clear();
     return found;
   }
@@ -166,9 +166,10 @@ class Comparison {
 
   template <typename Offer>
   void try_part(const Part& part, const Offer& offer) const {
+    if (!exceeds_noise(part)) return;
     const Sums all = sums_of(part);
-    if (!(all.misfit > kWorthSearching * entries(part)) || !(all.length > 0.0)) return;
-    // What one half of the lines tells must explain the other. A few lines with much noise explain only themselves.
+    if (!(all.length > 0.0)) return;
+    // A value from one half of the lines must explain the other half; that of a few disturbed lines does not.
     const Sums even = sums_of(part, 0, 2);
     const Sums odd = sums_of(part, 1, 2);
     const auto offer_if = [&](RealizationChange::Kind kind, double value, double length,
