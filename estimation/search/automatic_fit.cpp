@@ -82,12 +82,7 @@ class AutomaticFit {
   /// @param surplus modes to grow beyond the requested number
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
-    if (best_.status == FitStatus::singular) return;
-    if (selection_.keep_modes) {
-      structure_.open = {.rigid_body = structure_.open.rigid_body};
-      restructure();
-      return;
-    }
+    if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) {
       reduce();

@@ -88,8 +88,11 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
     free_delays(DelayModel::per_channel, skewed);
     skewed.options.max_iterations *= kFartherAway;
     skewed.from_nothing = true;
-    // Modes that were fitted to channels with different delays lead to another minimum.
+    // Poles that were fitted to channels with different delays lead to another minimum.
     std::erase_if(skewed.model.submodels, is_searched_mode);
+    for (Submodel& s : skewed.model.submodels)
+      if (s.role == SubmodelRole::suspension && !s.frequency_held)
+        s = suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0]);
     const ModelStructure structure{.general_damping = has(model, is_general)};
     for (const ModeCandidate& peak : pick_modes(frf))
       skewed.model.submodels.push_back(mode_submodel(frf, structure, peak));
