@@ -206,8 +206,9 @@ class AutomaticFit {
   /// @returns true if anything was changed
   bool restructure() {
     bool changed = false;
-    if (structure_.open == OpenStructure{}) return false;
+    if (structure_.open == OpenStructure{} || history_.size() == structured_at_) return false;
     while (!limit_reached() && change_structure()) changed = true;
+    structured_at_ = history_.size();
     return changed;
   }
 
@@ -220,7 +221,13 @@ class AutomaticFit {
       return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
-    if (!take_best(sample, std::move(moves))) return false;
+    // An expensive one that gains nothing in its first step is tried only if no other is better.
+    const auto last =
+        std::stable_partition(moves.begin(), moves.end(), [&](const StructureMove& move) {
+          return !move.from_nothing || gains_at_once(sample, move);
+        });
+    if (!take_best(sample, {moves.begin(), last}) && !take_best(sample, {last, moves.end()}))
+      return false;
     const OpenStructure open = structure_.open;
     structure_ = structure_of(best_.model);
     structure_.open = open;
@@ -231,7 +238,7 @@ class AutomaticFit {
 
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
   void merge() {
-    for (std::size_t done = 0; !limit_reached();) {
+    for (std::size_t done = 0; !limit_reached() && history_.size() != merged_at_;) {
       if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
@@ -240,7 +247,7 @@ class AutomaticFit {
         const auto count = static_cast<std::ptrdiff_t>(std::min(kTried, all.size() - done));
         if (take_best(sample, {first, first + count})) break;
       }
-      if (done >= all.size()) return;
+      if (done >= all.size()) merged_at_ = history_.size();
       done = 0;
     }
   }
@@ -281,6 +288,15 @@ class AutomaticFit {
     });
   }
 
+  /// Whether the options of a move gain anything in one step from the present poles.
+  bool gains_at_once(const Sample& sample, const StructureMove& move) const {
+    FitOptions options = move.options;
+    options.delay_s = sample.data.options.delay_s;
+    options.max_iterations = 1;
+    return sample.worth.criterion(fit_additive_model(sample.data.frf, sample.data.model, options)) <
+           sample.now;
+  }
+
   /// The trial of a move on the sample. From nothing, the result depends on the structure only.
   FitResult tried(const Sample& sample, const StructureMove& move) {
     if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
@@ -294,11 +310,11 @@ class AutomaticFit {
     if (!is_new) return at->second;
     FitResult& result = at->second;
     FitOptions options = move.options;
-    options.max_iterations /= 3;
+    options.max_iterations /= kFartherAway;
     result = fit_additive_model(sample.data.frf, move.model, options);
     if (result.status == FitStatus::iteration_limit &&
         result.model.fit.cost < kHopeless * sample.cost) {
-      options.max_iterations *= 2;
+      options.max_iterations = move.options.max_iterations - options.max_iterations;
       result = fit_additive_model(sample.data.frf, result.model, options);
     }
     return result;
@@ -465,7 +481,10 @@ class AutomaticFit {
       from_nothing_;  ///< results of such moves, by structure
   std::vector<std::string> decisions_;
   std::vector<double> history_;
-  std::size_t exhausted_at_ = 0;  ///< size of the history when no mode was left to add
+  // Size of the history when no such move was left; with the same model, none is tried again.
+  std::size_t merged_at_ = 0;
+  std::size_t structured_at_ = 0;
+  std::size_t exhausted_at_ = 0;  // modes to add
 };
 
 /// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried

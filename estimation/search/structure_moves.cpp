@@ -137,11 +137,18 @@ std::vector<StructureMove> structure_moves(const FrfEstimate& frf, const FitOpti
 
 std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model) {
   std::vector<StructureMove> out;
-  for (const auto& [i, j] : overlapping_modes(model))
+  std::vector<std::size_t> merged;
+  for (const auto& [i, j] : overlapping_modes(model)) {
+    const double one = model.submodels[i].damping_ratio();
+    const double other = model.submodels[j].damping_ratio();
+    const std::size_t broader = one > other ? i : j;
+    if (std::find(merged.begin(), merged.end(), broader) != merged.end()) continue;
+    merged.push_back(broader);
     out.push_back(
         {fmt::format("merged {:.6g} and {:.6g} Hz", model.submodels[i].natural_frequency_hz(),
                      model.submodels[j].natural_frequency_hz()),
          with_one_of(model, i, j), options});
+  }
   return out;
 }
 
