@@ -10,16 +10,11 @@
 #include "estimation/model/poles.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
 namespace {
-
-// Of a normal matrix with unit diagonal. One denominator of order 20 reaches 1e-12 (the numerators 1e-9) and is still
-// determined; sums of thousands of terms are accurate to 1e-15.
-constexpr double kSmallestDirection = 1e-12;  // of the numerators
-constexpr double kSmallestShare = 3e-14;      // of the denominators
-constexpr double kShareOfDirection = 0.1;     // above this share, a submodel is named
 
 /// @param first coefficient of submodel `i` among the globals
 bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
@@ -112,7 +107,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
     const Eigen::Index functions = problem.shapes[i].functions();
-    if (direction.segment(first, functions).norm() > kShareOfDirection)
+    if (direction.segment(first, functions).norm() > kSmallPart)
       names.push_back(submodel_name(problem, beta, i));
     first += functions;
   }

@@ -21,7 +21,7 @@ bool is_held_by_request(const Submodel& s) { return s.frequency_held || s.dampin
 /// Standard deviation of the frequency; if unknown, a part of the half-power width.
 double deviation_hz(const Submodel& s) {
   const double width_hz = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
-  return s.natural_frequency_std_hz.value_or(kUndoubtedWidths * width_hz);
+  return s.natural_frequency_std_hz.value_or(kSmallPart * width_hz);
 }
 
 /// @param with_flank also a peak outside the lines whose flank is on the lines

@@ -38,8 +38,8 @@ inline constexpr double kDearest = 1.5;
 inline constexpr double kNearly = 100.0;
 /// Of 2 ln(likelihood), which has a standard deviation above 1: acceptable cost of convergence.
 inline constexpr double kNothing = 0.1;
-/// Standard deviations of a chi-square variable: more is not chance.
-inline constexpr double kClearly = 3.0;
+/// Standard deviations: more is not chance, even in the largest of a thousand channels (p = 6e-7 each).
+inline constexpr double kClearly = 5.0;
 
 // More modes than this are placed at once before growing: those hidden by noise never settle.
 
@@ -52,15 +52,32 @@ inline constexpr double kSettled = 0.02;
 
 /// A mode of this damping ratio or more has no peak of its own.
 inline constexpr double kBroad = 0.1;
-/// Deviation of a frequency that is not known, in half-power widths.
-inline constexpr double kUndoubtedWidths = 0.1;
+/// Of a half-power width, a damping ratio or a direction: a small change, in which a fit is linear, but which is far
+/// above rounding. Also the deviation of a frequency without a standard deviation.
+inline constexpr double kSmallPart = 0.1;
+/// Of a half-power width or a damping ratio: the largest step from the linear solution that separates two modes.
+inline constexpr double kLargestPart = 0.5;
 /// Of the lowest line: start of a suspension that is hardly distinguishable from a free body.
 inline constexpr double kWeakSpringsStart = 0.02;
 
-// Real poles of requested submodels start on a grid that extends beyond the lines by these factors.
-
+/// Starts of a real pole of a requested submodel. Over four decades, two starts differ by a factor below two.
 inline constexpr int kRealPoleGrid = 17;
-inline constexpr double kRealPoleBelow = 0.3;
-inline constexpr double kRealPoleAbove = 3.0;
+
+// Of many modes hidden by noise: the part of the best shrinkage (three quarters of the gain for a quarter of the cost),
+// and its limit for a mode that is all noise.
+
+inline constexpr double kPartOfShare = 0.5;
+inline constexpr double kLargestShare = 0.99;
+
+// Rounding.
+
+/// Of a normal matrix with unit diagonal. One denominator of order 20 reaches 1e-12 (the numerators 1e-9) and is still
+/// determined; sums of thousands of terms are accurate to 1e-15.
+inline constexpr double kSmallestDirection = 1e-12;  ///< of the numerators
+inline constexpr double kSmallestShare = 3e-14;      ///< of the denominators
+/// Of the largest entry of a residue: a smaller deviation would only test rounding.
+inline constexpr double kBestKnown = 1e-8;
+/// Samples: smaller differences of delays are below the accuracy of the hold.
+inline constexpr double kLeastSamples = 1e-3;
 
 }  // namespace stageid

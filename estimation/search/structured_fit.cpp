@@ -16,6 +16,7 @@
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
+#include "estimation/start/residual_modes.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 
@@ -127,8 +128,8 @@ class PoleSearch {
   }
 
   void place_real_pole(std::vector<SubmodelRequest>& requests, std::size_t i) {
-    const double low = kRealPoleBelow * frf_.frequency_hz[0];
-    const double high = kRealPoleAbove * frf_.frequency_hz[frf_.lines() - 1];
+    const double low = kBelowBand * frf_.frequency_hz[0];
+    const double high = kAboveBand * frf_.frequency_hz[frf_.lines() - 1];
     std::vector<double>& f = requests[i].frequency_hz;
     f.push_back(low);
     double best = low;
