@@ -128,7 +128,8 @@ class AutomaticFit {
     sort_modes(result);
     if (many())
       evidence.number = ModeNumber::given;  // the hidden ones are held
-    else if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy())
+    else if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy() &&
+             supports_all_modes(frf_, evidence, result))
       evidence.alike = alike_modes(frf_, last, result);
     evidence.growth_ended = watch_.finding();
     evidence.delay_explains_more = watch_.by_delay();

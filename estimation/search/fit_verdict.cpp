@@ -45,6 +45,10 @@ bool is_worth_nothing(const FrfEstimate& frf, const FitResult& fit, std::size_t 
          fit.removal_cost[i] < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i]));
 }
 
+bool is_unsupported(ModeVerdict verdict) {
+  return verdict == ModeVerdict::weak || verdict == ModeVerdict::at_bound;
+}
+
 /// Why a mode is not a resonance of the data.
 std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) {
   if (verdict == ModeVerdict::at_bound)
@@ -63,7 +67,7 @@ void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult&
     s.verdict.reset();
     if (!s.is_mode()) continue;
     s.verdict = mode_verdict(frf, evidence.number, fit, i);
-    if (s.verdict == ModeVerdict::weak || s.verdict == ModeVerdict::at_bound)
+    if (is_unsupported(*s.verdict))
       places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
                                    s.damping_ratio(), reason_of(fit, i, *s.verdict)));
   }
@@ -117,6 +121,12 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   if (!is_held_by_request(s) && (open || (asked && is_worth_nothing(frf, fit, submodel))))
     return ModeVerdict::weak;
   return beside ? ModeVerdict::beside_band : ModeVerdict::determined;
+}
+
+bool supports_all_modes(const FrfEstimate& frf, const FitEvidence& evidence, const FitResult& fit) {
+  for (std::size_t i = 0; i < fit.model.submodels.size(); ++i)
+    if (is_unsupported(mode_verdict(frf, evidence.number, fit, i))) return false;
+  return true;
 }
 
 std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& options,

@@ -53,6 +53,9 @@ std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const Additiv
 ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitResult& fit,
                          std::size_t submodel);
 
+/// Whether no mode is weak or at a bound.
+bool supports_all_modes(const FrfEstimate& frf, const FitEvidence& evidence, const FitResult& fit);
+
 /// Pairs of overlapping modes that a single one could replace: a surplus mode may split a real one. At most four pairs
 /// are tried, one fit each.
 std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& options,

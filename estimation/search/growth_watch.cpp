@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -54,8 +55,6 @@ bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
              price_of_mode(frf, before, parameters / static_cast<double>(added));
 }
 
-bool is_power_of_two(int n) { return (n & (n - 1)) == 0; }
-
 }  // namespace
 
 bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
@@ -69,7 +68,8 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
   if (!spurious) spurious_in_a_row_ = 0;
   if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;
   // In every second, fourth, eighth round: a small part of the cost of the search.
-  if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
+  if (rounds_ > 1 && std::has_single_bit(static_cast<unsigned>(rounds_)) &&
+      a_delay_explains_more(frf, options, now))
     return true;
   if (spurious_in_a_row_ < kMostSpurious) return false;
   finding_ = fmt::format(
