@@ -62,6 +62,7 @@ Json submodel_to_json(const Submodel& s) {
     out["damping_ratio"] = s.damping_ratio();
     if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
     if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
+    if (s.verdict) out["verdict"] = to_string(*s.verdict);
     add_shapes(s, out);
   }
   for (const PoleEstimate& pole : s.poles) {
@@ -167,6 +168,11 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
   if (node.has("damping_ratio_std"))
     s.damping_ratio_std = node.member("damping_ratio_std").number();
+  if (node.has("verdict"))
+    for (const ModeVerdict verdict :
+         {ModeVerdict::determined, ModeVerdict::weak, ModeVerdict::at_bound,
+          ModeVerdict::coincident, ModeVerdict::beside_band})
+      if (node.member("verdict").text() == to_string(verdict)) s.verdict = verdict;
   if (node.has("poles"))
     for (const JsonNode& pole : node.member("poles").elements())
       s.poles.push_back(pole_from_json(pole));

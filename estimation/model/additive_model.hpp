@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -24,6 +25,16 @@ enum class SubmodelRole : std::uint8_t {
   given,      ///< requested: it stays, and the data must determine its poles
   suspension  ///< weak stiffness of a rigid body: it stays; below the lines its poles may be held
 };
+
+/// What the data say about a mode of a fit.
+enum class ModeVerdict : std::uint8_t {
+  determined,
+  weak,        ///< a standard deviation as large as the value, or not worth its parameters
+  at_bound,    ///< the pole ended at a bound, where the lines contain no information on it
+  coincident,  ///< another mode is so near that one would fit as well
+  beside_band  ///< outside the lines: it represents everything that the plant has there
+};
+const char* to_string(ModeVerdict verdict) noexcept;
 
 /// One pole (real) or one conjugate pair of a submodel.
 struct PoleEstimate {
@@ -50,7 +61,8 @@ struct Submodel {
   std::optional<double> natural_frequency_std_hz;
   std::optional<double> damping_ratio_std;
   std::optional<ModeShapeDeviation> shape_std = {};
-  std::optional<int> residue_rank = {};  ///< rank at which the numerators were held; none: free
+  std::optional<int> residue_rank = {};     ///< rank at which the numerators were held; none: free
+  std::optional<ModeVerdict> verdict = {};  ///< of a mode, see judge()
   /// by rising frequency; only for submodels with poles that are not modes
   std::vector<PoleEstimate> poles = {};
 

@@ -21,6 +21,7 @@
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
@@ -29,17 +30,6 @@
 
 namespace stageid {
 namespace {
-
-constexpr int kGrowthIterations = 12;   // a mode that is still moving is finished later
-constexpr std::size_t kCandidates = 4;  // tried before the search concludes that no mode is missing
-constexpr std::size_t kMergesAtOnce = 8;  // the nearest pairs first
-// A new search is given up if, after a third of its iterations, its cost is this many times that of the model.
-constexpr double kHopeless = 10.0;
-constexpr std::size_t kShareAtOnce = 5;     // models of many modes grow by a fifth at a time
-constexpr double kSettledDeviations = 0.1;  // if several ways to a number of modes are compared
-constexpr int kMostGrown = 40;              // modes; more are placed at once before growing
-constexpr int kIterationsOfMany = 6;        // with free poles: those hidden by noise never settle
-constexpr double kSettledOfMany = 0.02;     // the same per pole for many modes, root mean square
 
 /// Grows and prunes a model, and records every decision.
 class AutomaticFit {
@@ -107,7 +97,7 @@ class AutomaticFit {
     restructure();
     if (!at_rounding()) {  // else the last fit is sufficient
       quick_.max_iterations = options_.max_iterations;
-      quick_.deviation_tolerance = many() ? settled_of_many() : kSettledDeviations;
+      quick_.deviation_tolerance = settled();
       adopt(fit_additive_model(frf_, best_.model, quick_));
     }
     say("{}, reached by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
@@ -121,22 +111,32 @@ class AutomaticFit {
   /// Releases the weights of the search; the last fit computes its own.
   void release_weights() { quick_.user_weights = {}; }
 
-  FitResult finish() {
+  FitResult finish(FitEvidence& evidence) {
     release_weights();
     sort_modes(best_.model);
     const bool cut_short = limit_reached();
     options_.limit->begin_completion();
     FitOptions last = options_;
     last.judge_modes = selection_.keep_modes;
-    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled_of_many());
+    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled());
     last.shrink_hidden = many();
+    evidence.number = mode_number();
     FitResult result = many() ? fit_additive_model(frf_, best_.model, last)
-                              : ranked_fit(frf_, best_.model, last, mode_number());
+                              : ranked_fit(frf_, best_.model, last, evidence);
     if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
       result.decisions.push_back(ranks);
-    watch_.tell(result);
-    if (cut_short) tell_limit(frf_, options_, result);
     sort_modes(result);
+    if (many())
+      evidence.number = ModeNumber::given;  // the hidden ones are held
+    else if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy() &&
+             supports_all_modes(frf_, evidence, result))
+      evidence.alike = alike_modes(frf_, last, result);
+    evidence.growth_ended = watch_.finding();
+    evidence.delay_explains_more = watch_.by_delay();
+    if (cut_short) {
+      evidence.limit = options_.limit->status();
+      evidence.limit_message = limit_message(frf_, options_, result);
+    }
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());
@@ -153,12 +153,12 @@ class AutomaticFit {
 
   bool many() const { return selection_.exactly > kMostGrown; }
 
-  /// Newton decrement at which every free pole is within kSettledOfMany of its standard deviation.
-  double settled_of_many() const {
+  /// Newton decrement at which every free pole is within kSettled of its standard deviation.
+  double settled() const {
     double free = 0.0;
     for (const Submodel& s : best_.model.submodels)
       if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
-    return kSettledOfMany * std::sqrt(free);
+    return kSettled * std::sqrt(free);
   }
 
   /// Fits `model` with all poles free, then holds those of modes hidden by noise at the result.
@@ -207,8 +207,9 @@ class AutomaticFit {
   /// @returns true if anything was changed
   bool restructure() {
     bool changed = false;
-    if (structure_.open == OpenStructure{}) return false;
+    if (structure_.open == OpenStructure{} || history_.size() == structured_at_) return false;
     while (!limit_reached() && change_structure()) changed = true;
+    structured_at_ = history_.size();
     return changed;
   }
 
@@ -221,7 +222,13 @@ class AutomaticFit {
       return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
-    if (!take_best(sample, std::move(moves))) return false;
+    // An expensive one that gains nothing in its first step is tried only if no other is better.
+    const auto last =
+        std::stable_partition(moves.begin(), moves.end(), [&](const StructureMove& move) {
+          return !move.from_nothing || gains_at_once(sample, move);
+        });
+    if (!take_best(sample, {moves.begin(), last}) && !take_best(sample, {last, moves.end()}))
+      return false;
     const OpenStructure open = structure_.open;
     structure_ = structure_of(best_.model);
     structure_.open = open;
@@ -232,16 +239,16 @@ class AutomaticFit {
 
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
   void merge() {
-    for (std::size_t done = 0; !limit_reached();) {
+    for (std::size_t done = 0; !limit_reached() && history_.size() != merged_at_;) {
       if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
-      for (; done < all.size(); done += kMergesAtOnce) {
+      for (; done < all.size(); done += kTried) {
         const auto first = all.begin() + static_cast<std::ptrdiff_t>(done);
-        const auto count = static_cast<std::ptrdiff_t>(std::min(kMergesAtOnce, all.size() - done));
+        const auto count = static_cast<std::ptrdiff_t>(std::min(kTried, all.size() - done));
         if (take_best(sample, {first, first + count})) break;
       }
-      if (done >= all.size()) return;
+      if (done >= all.size()) merged_at_ = history_.size();
       done = 0;
     }
   }
@@ -282,6 +289,15 @@ class AutomaticFit {
     });
   }
 
+  /// Whether the options of a move gain anything in one step from the present poles.
+  bool gains_at_once(const Sample& sample, const StructureMove& move) const {
+    FitOptions options = move.options;
+    options.delay_s = sample.data.options.delay_s;
+    options.max_iterations = 1;
+    return sample.worth.criterion(fit_additive_model(sample.data.frf, sample.data.model, options)) <
+           sample.now;
+  }
+
   /// The trial of a move on the sample. From nothing, the result depends on the structure only.
   FitResult tried(const Sample& sample, const StructureMove& move) {
     if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
@@ -295,11 +311,11 @@ class AutomaticFit {
     if (!is_new) return at->second;
     FitResult& result = at->second;
     FitOptions options = move.options;
-    options.max_iterations /= 3;
+    options.max_iterations /= kFartherAway;
     result = fit_additive_model(sample.data.frf, move.model, options);
     if (result.status == FitStatus::iteration_limit &&
         result.model.fit.cost < kHopeless * sample.cost) {
-      options.max_iterations *= 2;
+      options.max_iterations = move.options.max_iterations - options.max_iterations;
       result = fit_additive_model(sample.data.frf, result.model, options);
     }
     return result;
@@ -330,7 +346,7 @@ class AutomaticFit {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
       const std::size_t most =
-          std::max(kCandidates, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
+          std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
           residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
       FitResult before = best_;
@@ -466,7 +482,10 @@ class AutomaticFit {
       from_nothing_;  ///< results of such moves, by structure
   std::vector<std::string> decisions_;
   std::vector<double> history_;
-  std::size_t exhausted_at_ = 0;  ///< size of the history when no mode was left to add
+  // Size of the history when no such move was left; with the same model, none is tried again.
+  std::size_t merged_at_ = 0;
+  std::size_t structured_at_ = 0;
+  std::size_t exhausted_at_ = 0;  // modes to add
 };
 
 /// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried
@@ -483,6 +502,15 @@ std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& asked) {
+  FitEvidence evidence;
+  FitResult fit = searched_fit(frf, structure, selection, asked, evidence);
+  judge(frf, evidence, fit);
+  return fit;
+}
+
+FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
+                       const ModeSelection& selection, const FitOptions& asked,
+                       FitEvidence& evidence) {
   check(frf);
   if (selection.exactly < 0 || selection.most < 1)
     throw std::invalid_argument("fit: the number of modes must be positive");
@@ -503,7 +531,7 @@ FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
   };
   const auto finish = [&] {
     begun.release_weights();
-    return best->finish();
+    return best->finish(evidence);
   };
   const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
   const bool too_many_to_grow = placed && selection.exactly > kMostGrown;

@@ -9,6 +9,8 @@
 
 namespace stageid {
 
+struct FitEvidence;
+
 /// How the number of modes is decided.
 struct ModeSelection {
   std::vector<ModeCandidate> modes;  ///< start values; empty: from the CMIF
@@ -26,6 +28,11 @@ struct ModeSelection {
 /// @throws std::invalid_argument: as fit_additive_model(), and for more modes than the lines support
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
                         const ModeSelection& selection, const FitOptions& options);
+
+/// The same before its verdict, see judge().
+FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
+                       const ModeSelection& selection, const FitOptions& options,
+                       FitEvidence& evidence);
 
 /// The limit of `options`, or a new one: with a budget if `selection` leaves the number of modes open.
 std::shared_ptr<SearchLimit> search_limit(const ModeSelection& selection,

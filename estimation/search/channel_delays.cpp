@@ -7,13 +7,12 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
 namespace {
 
-constexpr double kClear = 5.0;          // standard deviations
-constexpr double kLeastSamples = 1e-3;  // smaller than the accuracy of the hold
 constexpr std::size_t kMostNamed = 6;
 
 /// Of one kind. With two channels, the earlier one counts as right.
@@ -25,7 +24,7 @@ void add_late(const ChannelList& channels, const Eigen::VectorXd& delay_s,
   for (Eigen::Index i = 0; i < delay_s.size(); ++i) {
     const double samples = (delay_s[i] - middle_s) * sample_rate_hz;
     const double deviation = std_s.size() > i ? std_s[i] * sample_rate_hz : 0.0;
-    if (std::abs(samples) > std::max(kLeastSamples, kClear * deviation))
+    if (std::abs(samples) > std::max(kLeastSamples, kClearly * deviation))
       out.push_back(
           fmt::format("{} {:+.3g}", channels.names[static_cast<std::size_t>(i)], samples));
   }

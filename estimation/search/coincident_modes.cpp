@@ -10,13 +10,10 @@
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 namespace {
-
-constexpr double kProbedWidths = 0.1;   // distance of the probing modes in half-power widths
-constexpr double kProbedDamping = 0.1;  // of the damping ratio
-constexpr double kLargestPart = 0.5;    // of a half-power width, and of a damping ratio
 
 int modes_of(int rank) { return std::max(rank, 1); }
 
@@ -112,8 +109,8 @@ TiedModel with_coincident_tied(const AdditiveModel& model) {
 std::optional<TiedModel> with_parted(const FrfEstimate& frf, const TiedModel& tied, std::size_t i,
                                      const FitOptions& options) {
   const double width = 2.0 * tied.model.submodels[i].damping_ratio();
-  if (auto apart = parted(frf, tied, i, options, {0.5 * kProbedWidths * width, 0.0})) return apart;
-  return parted(frf, tied, i, options, {0.0, kProbedDamping});
+  if (auto apart = parted(frf, tied, i, options, {0.5 * kSmallPart * width, 0.0})) return apart;
+  return parted(frf, tied, i, options, {0.0, kSmallPart});
 }
 
 void split_tied(const std::vector<int>& ranks, FitResult& fit) {

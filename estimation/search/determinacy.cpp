@@ -10,17 +10,11 @@
 #include "estimation/model/poles.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
 namespace {
-
-// Of a normal matrix with unit diagonal. One denominator of order 20 reaches 1e-12 (the numerators 1e-9) and is still
-// determined; sums of thousands of terms are accurate to 1e-15.
-constexpr double kSmallestDirection = 1e-12;  // of the numerators
-constexpr double kSmallestShare = 3e-14;      // of the denominators
-constexpr double kShareOfDirection = 0.1;     // above this share, a submodel is named
 
 /// @param first coefficient of submodel `i` among the globals
 bool is_judged(const FitProblem& problem, std::size_t i, Eigen::Index first, bool judge_modes) {
@@ -44,10 +38,10 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   for (const PoleEstimate& pole : pole_estimates(beta.a[i], covariance.block(first, first, n, n))) {
     const double f = pole.natural_frequency_hz;
     const double std_hz = pole.natural_frequency_std_hz.value_or(0.0);
-    if (!(std_hz < kOpenFrequency * f))
+    if (!(std_hz < f))
       return fmt::format("its pole at {:.4g} Hz has a standard deviation of {:.2g} Hz", f, std_hz);
     const double damping_std = pole.damping_ratio_std.value_or(0.0);
-    if (!(damping_std < kOpenDamping * pole.damping_ratio))
+    if (!(damping_std < pole.damping_ratio))
       return fmt::format(
           "the damping ratio {:.2g} of its pole at {:.4g} Hz has a standard deviation of {:.2g}",
           pole.damping_ratio, f, damping_std);
@@ -113,7 +107,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
     const Eigen::Index functions = problem.shapes[i].functions();
-    if (direction.segment(first, functions).norm() > kShareOfDirection)
+    if (direction.segment(first, functions).norm() > kSmallPart)
       names.push_back(submodel_name(problem, beta, i));
     first += functions;
   }

@@ -19,7 +19,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
 /// modes whose poles are not held. The poles of a submodel are undetermined in four cases:
 /// - a pole is at a bound
 /// - the rest of the model can imitate a change of the denominator to rounding
-/// - the standard deviation is half of a natural frequency, or all of a damping ratio
+/// - the standard deviation of a natural frequency or a damping ratio is as large as the value
 /// - the whole response is rounding (-160 dB of the weighted power of the data) or within the noise
 /// @param cost of the fit   @param removal_cost rise of sum W |E|^2 without each submodel
 /// @param gn the Gauss-Newton equations at `beta`   @param covariance of the globals, may be empty

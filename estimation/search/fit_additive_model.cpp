@@ -160,6 +160,7 @@ void forget_results(AdditiveModel& model) {
     s.shape_std.reset();
     s.numerator_std.clear();
     s.residue_rank.reset();
+    s.verdict.reset();
     s.poles.clear();
   }
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -10,13 +11,10 @@
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 namespace {
-
-// In a row. A measured aircraft, which is nonlinear, has five before the search converges.
-constexpr int kMostSpurious = 6;
 
 /// Whether mode `i` overlaps another. Broad modes do not count: they are not resonances that contain a narrow one.
 bool overlaps_another(const AdditiveModel& model, std::size_t i) {
@@ -57,8 +55,6 @@ bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
              price_of_mode(frf, before, parameters / static_cast<double>(added));
 }
 
-bool is_power_of_two(int n) { return (n & (n - 1)) == 0; }
-
 }  // namespace
 
 bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const FitResult& before,
@@ -72,7 +68,8 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
   if (!spurious) spurious_in_a_row_ = 0;
   if (spurious && spurious_in_a_row_++ == 0) back_to_ = before;
   // In every second, fourth, eighth round: a small part of the cost of the search.
-  if (rounds_ > 1 && is_power_of_two(rounds_) && a_delay_explains_more(frf, options, now))
+  if (rounds_ > 1 && std::has_single_bit(static_cast<unsigned>(rounds_)) &&
+      a_delay_explains_more(frf, options, now))
     return true;
   if (spurious_in_a_row_ < kMostSpurious) return false;
   finding_ = fmt::format(
@@ -81,13 +78,6 @@ bool GrowthWatch::ends(const FrfEstimate& frf, const FitOptions& options, const 
       "the plant: try --damping general, --direct-term full or --delay estimate",
       spurious_in_a_row_, back_to_.model.fit.cost, now.model.fit.cost);
   return true;
-}
-
-void GrowthWatch::tell(FitResult& result) const {
-  if (!ended()) return;
-  result.findings.push_back(finding_);
-  if (!by_delay_ || !result.trustworthy()) return;
-  result.distrust(FitStatus::unexplained, finding_);
 }
 
 bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions& searched,

@@ -26,9 +26,6 @@ class GrowthWatch {
   /// For a search that continues after modes were removed: restarts the count of rounds in a row.
   void cut() noexcept { spurious_in_a_row_ = 0; }
 
-  /// Adds the reason if it ended the search.
-  void tell(FitResult& result) const;
-
   bool ended() const noexcept { return !finding_.empty(); }
   bool by_delay() const noexcept { return by_delay_; }
   /// The model to return to.

@@ -5,17 +5,11 @@
 
 #include "estimation/equations/numerators.hpp"
 #include "estimation/model/model_structure.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {
-namespace {
-
-constexpr double kPart =
-    0.5;  // of the best share: three quarters of the gain, a quarter of the cost
-constexpr double kLargestShare = 0.99;  // of a mode that is removed
-
-}  // namespace
 
 int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
                       AdditiveModel& model) {
@@ -45,7 +39,7 @@ void shrink_hidden_modes(const FitProblem& problem, const std::vector<BasisGroup
   for (const std::size_t i : hidden) {
     const double numbers = channels * static_cast<double>(problem.shapes[i].functions());
     if (numbers > 2.0)
-      share[i] = std::min(kLargestShare, kPart * (numbers - 2.0) * noise / removal[i]);
+      share[i] = std::min(kLargestShare, kPartOfShare * (numbers - 2.0) * noise / removal[i]);
   }
   cost +=
       shrink_numerators(problem, groups, share, B) / (2.0 * static_cast<double>(problem.size()));

@@ -31,11 +31,14 @@ std::vector<std::pair<std::size_t, std::size_t>> overlapping_modes(const Additiv
 
 AdditiveModel with_one_of(const AdditiveModel& model, std::size_t i, std::size_t j) {
   AdditiveModel out = model;
-  Submodel& one = out.submodels[i];
+  const Submodel& one = model.submodels[i];
   const Submodel& other = model.submodels[j];
-  const double a2 = std::sqrt(one.denominator[2] * other.denominator[2]);
-  const double damping = std::sqrt(one.damping_ratio() * other.damping_ratio());
-  one.denominator = {1.0, 2.0 * damping * std::sqrt(a2), a2};
+  // Of a broad and a narrow mode, the narrow one determines the pole.
+  const double share = 1.0 / (1.0 + std::pow(one.damping_ratio() / other.damping_ratio(), 2));
+  const double a2 = std::pow(one.denominator[2], share) * std::pow(other.denominator[2], 1 - share);
+  const double damping =
+      std::pow(one.damping_ratio(), share) * std::pow(other.damping_ratio(), 1 - share);
+  out.submodels[i].denominator = {1.0, 2.0 * damping * std::sqrt(a2), a2};
   out.submodels.erase(out.submodels.begin() + static_cast<std::ptrdiff_t>(j));
   return out;
 }

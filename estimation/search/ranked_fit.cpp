@@ -13,18 +13,12 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/search/settled_fit.hpp"
-#include "estimation/search/undetermined_modes.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
 
 namespace stageid {
 namespace {
-
-constexpr std::size_t kPairsTried = 3;  // of modes that do not converge, at a time
-constexpr double kDearest =
-    1.5;  // times the cost: above, following the data is better than convergence
-constexpr double kNothing = 0.1;  // of 2 ln(likelihood): acceptable cost of convergence
-constexpr double kClearly = 3.0;  // standard deviations of a chi-square variable
 
 /// Excess of a chi-square variable over its degrees of freedom, in standard deviations.
 double sigmas_above(double chi_square, Eigen::Index degrees) {
@@ -34,8 +28,12 @@ double sigmas_above(double chi_square, Eigen::Index degrees) {
 
 class RankedFit {
  public:
-  RankedFit(const FrfEstimate& frf, const FitOptions& options, ModeNumber number)
-      : frf_(frf), options_(options), number_(number), data_(independent_numbers(frf)) {}
+  RankedFit(const FrfEstimate& frf, const FitOptions& options, FitEvidence& evidence)
+      : frf_(frf),
+        options_(options),
+        evidence_(evidence),
+        number_(evidence.number),
+        data_(independent_numbers(frf)) {}
 
   FitResult run(const AdditiveModel& start) {
     tied_ = with_coincident_tied(start);
@@ -58,8 +56,7 @@ class RankedFit {
     options.residue_rank = options.rigid_body_rank = 0;
     options.judge_modes = options.response_variance = false;
     options.uncertainty = true;
-    const auto fit = number_ == ModeNumber::chosen ? settled_fit : fit_additive_model;
-    free_ = fit(frf_, tied_.model, options);
+    free_ = settled_fit(frf_, tied_.model, options, number_);
     if (free_.model.submodels.size() != tied_.ranks.size())  // settled without some of them
       tied_.ranks.assign(free_.model.submodels.size(), 0);
     tied_.model = free_.model;
@@ -134,10 +131,9 @@ class RankedFit {
                         one_hz, other_hz, cost, best_.model.fit.cost));
         return true;
       };
-      if (!std::any_of(
-              pairs.begin(),
-              pairs.begin() + static_cast<std::ptrdiff_t>(std::min(pairs.size(), kPairsTried)),
-              tie))
+      if (!std::any_of(pairs.begin(),
+                       pairs.begin() + static_cast<std::ptrdiff_t>(std::min(pairs.size(), kTried)),
+                       tie))
         return;
     }
   }
@@ -218,12 +214,12 @@ class RankedFit {
                               test.natural_frequency_hz, test.rank);
     if (places.empty()) return;
     const bool of_any_rank = may_tie() || options_.residue_rank > 1;
-    best_.findings.push_back(
-        fmt::format("rank {} is too low for the residues at {}: the cost is {:.3g} times that of "
-                    "free residues; use --residue-rank {}{}",
-                    options_.residue_rank, places, best_.model.fit.cost / free_.model.fit.cost,
-                    of_any_rank ? fmt::format("{}", options_.residue_rank + 1) : "full",
-                    number_ == ModeNumber::chosen ? "" : ", or add one mode there per shape"));
+    evidence_.low_ranks = fmt::format(
+        "rank {} is too low for the residues at {}: the cost is {:.3g} times that of "
+        "free residues; use --residue-rank {}{}",
+        options_.residue_rank, places, best_.model.fit.cost / free_.model.fit.cost,
+        of_any_rank ? fmt::format("{}", options_.residue_rank + 1) : "full",
+        number_ == ModeNumber::chosen ? "" : ", or add one mode there per shape");
   }
 
   bool is_raised(const ResidueRankTest& test) const {
@@ -247,7 +243,6 @@ class RankedFit {
     all.insert(all.end(), decisions_.begin(), decisions_.end());
     all.insert(all.end(), best_.decisions.begin(), best_.decisions.end());
     best_.decisions = std::move(all);
-    best_.decisions.insert(best_.decisions.end(), best_.findings.begin(), best_.findings.end());
     best_.cost.insert(best_.cost.begin(), free_.cost.begin(), free_.cost.end());
     best_.residue_ranks = std::move(free_.residue_ranks);
     return std::move(best_);
@@ -255,6 +250,7 @@ class RankedFit {
 
   const FrfEstimate& frf_;
   const FitOptions& options_;
+  FitEvidence& evidence_;
   ModeNumber number_;
   double data_;
   FitResult free_;
@@ -266,16 +262,9 @@ class RankedFit {
 }  // namespace
 
 FitResult ranked_fit(const FrfEstimate& frf, const AdditiveModel& start, const FitOptions& options,
-                     ModeNumber number) {
-  FitResult fit = options.residue_rank > 0       ? RankedFit(frf, options, number).run(start)
-                  : number == ModeNumber::chosen ? settled_fit(frf, start, options)
-                                                 : fit_additive_model(frf, start, options);
-  // Modes that were requested as a list have been judged by the fit itself.
-  if (number != ModeNumber::given && fit.status != FitStatus::singular)
-    judge_undetermined_modes(frf, number == ModeNumber::asked, fit);
-  if (number == ModeNumber::asked && options.residue_rank == 0 && fit.trustworthy())
-    judge_close_modes(frf, options, fit);
-  return fit;
+                     FitEvidence& evidence) {
+  return options.residue_rank > 0 ? RankedFit(frf, options, evidence).run(start)
+                                  : settled_fit(frf, start, options, evidence.number);
 }
 
 std::string rank_decision(double free_cost, double cost, double cost_to_squares,

@@ -10,14 +10,13 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/model/model_structure.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 namespace {
 
 constexpr std::size_t kMostShown = 8;  // modes of higher rank
-// of the largest entry: a smaller deviation would only test rounding
-constexpr double kBestKnown = 1e-8;
 
 /// sum |B - B_r|^2 / variance of a mode, minimized over residues of rank r.
 class RankDistance {

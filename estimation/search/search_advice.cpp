@@ -13,14 +13,13 @@
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/start/residual_modes.hpp"
 
 namespace stageid {
 namespace {
 
-// enough to show the gain of a structure, not to complete the fit
-constexpr int kTrialIterations = 8;
 constexpr double kMostOfCost = 0.5;  // one end of the band has more than the rest
 constexpr double kSmallEnd = 0.25;   // of the lines
 constexpr double kMoreBudget = 4.0;  // factor for the next budget to try
@@ -74,7 +73,7 @@ FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
   trial.residue_rank = trial.rigid_body_rank = 0;
   trial.mode_ranks.clear();
   trial.uncertainty = trial.covariance = trial.judge_modes = trial.shrink_hidden = false;
-  trial.max_iterations = kTrialIterations;
+  trial.max_iterations = kGrowthIterations;
   return trial;
 }
 
@@ -152,27 +151,14 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
   return "No other structure fits better: give the number of modes with --modes N";
 }
 
-std::string budget_message(const FrfEstimate& frf, const FitOptions& options,
-                           const FitResult& fit) {
-  const std::string advice = advice_for(frf, options, fit, true);
-  const int modes = count_modes(fit.model);
+std::string limit_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
+  if (options.limit->was_interrupted() || fit.status == FitStatus::singular)
+    return options.limit->message();
   const double budget_s = options.limit->budget_s();
   return fmt::format(
       "the search reached its budget of {:.6g} s at {}. {}; continue with --search-seconds {:.6g}",
-      budget_s, counted(modes, "mode"), advice, kMoreBudget * budget_s);
-}
-
-void tell_limit(const FrfEstimate& frf, const FitOptions& options, FitResult& fit) {
-  const FitStatus status = options.limit->status();
-  std::string message = options.limit->message();
-  if (status == FitStatus::search_budget && fit.status != FitStatus::singular) {
-    message = budget_message(frf, options, fit);
-    fit.findings.push_back(message);
-  }
-  fit.decisions.push_back(message);
-  // the message of its own status is less helpful
-  if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;
-  fit.distrust(status, message);
+      budget_s, counted(count_modes(fit.model), "mode"), advice_for(frf, options, fit, true),
+      kMoreBudget * budget_s);
 }
 
 }  // namespace stageid

@@ -16,11 +16,7 @@ namespace stageid {
 std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit,
                        bool cut_short);
 
-/// Message of a search that used its budget: its progress, and advice_for() its completed model.
-std::string budget_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit);
-
-/// Records in a completed model that the search reached options.limit: the last fit has converged, but the search is
-/// incomplete.
-void tell_limit(const FrfEstimate& frf, const FitOptions& options, FitResult& fit);
+/// Message of a search that reached options.limit: its progress, and advice_for() its completed model.
+std::string limit_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit);
 
 }  // namespace stageid

@@ -6,14 +6,10 @@
 #include <utility>
 
 #include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 namespace {
-
-constexpr Eigen::Index kTrialLines = 500;        // at least
-constexpr Eigen::Index kTrialLinesOfAMode = 20;  // at least, per mode
-constexpr Eigen::Index kTrialChannels = 256;     // at most, if an input has no more
-constexpr int kIterationsOfDelays = 3;           // times as many: the start is farther away
 
 bool is_rigid_body(const Submodel& s) {
   return s.role == SubmodelRole::searched && s.integrators == 2 && s.denominator.size() == 1;
@@ -69,10 +65,13 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
       out.push_back(std::move(direct));
   }
   if (open.rigid_body && has(model, is_rigid_body)) {
-    StructureMove springs{"--rigid-body suspension", model, options};
-    std::erase_if(springs.model.submodels, is_rigid_body);
-    springs.model.submodels.push_back(suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0]));
-    out.push_back(std::move(springs));
+    for (const double start : {kSuspensionStart, kWeakSpringsStart}) {
+      StructureMove springs{"--rigid-body suspension", model, options};
+      springs.options.max_iterations *= kFartherAway;
+      std::erase_if(springs.model.submodels, is_rigid_body);
+      springs.model.submodels.push_back(suspension_mode(frf, start * frf.frequency_hz[0]));
+      out.push_back(std::move(springs));
+    }
   } else if (open.rigid_body && !has(model, [](const Submodel& s) {
                return s.integrators > 0 || s.role == SubmodelRole::suspension;
              })) {
@@ -87,10 +86,13 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
       frf.response.rows() > 1) {
     StructureMove skewed{"--delay per_channel", model, options};
     free_delays(DelayModel::per_channel, skewed);
-    skewed.options.max_iterations *= kIterationsOfDelays;
+    skewed.options.max_iterations *= kFartherAway;
     skewed.from_nothing = true;
-    // Modes that were fitted to channels with different delays lead to another minimum.
+    // Poles that were fitted to channels with different delays lead to another minimum.
     std::erase_if(skewed.model.submodels, is_searched_mode);
+    for (Submodel& s : skewed.model.submodels)
+      if (s.role == SubmodelRole::suspension && !s.frequency_held)
+        s = suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0]);
     const ModelStructure structure{.general_damping = has(model, is_general)};
     for (const ModeCandidate& peak : pick_modes(frf))
       skewed.model.submodels.push_back(mode_submodel(frf, structure, peak));
@@ -135,11 +137,18 @@ std::vector<StructureMove> structure_moves(const FrfEstimate& frf, const FitOpti
 
 std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model) {
   std::vector<StructureMove> out;
-  for (const auto& [i, j] : overlapping_modes(model))
+  std::vector<std::size_t> merged;
+  for (const auto& [i, j] : overlapping_modes(model)) {
+    const double one = model.submodels[i].damping_ratio();
+    const double other = model.submodels[j].damping_ratio();
+    const std::size_t broader = one > other ? i : j;
+    if (std::find(merged.begin(), merged.end(), broader) != merged.end()) continue;
+    merged.push_back(broader);
     out.push_back(
         {fmt::format("merged {:.6g} and {:.6g} Hz", model.submodels[i].natural_frequency_hz(),
                      model.submodels[j].natural_frequency_hz()),
          with_one_of(model, i, j), options});
+  }
   return out;
 }
 

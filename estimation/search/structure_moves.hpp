@@ -45,8 +45,9 @@ struct StructureTrial {
 StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options,
                                const AdditiveModel& model);
 
-/// One of two overlapping modes instead of both. On a single resonance, two nearly equal modes with large opposite
-/// residues fit as well as one, and neither can be dropped alone.
+/// One of two overlapping modes instead of both, the broader of which merges only into its nearest neighbour. On a
+/// single resonance, two nearly equal modes with large opposite residues fit as well as one, and neither can be dropped
+/// alone.
 std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model);
 
 /// The poles and delays of a model of a trial, for all inputs; of those that were not in it, the mean delay.

@@ -14,22 +14,14 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/mode_worth.hpp"
-#include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/search_advice.hpp"
-#include "estimation/search/undetermined_modes.hpp"
+#include "estimation/search/search_constants.hpp"
+#include "estimation/start/residual_modes.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 
 namespace stageid {
 namespace {
-
-// of the lowest line: the start if a free body is replaced
-constexpr double kWeakSpringsStart = 0.02;
-constexpr int kRealPoleGrid = 17;
-constexpr double kRealPoleBelow = 0.3;  // the grid extends beyond the lines by these factors
-constexpr double kRealPoleAbove = 3.0;
-constexpr double kLargestDeviation = 0.5;  // of a frequency that is considered determined
 
 std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
                                        const std::vector<double>& known_hz) {
@@ -136,8 +128,8 @@ class PoleSearch {
   }
 
   void place_real_pole(std::vector<SubmodelRequest>& requests, std::size_t i) {
-    const double low = kRealPoleBelow * frf_.frequency_hz[0];
-    const double high = kRealPoleAbove * frf_.frequency_hz[frf_.lines() - 1];
+    const double low = kBelowBand * frf_.frequency_hz[0];
+    const double high = kAboveBand * frf_.frequency_hz[frf_.lines() - 1];
     std::vector<double>& f = requests[i].frequency_hz;
     f.push_back(low);
     double best = low;
@@ -182,94 +174,6 @@ class PoleSearch {
   FitResult found_;
 };
 
-/// Replaces `result` by `next`, keeping the history.
-void continue_with(FitResult next, FitResult& result) {
-  next.decisions.insert(next.decisions.begin(), result.decisions.begin(), result.decisions.end());
-  next.cost.insert(next.cost.begin(), result.cost.begin(), result.cost.end());
-  next.model.cost_history = next.cost;
-  next.model.fit.iterations = static_cast<int>(next.cost.size()) - 1;
-  if (ended_by_limit(result)) {
-    next.status = result.status;
-    next.message = std::move(result.message);
-    next.findings = std::move(result.findings);
-    next.model.fit.status = to_string(next.status);
-    next.model.fit.message = next.message;
-  }
-  result = std::move(next);
-}
-
-void refit(const FrfEstimate& frf, const ModeSelection& selection, const FitOptions& options,
-           FitResult& result) {
-  FitResult next = ranked_fit(frf, result.model, options, ModeNumber::given);
-  sort_modes(next);
-  if (!selection.keep_modes && next.status != FitStatus::singular)
-    judge_undetermined_modes(frf, selection.exactly > 0, next);
-  continue_with(std::move(next), result);
-}
-
-/// Puts the rigid body on weak springs if that is worth two parameters (BIC). Far above the suspension its effect is
-/// small per line, but adds up: as a wrong delay, which shifts every mode, or as a mode among the lowest lines. The
-/// modes are therefore reassessed.
-void try_springs(const FrfEstimate& frf, const ModeSelection& selection, const FitOptions& options,
-                 FitResult& result) {
-  const auto body = std::find_if(result.model.submodels.begin(), result.model.submodels.end(),
-                                 [](const Submodel& s) { return s.integrators == 2; });
-  if (body == result.model.submodels.end() || result.status == FitStatus::singular ||
-      ended_by_limit(result))
-    return;
-  AdditiveModel sprung = result.model;
-  sprung.submodels[static_cast<std::size_t>(body - result.model.submodels.begin())] =
-      suspension_mode(frf, kWeakSpringsStart * frf.frequency_hz[0]);
-  FitOptions quick = options;
-  quick.uncertainty = false;
-  quick.method = FitMethod::gn;
-  const FitResult trial = fit_additive_model(frf, sprung, quick);
-  if (trial.status == FitStatus::singular ||
-      !(information_criterion(frf, trial) < information_criterion(frf, result)))
-    return;
-  result.decisions.push_back(
-      fmt::format("rigid body on weak springs instead of a free rigid body: cost {:.6g} -> {:.6g}",
-                  result.model.fit.cost, trial.model.fit.cost));
-  const ModelStructure with_springs = structure_of(trial.model);
-  ModeSelection again = selection;
-  again.keep_modes = selection.keep_modes || selection.exactly > 0;
-  again.modes.clear();
-  for (const Submodel& s : trial.model.submodels)
-    if (is_searched_mode(s))
-      again.modes.push_back({s.natural_frequency_hz(), s.damping_ratio(), 1});
-  continue_with(automatic_fit(frf, with_springs, again, options), result);
-}
-
-/// Holds the frequencies of suspension modes that the lines do not determine, the least determined first.
-void settle_suspension(const FrfEstimate& frf, const ModeSelection& selection,
-                       const FitOptions& options, FitResult& result) {
-  for (std::size_t left = result.model.submodels.size(); left > 0; --left) {
-    Submodel* worst = nullptr;
-    double worst_deviation = kLargestDeviation;
-    for (std::size_t i = 0; i < result.model.submodels.size(); ++i) {
-      Submodel& s = result.model.submodels[i];
-      if (s.role != SubmodelRole::suspension || s.frequency_held) continue;
-      const double deviation =
-          result.is_held(i) ? std::numeric_limits<double>::infinity()
-                            : s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
-      if (!(deviation > worst_deviation)) continue;
-      worst = &s;
-      worst_deviation = deviation;
-    }
-    if (worst == nullptr || result.status == FitStatus::singular) return;
-    worst->frequency_held = true;
-    result.decisions.push_back(
-        fmt::format("suspension: the data do not support an estimate of the frequency of its mode "
-                    "at {:.4g} Hz{}; the frequency is held, without a standard deviation",
-                    worst->natural_frequency_hz(),
-                    std::isfinite(worst_deviation)
-                        ? fmt::format(" (standard deviation {:.2g} Hz)",
-                                      worst_deviation * worst->natural_frequency_hz())
-                        : " (at its bound)"));
-    refit(frf, selection, options, result);
-  }
-}
-
 void check_requests(const FrfEstimate& frf, const RequestedStructure& structure) {
   const auto require_faultless = [](const std::string& fault) {
     if (!fault.empty()) throw std::invalid_argument("fit: submodel: " + fault);
@@ -287,8 +191,9 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
           frequency_hz, frf.frequency_hz[0]));
 }
 
-/// A fit whose residual is clearly larger than noise and known distortion is not trustworthy.
-void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+/// Why the residual is clearly larger than noise and known distortion, with advice; else empty.
+std::string why_unexplained(const FrfEstimate& frf, const FitOptions& options, bool cut_short,
+                            const FitResult& result) {
   const AdditiveModel& model = result.model;
   const ResidualVerdict verdict = judge_residual(
       frf,
@@ -299,17 +204,13 @@ void judge_explained(const FrfEstimate& frf, const FitOptions& options, FitResul
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);
-  if (verdict.explained && by_weights) return;
-  const std::string finding =
-      verdict.explained ? "the residual is explained by the scatter of the realizations, but not "
-                          "by the noise used as weight: use --weighting total_variance"
-      : ended_by_limit(result)
-          ? verdict.reason + ": the model does not explain the data"
-          : fmt::format("{}: the model does not explain the data. {}", verdict.reason,
-                        advice_for(frf, options, result, false));
-  result.findings.insert(result.findings.begin(), finding);
-  result.decisions.push_back(finding);
-  result.distrust(FitStatus::unexplained, finding);
+  if (verdict.explained && by_weights) return {};
+  if (verdict.explained)
+    return "the residual is explained by the scatter of the realizations, but not by the noise "
+           "used as weight: use --weighting total_variance";
+  if (cut_short) return verdict.reason + ": the model does not explain the data";
+  return fmt::format("{}: the model does not explain the data. {}", verdict.reason,
+                     advice_for(frf, options, result, false));
 }
 
 }  // namespace
@@ -332,22 +233,22 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
       asked);
   PoleSearch(frf, complete, selection, options, decisions).complete(requests);
   for (const SubmodelRequest& r : requests) complete.given.push_back(start_submodel(frf, r));
-  FitResult result = automatic_fit(frf, complete, selection, options);
+  FitEvidence evidence;
+  FitResult result = searched_fit(frf, complete, selection, options, evidence);
   options.delay = result.delay;
-  if (structure.common.open.rigid_body) try_springs(frf, selection, options, result);
-  settle_suspension(frf, selection, options, result);
   result.decisions.insert(result.decisions.begin(), decisions.begin(), decisions.end());
   if (result.delay == DelayModel::per_channel && asked.delay != DelayModel::per_channel)
-    if (std::string late = late_channels(result.model); !late.empty()) {
-      result.decisions.push_back(late);
-      result.findings.push_back(std::move(late));
-    }
-  judge_explained(frf, options, result);
+    evidence.late_channels = late_channels(result.model);
+  // An interrupt between two fits has shortened the search as well.
+  if (options.limit->was_interrupted() && !evidence.limit) {
+    evidence.limit = FitStatus::interrupted;
+    evidence.limit_message = options.limit->message();
+  }
+  evidence.unexplained =
+      why_unexplained(frf, options, evidence.limit.has_value() || ended_by_limit(result), result);
+  judge(frf, evidence, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);
-  // An interrupt between two fits has shortened the search as well.
-  if (options.limit->was_interrupted() && !ended_by_limit(result))
-    result.distrust(FitStatus::interrupted, options.limit->message());
   return result;
 }
 

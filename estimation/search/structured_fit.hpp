@@ -9,7 +9,6 @@ namespace stageid {
 
 /// The submodels besides the modes of an automatic fit.
 struct RequestedStructure {
-  /// With an open rigid body, a free one is replaced by one on springs if that is worth its parameters.
   ModelStructure common{.open = {.rigid_body = true}};
   std::vector<SubmodelRequest> submodels;
   bool suspension =
@@ -23,9 +22,7 @@ struct RequestedStructure {
 ///
 /// Poles without a start are searched: automatic_fit() finds as many modes as the submodels need. These are
 /// distributed by frequency and their denominators multiplied; real poles are searched on a grid of the profiled cost.
-/// A suspension frequency that the lines do not determine (standard deviation above half of it, or at its bound) is
-/// held where the cost is smallest, without a standard deviation. Far above a suspension, w >> w_0, the lines depend
-/// on B/s^2 (1 - 2 zeta w_0/s - ...): first on the product of damping and frequency, then on its square.
+/// Suspension frequencies that the lines do not determine are held, see settled_fit().
 /// Undetermined submodels give FitStatus::undetermined, see determinacy.hpp.
 /// @throws std::invalid_argument: as automatic_fit(), and for requests with a fault_of()
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,

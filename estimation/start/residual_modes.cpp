@@ -13,8 +13,6 @@ namespace stageid {
 namespace {
 
 constexpr double kDampings[] = {0.002, 0.006, 0.02, 0.06};
-constexpr double kBelowBand = 0.5;  // candidates extend beyond the band by these factors
-constexpr double kAboveBand = 1.8;
 constexpr double kLeastOwnShare = 0.02;
 constexpr Eigen::Index kBlock = 64;
 constexpr Eigen::Index kChannels = 256;  // residuals stored at a time
@@ -34,7 +32,7 @@ std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const Additive
                              : low;
   std::vector<ModeCandidate> grid;
   for (const double zeta : kDampings)
-    for (double f = low; f <= high; f += std::max(0.7 * zeta * f, 0.5 * spacing)) {
+    for (double f = low; f <= high; f += std::max(1.4 * zeta * f, 0.5 * spacing)) {
       const bool outside = f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1];
       if (outside && zeta < 0.02) continue;  // its width cannot be determined from the band
       grid.push_back({f, zeta, 1});

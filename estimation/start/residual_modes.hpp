@@ -8,6 +8,10 @@
 
 namespace stageid {
 
+/// Poles that start beyond the lines start within these factors of their lowest and highest frequency.
+inline constexpr double kBelowBand = 0.5;
+inline constexpr double kAboveBand = 1.8;
+
 /// A mode proposed by the weighted residual.
 struct ResidualMode {
   ModeCandidate mode;

@@ -54,6 +54,7 @@ AdditiveModel full_model() {
   model.submodels[1].natural_frequency_std_hz = 0.1 / 3.0;
   model.submodels[1].damping_ratio_std = 1e-5 / 3.0;
   model.submodels[1].residue_rank = 1;
+  model.submodels[1].verdict = ModeVerdict::weak;
   for (const Eigen::MatrixXd& B : model.submodels[1].numerator)
     model.submodels[1].numerator_std.push_back(B.cwiseAbs() / 3.0);
   model.fit = {1.0 / 7.0,  "noise_variance", 12, "unexplained", "the residual is 5 times the noise",
@@ -107,6 +108,7 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
     EXPECT_EQ(a.natural_frequency_std_hz, b.natural_frequency_std_hz);
     EXPECT_EQ(a.damping_ratio_std, b.damping_ratio_std);
     EXPECT_EQ(a.residue_rank, b.residue_rank);
+    EXPECT_EQ(a.verdict, b.verdict);
     EXPECT_EQ(a.numerator_std, b.numerator_std);
   }
   EXPECT_EQ(read.fit.cost, model.fit.cost);

@@ -166,7 +166,8 @@ TEST_F(CoincidentModes, ACloseRankOnePairIsTakenApart) {
   options_.residue_rank = 1;
   AdditiveModel start = problem_.model;
   start.submodels.pop_back();
-  const FitResult fit = ranked_fit(frf, start, options_, ModeNumber::chosen);
+  FitEvidence evidence;
+  const FitResult fit = ranked_fit(frf, start, options_, evidence);
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   const auto found = modes(fit);
   ASSERT_EQ(found.size(), 2U);
@@ -183,7 +184,8 @@ TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
   AdditiveModel start = problem_.model;
   start.submodels.push_back(start.submodels[1]);  // at 80 Hz twice
   options_.residue_rank = 1;
-  const FitResult fit = ranked_fit(measured(), start, options_, ModeNumber::chosen);
+  FitEvidence evidence;
+  const FitResult fit = ranked_fit(measured(), start, options_, evidence);
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_EQ(modes(fit).size(), 2U);
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("one mode fewer at 80")));

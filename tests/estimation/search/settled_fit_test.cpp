@@ -12,7 +12,6 @@
 #include "estimation/search/automatic_fit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/undetermined_modes.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
@@ -120,7 +119,7 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   broad.submodels.push_back(test::empty_submodel(true_, 0, test::mode_coefficients(250.0, 0.9), 1));
   const FitResult kept = fit_additive_model(frf_, broad, options_);
   ASSERT_TRUE(kept.trustworthy()) << kept.message;
-  ASSERT_EQ(undetermined_modes(kept), std::vector<std::size_t>{2}) << "no mode to leave out";
+  ASSERT_EQ(mode_verdict(frf_, ModeNumber::chosen, kept, 2), ModeVerdict::weak);
   const FitResult fit = settled_fit(frf_, broad, options_);
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   EXPECT_EQ(count_modes(fit.model), 2);
@@ -131,31 +130,35 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
 // Requested modes are kept, and such a fit is not trustworthy.
 TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
   FitResult fit = fit_additive_model(frf_, true_, options_);
-  judge_undetermined_modes(frf_, false, fit);
+  judge(frf_, {}, fit);
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
   const FitStatus converged = fit.status;
   fit.held = {1};
   fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
-  judge_undetermined_modes(frf_, false, fit);
+  judge(frf_, {}, fit);
   ASSERT_EQ(fit.findings.size(), 1U);
   EXPECT_THAT(fit.findings[0], HasSubstr(", with a standard deviation as large), 390.0"));
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
   EXPECT_EQ(fit.status, FitStatus::undetermined);
   EXPECT_EQ(fit.message, fit.findings[0]);
   EXPECT_EQ(fit.model.fit.status, "undetermined");
+  EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::weak);
+  EXPECT_EQ(fit.model.submodels[1].verdict, ModeVerdict::at_bound);
   fit.findings.clear();
   fit.status = FitStatus::iteration_limit;  // the reason for not converging comes first
-  judge_undetermined_modes(frf_, false, fit);
+  judge(frf_, {}, fit);
   EXPECT_EQ(fit.findings.size(), 1U);
   EXPECT_EQ(fit.status, FitStatus::iteration_limit);
   fit.findings.clear();
   fit.status = converged;
   fit.model.fit.band_hz[1] = 300.0;  // outside the lines, a mode represents the rest of the plant
   fit.model.submodels[0].damping_ratio_std = 1e-4;
-  judge_undetermined_modes(frf_, false, fit);
+  judge(frf_, {}, fit);
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_EQ(fit.status, converged);
+  EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::determined);
+  EXPECT_EQ(fit.model.submodels[1].verdict, ModeVerdict::beside_band);
 }
 
 // A surplus mode follows the noise: its deviations are a few tenths of its size, and it is worth less than its
@@ -170,15 +173,16 @@ TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
   const FitResult three = asked(3);
   EXPECT_EQ(three.status, FitStatus::undetermined) << three.message;
   EXPECT_THAT(three.message, HasSubstr("do not interpret them as resonances"));
-  for (const bool number_asked : {false, true}) {
+  for (const ModeNumber number : {ModeNumber::chosen, ModeNumber::asked}) {
+    const bool number_asked = number == ModeNumber::asked;
     FitResult weak = two;
     weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
-    judge_undetermined_modes(frf_, number_asked, weak);
+    judge(frf_, {.number = number}, weak);
     EXPECT_EQ(weak.status == FitStatus::undetermined, number_asked);
     EXPECT_EQ(weak.message.find("390.0") != std::string::npos, number_asked) << weak.message;
     FitResult strong = two;
     strong.removal_cost[1] = 1.1 * price_of_mode(frf_, two, 3.0);
-    judge_undetermined_modes(frf_, number_asked, strong);
+    judge(frf_, {.number = number}, strong);
     EXPECT_TRUE(strong.trustworthy()) << strong.message;
   }
 }
@@ -189,11 +193,12 @@ TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
       test::empty_submodel(true_, 0, test::mode_coefficients(1.003 * kTrue_hz[1], 0.0101), 1));
   FitResult fit = fit_additive_model(frf_, halved, options_);
   fit.status = FitStatus::gradient_small;
-  judge_close_modes(frf_, options_, fit);
+  judge(frf_, {.alike = alike_modes(frf_, options_, fit)}, fit);
   EXPECT_EQ(fit.status, FitStatus::undetermined);
   EXPECT_THAT(fit.message, HasSubstr("one mode fits as well"));
+  EXPECT_EQ(fit.model.submodels[2].verdict, ModeVerdict::coincident);
   FitResult sound = fit_additive_model(frf_, true_, options_);
-  judge_close_modes(frf_, options_, sound);
+  judge(frf_, {.alike = alike_modes(frf_, options_, sound)}, sound);
   EXPECT_TRUE(sound.trustworthy()) << sound.message;
 }
 

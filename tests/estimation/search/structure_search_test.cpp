@@ -74,6 +74,20 @@ TEST(StructureSearchFixed, ANumberOfModesLeavesTheStructureOpen) {
   EXPECT_NEAR(fit.model.fit.cost / cost_of_truth(plant), 1.0, 0.01);
 }
 
+TEST(StructureSearchFixed, GivenModesLeaveNothingOpen) {
+  const test::VariedPlant plant = test::draw_varied_plant(5);
+  FitRequest request;
+  request.modes.kind = ModesRequest::Kind::given;
+  for (const Submodel& s : plant.truth.submodels)
+    if (is_searched_mode(s))
+      request.modes.given.push_back({s.natural_frequency_hz(), s.damping_ratio(), 1});
+  const FitResult fit = fit_model(plant.frf, request);
+  EXPECT_THAT(fit.decisions, Not(Contains(HasSubstr("structure: "))));
+  EXPECT_EQ(count_modes(fit.model), count_modes(plant.truth));
+  EXPECT_FALSE(fit.trustworthy());
+  EXPECT_THAT(fit.message, HasSubstr("--damping general"));
+}
+
 /// A body on two soft springs far below the lines, and two modes: 2 x 2, white noise of known variance.
 FrfEstimate on_soft_springs(std::uint64_t seed, double damping_of_springs) {
   test::RandomNumbers random(seed);

@@ -1,0 +1,182 @@
+#include "estimation/search/fit_verdict.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/model/model_structure.hpp"
+#include "estimation/problem/search_limit.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/search/mode_worth.hpp"
+#include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/search_constants.hpp"
+
+namespace stageid {
+namespace {
+
+bool is_held_by_request(const Submodel& s) { return s.frequency_held || s.damping_held; }
+
+/// Standard deviation of the frequency; if unknown, a part of the half-power width.
+double deviation_hz(const Submodel& s) {
+  const double width_hz = 2.0 * s.damping_ratio() * s.natural_frequency_hz();
+  return s.natural_frequency_std_hz.value_or(kSmallPart * width_hz);
+}
+
+/// @param with_flank also a peak outside the lines whose flank is on the lines
+bool is_between_lines(const Submodel& s, const FitRecord& record, bool with_flank) {
+  const double f = s.natural_frequency_hz();
+  const double reach = with_flank && s.damping_ratio() < kBroad ? s.damping_ratio() * f : 0.0;
+  return f >= record.band_hz[0] - reach && f <= record.band_hz[1] + reach;
+}
+
+/// Two for the pole, plus those of a residue of its rank.
+double parameters_of(const Submodel& s) {
+  const auto n_y = static_cast<double>(s.numerator[0].rows());
+  const auto n_u = static_cast<double>(s.numerator[0].cols());
+  const double rank = s.residue_rank.value_or(0);
+  const double residue = rank > 0.0 ? rank * (n_y + n_u - rank) : n_y * n_u;
+  return 2.0 + static_cast<double>(s.numerator.size()) * residue;
+}
+
+bool is_worth_nothing(const FrfEstimate& frf, const FitResult& fit, std::size_t i) {
+  return i < fit.removal_cost.size() &&
+         fit.removal_cost[i] < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i]));
+}
+
+bool is_unsupported(ModeVerdict verdict) {
+  return verdict == ModeVerdict::weak || verdict == ModeVerdict::at_bound;
+}
+
+/// Why a mode is not a resonance of the data.
+std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) {
+  if (verdict == ModeVerdict::at_bound)
+    return fit.model.submodels[i].damping_ratio() < kBroad
+               ? "at its bound: narrower than the line spacing, undamped or unstable"
+               : "at its bound";
+  return pole_doubt(fit, i) < 1.0 ? "does not justify its parameters (BIC)"
+                                  : "with a standard deviation as large";
+}
+
+void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit,
+                 std::vector<std::string>& reasons) {
+  std::vector<std::string> places;
+  for (std::size_t i = 0; i < fit.model.submodels.size(); ++i) {
+    Submodel& s = fit.model.submodels[i];
+    s.verdict.reset();
+    if (!s.is_mode()) continue;
+    s.verdict = mode_verdict(frf, evidence.number, fit, i);
+    if (is_unsupported(*s.verdict))
+      places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
+                                   s.damping_ratio(), reason_of(fit, i, *s.verdict)));
+  }
+  // Modes that were requested as a list have been judged by the fit itself.
+  if (!places.empty() && evidence.number != ModeNumber::given)
+    reasons.push_back(
+        fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
+                    "the cost as much; do not interpret them as resonances",
+                    fmt::join(places, ", ")));
+  for (const AlikeModes& pair : evidence.alike) {
+    Submodel& one = fit.model.submodels[pair.first];
+    Submodel& other = fit.model.submodels[pair.second];
+    one.verdict = other.verdict = ModeVerdict::coincident;
+    reasons.push_back(fmt::format(
+        "the data do not distinguish the modes at {:.6g} and {:.6g} Hz: one mode fits as well "
+        "(BIC), cost {:.6g} -> {:.6g}; request fewer modes",
+        one.natural_frequency_hz(), other.natural_frequency_hz(), fit.model.fit.cost, pair.cost));
+  }
+}
+
+}  // namespace
+
+double pole_doubt(const FitResult& fit, std::size_t submodel) {
+  const Submodel& s = fit.model.submodels[submodel];
+  if (!s.is_mode() || is_held_by_request(s)) return 0.0;
+  if (fit.is_held(submodel)) return HUGE_VAL;
+  const double of_frequency = s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
+  if (s.role == SubmodelRole::suspension) return of_frequency;
+  return std::max(of_frequency, s.damping_ratio_std.value_or(0.0)) / s.damping_ratio();
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const AdditiveModel& model) {
+  for (const auto& [i, j] : overlapping_modes(model)) {
+    const Submodel& one = model.submodels[i];
+    const Submodel& other = model.submodels[j];
+    if (one.frequency_held || other.frequency_held) continue;
+    const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
+    if (apart_hz < std::min(deviation_hz(one), deviation_hz(other))) return std::pair(i, j);
+  }
+  return std::nullopt;
+}
+
+ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitResult& fit,
+                         std::size_t submodel) {
+  const Submodel& s = fit.model.submodels[submodel];
+  if (!is_searched_mode(s)) return ModeVerdict::determined;
+  const bool asked = number == ModeNumber::asked;
+  const bool beside = !is_between_lines(s, fit.model.fit, asked);
+  if (!beside && fit.is_held(submodel) && !is_held_by_request(s)) return ModeVerdict::at_bound;
+  const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
+  if (!is_held_by_request(s) && (open || (asked && is_worth_nothing(frf, fit, submodel))))
+    return ModeVerdict::weak;
+  return beside ? ModeVerdict::beside_band : ModeVerdict::determined;
+}
+
+bool supports_all_modes(const FrfEstimate& frf, const FitEvidence& evidence, const FitResult& fit) {
+  for (std::size_t i = 0; i < fit.model.submodels.size(); ++i)
+    if (is_unsupported(mode_verdict(frf, evidence.number, fit, i))) return false;
+  return true;
+}
+
+std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& options,
+                                    const FitResult& fit) {
+  FitOptions plain = options;
+  plain.uncertainty = plain.judge_modes = plain.covariance = false;
+  std::vector<AlikeModes> out;
+  const std::vector<std::pair<std::size_t, std::size_t>> pairs = overlapping_modes(fit.model);
+  for (std::size_t p = 0; p < std::min(pairs.size(), kTried); ++p) {
+    const auto [i, j] = pairs[p];
+    const FitResult single = fit_additive_model(frf, with_one_of(fit.model, i, j), plain);
+    const double rise =
+        2.0 * static_cast<double>(frf.lines()) * (single.model.fit.cost - fit.model.fit.cost);
+    if (single.status != FitStatus::singular &&
+        rise < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i])))
+      out.push_back({i, j, single.model.fit.cost});
+  }
+  return out;
+}
+
+void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) {
+  const auto tell = [&](const std::string& text) {
+    fit.decisions.push_back(text);
+    fit.findings.push_back(text);
+  };
+  if (!evidence.low_ranks.empty()) tell(evidence.low_ranks);
+  std::vector<std::string> reasons;
+  if (fit.status != FitStatus::singular) judge_modes(frf, evidence, fit, reasons);
+  for (const std::string& reason : reasons) {
+    tell(reason);
+    if (fit.trustworthy()) fit.distrust(FitStatus::undetermined, reason);
+  }
+  if (!evidence.growth_ended.empty()) {
+    fit.findings.push_back(evidence.growth_ended);
+    if (evidence.delay_explains_more && fit.trustworthy())
+      fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+  }
+  if (evidence.limit) {
+    fit.decisions.push_back(evidence.limit_message);
+    if (*evidence.limit == FitStatus::search_budget) fit.findings.push_back(evidence.limit_message);
+    // The message of its own status is less helpful.
+    if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;
+    fit.distrust(*evidence.limit, evidence.limit_message);
+  }
+  if (!evidence.late_channels.empty()) tell(evidence.late_channels);
+  if (!evidence.unexplained.empty()) {
+    fit.decisions.push_back(evidence.unexplained);
+    fit.findings.insert(fit.findings.begin(), evidence.unexplained);
+    fit.distrust(FitStatus::unexplained, evidence.unexplained);
+  }
+}
+
+}  // namespace stageid

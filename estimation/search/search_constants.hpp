@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+// The numbers that the decisions of the search depend on, each once. The price of a mode, the tolerance of a trial and
+// the limit of a determined pole (a standard deviation as large as the value) follow from the criterion.
+
+namespace stageid {
+
+// How far a trial goes.
+
+/// Iterations of a trial: enough to show the gain of a mode or a structure. A mode that still moves is finished later.
+inline constexpr int kGrowthIterations = 12;
+/// Times as many for delays per channel and for springs, whose start is farther away.
+inline constexpr int kFartherAway = 3;
+/// A new search is given up if, after a third of its iterations, its cost is this many times that of the model.
+inline constexpr double kHopeless = 10.0;
+/// Alternatives tried before the search concludes that none is better: missing modes, merges, pairs.
+inline constexpr std::size_t kTried = 4;
+/// Models of many modes grow by a fifth at a time.
+inline constexpr std::size_t kShareAtOnce = 5;
+
+// The part of the data on which moves are tried (structure_study: the same moves as on all data).
+
+inline constexpr Eigen::Index kTrialLines = 500;        ///< at least
+inline constexpr Eigen::Index kTrialLinesOfAMode = 20;  ///< at least, per mode
+inline constexpr Eigen::Index kTrialChannels = 256;     ///< at most, if an input has no more
+
+// When the search or its last fit ends.
+
+/// Rounds in a row that add no resonance. A measured aircraft, which is nonlinear, has five before convergence.
+inline constexpr int kMostSpurious = 6;
+/// A model with this many times the cost does not follow the data: a fit that has not converged is better.
+inline constexpr double kDearest = 1.5;
+/// Times the tolerance: a fit that ends by its number of iterations so near to the stationary point has converged if
+/// all its modes are determined. With the default tolerance, its error is a hundredth of a standard deviation.
+inline constexpr double kNearly = 100.0;
+/// Of 2 ln(likelihood), which has a standard deviation above 1: acceptable cost of convergence.
+inline constexpr double kNothing = 0.1;
+/// Standard deviations: more is not chance, even in the largest of a thousand channels (p = 6e-7 each).
+inline constexpr double kClearly = 5.0;
+
+// More modes than this are placed at once before growing: those hidden by noise never settle.
+
+inline constexpr int kMostGrown = 40;
+inline constexpr int kIterationsOfMany = 6;  ///< with free poles
+/// Of the standard deviation per pole, root mean square: settled, if many modes or several ways are compared.
+inline constexpr double kSettled = 0.02;
+
+// Resonances.
+
+/// A mode of this damping ratio or more has no peak of its own.
+inline constexpr double kBroad = 0.1;
+/// Of a half-power width, a damping ratio or a direction: a small change, in which a fit is linear, but which is far
+/// above rounding. Also the deviation of a frequency without a standard deviation.
+inline constexpr double kSmallPart = 0.1;
+/// Of a half-power width or a damping ratio: the largest step from the linear solution that separates two modes.
+inline constexpr double kLargestPart = 0.5;
+/// Of the lowest line: start of a suspension that is hardly distinguishable from a free body.
+inline constexpr double kWeakSpringsStart = 0.02;
+
+/// Starts of a real pole of a requested submodel. Over four decades, two starts differ by a factor below two.
+inline constexpr int kRealPoleGrid = 17;
+
+// Of many modes hidden by noise: the part of the best shrinkage (three quarters of the gain for a quarter of the cost),
+// and its limit for a mode that is all noise.
+
+inline constexpr double kPartOfShare = 0.5;
+inline constexpr double kLargestShare = 0.99;
+
+// Rounding.
+
+/// Of a normal matrix with unit diagonal. One denominator of order 20 reaches 1e-12 (the numerators 1e-9) and is still
+/// determined; sums of thousands of terms are accurate to 1e-15.
+inline constexpr double kSmallestDirection = 1e-12;  ///< of the numerators
+inline constexpr double kSmallestShare = 3e-14;      ///< of the denominators
+/// Of the largest entry of a residue: a smaller deviation would only test rounding.
+inline constexpr double kBestKnown = 1e-8;
+/// Samples: smaller differences of delays are below the accuracy of the hold.
+inline constexpr double kLeastSamples = 1e-3;
+
+}  // namespace stageid
