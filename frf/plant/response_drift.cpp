@@ -25,6 +25,7 @@ constexpr double kLeastShare = 0.5;
 // have this share along one direction by chance once in several thousand cases.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
+constexpr double kMisleading = 3.0;  // standard deviations of bias: no interval holds
 constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line
 
 /// A slope of G in time, and its variance per unit of noise_variance.
@@ -266,7 +267,7 @@ std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const Matri
 
 Finding to_finding(const ModeDrift& drift) {
   Finding finding;
-  finding.severity = Severity::doubt;
+  finding.severity = drift.bias > kMisleading ? Severity::fault : Severity::doubt;
   finding.cause = Cause::drift;
   finding.what = fmt::format(
       "the response changes during the measurement: near {:.4g} Hz a mode moves by {:+.2g} % from "
