@@ -21,13 +21,13 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr Index kBins = Index{1} << 15;  // of commands from the lowest to the highest
+constexpr Index kBins = Index{1} << 16;  // of commands from the lowest to the highest
 constexpr int kPadding = 4;
-constexpr Index kFewestSteps = 6;  // between them: fewer are a smooth curve
-constexpr Index kMostSteps = 1024;
-constexpr int kMostPeriods = 4;    // of a run
-constexpr Index kNeighbours = 15;  // lines on each side, for the variance of the residual
-constexpr double kSurely = 1e-10;  // probability of the peak without steps
+constexpr Index kFewestSteps = 6;   // between them: fewer are a smooth curve
+constexpr Index kMostSteps = 8192;  // eight bins per step
+constexpr int kMostPeriods = 4;     // of a run
+constexpr Index kNeighbours = 15;   // lines on each side, for the variance of the residual
+constexpr double kSurely = 1e-10;   // probability of the peak without steps
 constexpr double kOwnPower = 6.0;  // of an actuator at the step of others: one of 100 without steps
 constexpr double kOwnCertainty = 30.0;  // of a peak anywhere: one of 1e10 without steps
 constexpr double kHarmonic = 0.01;      // relative distance from a multiple of the step's frequency
@@ -38,6 +38,7 @@ class CommandHistogram {
  public:
   void add(const Eigen::Ref<const Eigen::VectorXd>& commands, const Eigen::VectorXd& matched,
            double largest) {
+    allocate();
     for (Index t = 0; t < commands.size(); ++t) {
       const double position = 0.5 * (commands[t] / largest + 1.0) * static_cast<double>(kBins);
       const auto bin = std::clamp<Index>(static_cast<Index>(position), 0, kBins - 1);
@@ -47,6 +48,8 @@ class CommandHistogram {
     power_ += matched.squaredNorm();
   }
   void add(const CommandHistogram& other) {
+    if (other.sum_.size() == 0) return;
+    allocate();
     sum_ += other.sum_;
     count_ += other.count_;
     power_ += other.power_;
@@ -70,8 +73,8 @@ class CommandHistogram {
   /// Power of the residuals explained by a converter with this error per bin, over their mean power per sample; 0 if its
   /// sign is opposite. The response contains the part of the error that is linear in the `commands`.
   double explained(Eigen::VectorXd error, const Eigen::VectorXd& commands) const {
+    if (!(power_ > 0.0)) return 0.0;
     const double samples = count_.sum();
-    if (!(samples > 0.0) || !(power_ > 0.0)) return 0.0;
     const Eigen::VectorXd centred = commands.array() - commands.dot(count_) / samples;
     error.array() -= error.dot(count_) / samples;
     const Eigen::VectorXd weighted = centred.cwiseProduct(count_);
@@ -82,8 +85,14 @@ class CommandHistogram {
   }
 
  private:
-  Eigen::VectorXd sum_ = Eigen::VectorXd::Zero(kBins);
-  Eigen::VectorXd count_ = Eigen::VectorXd::Zero(kBins);  // of samples
+  void allocate() {
+    if (sum_.size() > 0) return;
+    sum_.setZero(kBins);
+    count_.setZero(kBins);
+  }
+
+  Eigen::VectorXd sum_;    // empty before the first sample
+  Eigen::VectorXd count_;  // of samples
   double power_ = 0.0;
 };
 

@@ -18,7 +18,7 @@ namespace stageid {
 /// spectrum of H_j over the powers of the samples is exponentially distributed without steps. With steps, it has a peak
 /// at one period per step. Actuators of one unit are tested together, because they often have the same converter: the
 /// sum of their spectra has a gamma distribution. Only experiments that excite an actuator are used for it, and at most
-/// four periods of each run. Steps below 1/512 of the largest command are not found.
+/// four periods of each run. Steps below 1/4096 of the largest command are not found.
 ///
 /// Steps of an earlier estimate of the runs are applied, and looked for in the actuators without one.
 ///
