@@ -271,7 +271,7 @@ void Search::try_actuators() {
                 [&](const Line& line) { return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U); });
   for (Index a = 0; a < n_u; ++a) {
     const double cost = row_cost(a);
-    if (!(cost > 0.0)) continue;
+    if (!(cost > 0.0) || !significant(a)) continue;
     if (commands_follow(a, 1))
       try_direction({Kind::gain, false, a}, cost, a, 1,
                     [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });

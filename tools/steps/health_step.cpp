@@ -75,7 +75,11 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
     for (Finding& finding : check_experiment_noise(frf, noisy))
       findings.push_back(std::move(finding));
   // It comes from the steps, and the response is that to them.
-  if (steps_known)
+  const bool only_limit_cycles =
+      std::all_of(findings.begin(), findings.end(), [](const Finding& finding) {
+        return finding.severity != Severity::fault || finding.cause == Cause::limit_cycle;
+      });
+  if (steps_known && only_limit_cycles)
     for (Finding& finding : findings)
       if (finding.cause == Cause::limit_cycle) finding.severity = Severity::doubt;
   return findings;

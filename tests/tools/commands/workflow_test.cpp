@@ -109,6 +109,20 @@ TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
   }
 }
 
+// A tenth of the excitation per step: the idle actuators move by less.
+TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) {
+  const std::string config =
+      stage("coarse.yaml", "force_n: 1e-4,", "force_n: 1e-4, actuator_quantum_n: 0.1,");
+  succeed({"identify", config, "-o", name("result")});
+  const json summary = json::parse(read_bytes(at("result/summary.json")));
+  std::string steps;
+  for (const json& finding : summary["health"])
+    if (finding["cause"] == "actuator_step")
+      steps += finding["channel"].get<std::string>() + ": " + finding["figure"].get<std::string>();
+  EXPECT_EQ(steps, "a1 a2 a3: 0.1 N, rounded to the nearest");
+  EXPECT_LT(summary["truth"]["relative_rms_error"].get<double>(), 0.02);
+}
+
 TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
   succeed({"identify", config_, "-o", name("one"), "--threads", "1"});
   succeed({"identify", config_, "-o", name("two"), "--threads", "2"});
