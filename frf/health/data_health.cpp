@@ -334,7 +334,8 @@ void Examination::check_excluded() {
   double inputs = 0.0;
   for (const Index a : excited) inputs += power(a);
   if (!(inputs > 0.0)) return;
-  const double noise = noise_share(record_);
+  // Of the mean over all realizations.
+  const double noise = noise_share(record_) / static_cast<double>(1 + record_.others.size());
   for (Index a = 0; a < record_.n_u(); ++a) {
     const Index c = record_.n_y() + a;
     if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
