@@ -25,7 +25,7 @@ constexpr double kLeastShare = 0.5;
 // have this share along one direction by chance once in several thousand cases.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
-constexpr double kMisleading = 3.0;  // standard deviations of bias: no interval holds
+constexpr double kMisleading = 3.0;       // standard deviations of bias: no interval holds
 constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line
 
 /// A slope of G in time, and its variance per unit of noise_variance.
