@@ -43,6 +43,9 @@ namespace stageid {
 /// see nonlinearity_test(). If only some of the excited actuators are requested as inputs, they are columns of the
 /// whole estimate, because the others move too.
 ///
+/// If the realizations show that actuators apply their commands in steps, the response is that to what was applied
+/// (docs/theory.md, section 3): up to a few more passes over the logs. "actuator_steps" in the provenance lists them.
+///
 /// Memory (periodic): per thread one period of samples and 16 of spectra; in total the spectra and scatters of one
 /// realization, (n_y + n_u)^2 numbers per line and experiment.
 /// Source: docs/theory.md, section 3; Pintelon and Schoukens, System Identification (2012).

@@ -23,7 +23,7 @@ namespace stageid {
 /// Steps of an earlier estimate of the runs are applied, and looked for in the actuators without one.
 ///
 /// @param frf the response of these runs; its channels are tested
-/// @returns the others, ordered by actuator and step; false in less than one of 1e8 logs
+/// @returns the others; by chance, a wrong one in less than one of 1e8 logs
 /// @throws the same as LogReader::read()
 std::vector<ActuatorStep> find_actuator_steps(const std::vector<RealizationRuns>& realizations,
                                               const FrfEstimate& frf, const FrfOptions& options);
