@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 PROGRAM, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
-RATE_HZ, N_Y, N_U = 5000.0, 4, 13
+RATE_HZ, N_Y, N_U = 5000.0, 3, 6
 FREQUENCY_HZ = np.arange(1.0, 2000.5, 1.0)
 MODES_HZ = np.array([31.7, 88.2, 143.9, 144.6, 260.3, 351.1, 420.8, 575.5, 731.9, 902.4, 1234.5, 1711.1])
 DAMPING = np.array([0.012, 0.004, 0.003, 0.006, 0.02, 0.0025, 0.008, 0.005, 0.003, 0.011, 0.007, 0.004])
