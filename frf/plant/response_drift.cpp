@@ -10,6 +10,8 @@
 #include <limits>
 #include <vector>
 
+#include "frf/statistics/mean_around.hpp"
+
 namespace stageid {
 namespace {
 
@@ -36,13 +38,6 @@ struct Slope {
   bool poles = false;  // whether X may follow from a pole
   double span = 0.0;   // duration of the measurement in its unit of time
 };
-
-/// Mean over the lines of the window around line k, truncated at the ends.
-VectorXd about(const MatrixXd& columns, Index k) {
-  const Index first = std::max<Index>(0, k - kWindow / 2);
-  const Index last = std::min(columns.cols(), k + kWindow / 2 + 1);
-  return columns.middleCols(first, last - first).rowwise().mean();
-}
 
 /// X = -f dG/df from the neighbours of each line of the window.
 MatrixXcd by_differences(const FrfEstimate& frf, Index first) {
@@ -166,7 +161,7 @@ class DriftFit {
     return kDriftRounding * frf_.response.col(k).cwiseAbs2().maxCoeff() + 1e-300;
   }
   Eigen::ArrayXd noise_about(Index k) const {
-    return about(frf_.noise_variance, k).array() + least(k);
+    return mean_around(frf_.noise_variance, k, kWindow / 2).array() + least(k);
   }
 
   /// Power of the slope beyond noise.

@@ -14,6 +14,7 @@
 #include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/statistics/distributions.hpp"
+#include "frf/statistics/mean_around.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
@@ -95,17 +96,6 @@ class CommandHistogram {
   Eigen::VectorXd count_;  // of samples
   double power_ = 0.0;
 };
-
-/// Mean over `kNeighbours` lines on each side.
-Eigen::VectorXd smoothed(const Eigen::VectorXd& power) {
-  Eigen::VectorXd mean(power.size());
-  for (Index k = 0; k < power.size(); ++k) {
-    const Index first = std::max<Index>(0, k - kNeighbours);
-    const Index next = std::min(power.size(), k + kNeighbours + 1);
-    mean[k] = power.segment(first, next - first).mean();
-  }
-  return mean;
-}
 
 class StepSearch {
  public:
@@ -235,8 +225,8 @@ void StepSearch::collect(const UsedRun& run, RunWorkspace& w,
   if (residuals.empty()) return;
   Eigen::MatrixXd power = Eigen::MatrixXd::Zero(residuals.front().rows(), residuals.front().cols());
   for (const Eigen::MatrixXcd& E : residuals) power += E.cwiseAbs2();
-  for (Index i = 0; i < power.rows(); ++i)
-    power.row(i) = smoothed(power.row(i).transpose()).transpose();
+  Eigen::MatrixXd variance(power.rows(), power.cols());
+  for (Index k = 0; k < power.cols(); ++k) variance.col(k) = mean_around(power, k, kNeighbours);
   Eigen::VectorXcd half = Eigen::VectorXcd::Zero(w.dft.half_size());
   for (std::size_t p = 0; p < residuals.size(); ++p)
     for (std::size_t a = 0; a < tested_.size(); ++a) {
@@ -244,9 +234,10 @@ void StepSearch::collect(const UsedRun& run, RunWorkspace& w,
       for (std::size_t k = 0; k < lines_.size(); ++k) {
         const auto at = static_cast<Index>(k);
         std::complex<double> matched = 0.0;
-        for (Index i = 0; i < power.rows(); ++i)
-          if (power(i, at) > 0.0)
-            matched += std::conj(G_[k](i, tested_[a].input)) * residuals[p](i, at) / power(i, at);
+        for (Index i = 0; i < variance.rows(); ++i)
+          if (variance(i, at) > 0.0)
+            matched +=
+                std::conj(G_[k](i, tested_[a].input)) * residuals[p](i, at) / variance(i, at);
         half[lines_[k]] = matched;
       }
       own[a].add(commands[p].col(tested_[a].actuator), w.dft.inverse(half), tested_[a].largest);

@@ -118,7 +118,7 @@ TEST(StepSearch, FindsNothingInARecordOfTheSteps) {
   EXPECT_TRUE(steps_in(log).empty());
 }
 
-// Lost samples are found in the records as they are, and both are told.
+// Lost samples and steps are both found, and the period with the gap is dropped.
 TEST(StepSearch, LostSamplesAreStillFound) {
   const double rms = command_rms();
   MemoryLog log =
@@ -145,7 +145,7 @@ TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
   EXPECT_EQ(one.response, estimate_plant_frf({&log}, options).response);
 }
 
-// The fingerprint in the provenance is that of the log, and the steps are told beside it.
+// The provenance lists step and rounding of each actuator.
 TEST(StepSearch, TheProvenanceTellsTheSteps) {
   const double rms = command_rms();
   const MemoryLog log =
