@@ -31,7 +31,7 @@ constexpr double kSuspicion = 0.05;   // of clipping, if u = r - C y is violated
 constexpr double kStuckShare = 0.02;  // of a run's samples that have one value
 constexpr double kCoarse =
     25.0;  // times the longest expected sequence: motion is slow and differs between runs
-constexpr double kExcludedPower = 1e-4;   // of the inputs' power
+constexpr double kExcludedPower = 1e-4;   // of the inputs' power, where the noise is unknown
 constexpr double kWorstExcitation = 1e3;  // cond(R)
 constexpr double kWorstInputs = 1e2;      // median of cond(U) in the upper half of the band
 constexpr double kLeastCoherence = 0.9;
@@ -334,15 +334,16 @@ void Examination::check_excluded() {
   double inputs = 0.0;
   for (const Index a : excited) inputs += power(a);
   if (!(inputs > 0.0)) return;
-  // Of the mean over all realizations.
-  const double noise = noise_share(record_) / static_cast<double>(1 + record_.others.size());
+  // A mode averages the bias over lines and realizations, as it does the noise.
+  const double averaged = static_cast<double>(record_.lines.size() * (1 + record_.others.size()));
+  const double tolerable =
+      record_.scatter_dof() > 0 ? noise_share(record_) / averaged : kExcludedPower;
   for (Index a = 0; a < record_.n_u(); ++a) {
     const Index c = record_.n_y() + a;
     if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
     const double share = power(a) / inputs;
-    if (share > kExcludedPower && responds(record_, c))
-      // The bias of the response is about the root of the share.
-      find(share > noise ? Severity::fault : Severity::doubt, Cause::excluded, name(c),
+    if (share > tolerable && responds(record_, c))  // the bias is about the root of the share
+      find(Severity::fault, Cause::excluded, name(c),
            "is not an input of the sub-plant but moves on the excited lines, which biases the "
            "response",
            fmt::format("{:.2g} of the power of the inputs", share),

@@ -236,8 +236,8 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       continue;
     }
     const double shift = window.shift(q, evidence.runs.front().start_used);
-    // At an end of the lines, what rings lies beside them and shifts no mode.
-    if (peak > 0 && peak + 1 < evidence.frequency_hz.size())
+    // A mode that rings at an end of the lines lies beside them and shifts no other.
+    if (!window.linear() || (peak > 0 && peak + 1 < evidence.frequency_hz.size()))
       settled = std::max(settled, window.shift(q, false));
     if (shift <= kLargestShift) continue;
     frequencies.push_back(window.frequency_hz());

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 
 #include "frf/health/data_health.hpp"
 #include "frf/health/transient_check.hpp"
@@ -135,11 +137,11 @@ TEST(StartTransient, TheEstimateGathersTheSame) {
       estimate_plant_frf_and_health({&log}, {.method = FrfMethod::lpm}).health.start.runs.empty());
 }
 
-/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on `lines` lines, which is
-/// the same in all periods of a run or `new_phases` in each.
+/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on `lines` of 60 lines, in
+/// the middle or from the `first` on. The phase is the same in all periods of a run or `new_phases` in each.
 template <typename Change>
 std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool new_phases = false,
-                               Eigen::Index lines = 5) {
+                               Eigen::Index lines = 5, std::optional<Eigen::Index> first = {}) {
   test::RandomNumbers random(seed);
   StartEvidence evidence{.frequency_hz = Eigen::VectorXd::LinSpaced(60, 5.0, 64.0),
                          .runs = {},
@@ -150,7 +152,7 @@ std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool ne
     const auto period = [&](const Eigen::MatrixXcd& shape, int p) {
       Eigen::MatrixXcd Z =
           Eigen::MatrixXcd::NullaryExpr(2, 60, [&random] { return random.circular(); });
-      Z.middleCols((60 - lines) / 2, lines) += change(p) * shape;
+      Z.middleCols(first.value_or((60 - lines) / 2), lines) += change(p) * shape;
       return Z;
     };
     Eigen::MatrixXcd shape;
@@ -199,6 +201,23 @@ TEST(StartTransient, ADecayWithoutACommonRatioIsALimitCycle) {
     named += found.size() == 1 && found[0].cause == Cause::limit_cycle;
   }
   EXPECT_GE(named, 19);
+}
+
+// A mode that rings below the first line does no harm to the others, but a loop that oscillates there does.
+TEST(StartTransient, AtAnEndOfTheLinesOnlyALimitCycleIsAFault) {
+  for (const bool cycle : {false, true})
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      double turn = 0.0;
+      const auto change = [&](int p) {
+        if (p == 0 && cycle) turn = turn > 0.0 ? -0.95 : 0.95;  // of each run
+        return std::polar(1e5 * std::pow(0.5, p), turn * p);
+      };
+      const std::vector<Finding> found = of_change(change, seed, false, 1, 0);
+      const bool fault = std::any_of(found.begin(), found.end(), [](const Finding& f) {
+        return f.severity == Severity::fault && f.cause == Cause::limit_cycle;
+      });
+      EXPECT_EQ(fault, cycle) << (found.empty() ? "nothing" : found[0].what + found[0].figure);
+    }
 }
 
 // A mode that rings for a thousand periods is rarer than one that drifts.
