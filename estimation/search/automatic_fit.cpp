@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <optional>
 #include <ranges>
 #include <stdexcept>
@@ -58,8 +57,14 @@ class AutomaticFit {
     threads_ = worker_count(options.threads);
   }
 
-  /// The first fit of every search.
-  void begin() { adopt(fit_additive_model(frf_, start(), quick_)); }
+  /// The first fit of every search. A search for the number of modes begins on a part of the data.
+  void begin() {
+    const AdditiveModel model = start();
+    const bool open = selection_.exactly == 0 && !selection_.keep_modes;
+    if (open && begin_on_part(model)) return;
+    adopt(fit_additive_model(frf_, model, quick_));
+    if (open) relocate();
+  }
 
   /// The same with the requested number of modes, all placed at once.
   void begin_relocated() {
@@ -161,6 +166,47 @@ class AutomaticFit {
     return kSettled * std::sqrt(free);
   }
 
+  /// Places all modes at once by pole relocation, if that is better.
+  void relocate() {
+    if (limit_reached()) return;
+    FitResult fit = fit_additive_model(
+        frf_,
+        start_of(relocate_poles(frf_, best_.model, quick_.user_weights,
+                                static_cast<std::size_t>(count_modes(best_.model)), threads_)),
+        quick_);
+    if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
+      return;
+    say("pole relocation: cost {:.6g} -> {:.6g}", best_.model.fit.cost, fit.model.fit.cost);
+    adopt(std::move(fit));
+  }
+
+  /// The whole search on a part of the data; then a fit of its result to all data.
+  /// @returns false if the data are too few for a part
+  bool begin_on_part(const AdditiveModel& model) {
+    const StructureTrial part = structure_trial(frf_, quick_, model);
+    if (part.all) return false;
+    ModelStructure structure = structure_;
+    structure.given = structure_of(part.model).given;
+    FitOptions options = options_;
+    options.weighting = Weighting::user;
+    options.user_weights = part.options.user_weights;
+    options.user_weight_matrices.resize(0, 0);
+    AutomaticFit search(part.frf, structure, selection_, options);
+    search.adopt(fit_additive_model(part.frf, part.model, search.quick_));
+    search.relocate();
+    search.search(0);
+    if (search.best_.status == FitStatus::singular) return false;
+    for (const std::string& decision : search.decisions_)
+      say("{} of {} lines: {}", part.frf.lines(), frf_.lines(), decision);
+    quick_.delay = options_.delay = search.options_.delay;
+    quick_.delay_s = options_.delay_s = search.options_.delay_s;
+    take_structure_of(search.best_.model);
+    if (search.watch_.ended()) watch_ = std::move(search.watch_);
+    adopt(fit_additive_model(frf_, with_all_inputs(frf_, search.best_.model), quick_));
+    structured_at_ = history_.size();
+    return true;
+  }
+
   /// Fits `model` with all poles free, then holds those of modes hidden by noise at the result.
   void hold_hidden(const AdditiveModel& model) {
     FitOptions while_free = quick_;
@@ -222,19 +268,17 @@ class AutomaticFit {
       return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
-    // An expensive one that gains nothing in its first step is tried only if no other is better.
-    const auto last =
-        std::stable_partition(moves.begin(), moves.end(), [&](const StructureMove& move) {
-          return !move.from_nothing || gains_at_once(sample, move);
-        });
-    if (!take_best(sample, {moves.begin(), last}) && !take_best(sample, {last, moves.end()}))
-      return false;
-    const OpenStructure open = structure_.open;
-    structure_ = structure_of(best_.model);
-    structure_.open = open;
-    worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
+    if (!take_best(sample, std::move(moves))) return false;
+    take_structure_of(best_.model);
     watch_ = {};  // it compares models of one structure
     return true;
+  }
+
+  void take_structure_of(const AdditiveModel& model) {
+    const OpenStructure open = structure_.open;
+    structure_ = structure_of(with_all_inputs(frf_, model));
+    structure_.open = open;
+    worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
   }
 
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
@@ -289,36 +333,15 @@ class AutomaticFit {
     });
   }
 
-  /// Whether the options of a move gain anything in one step from the present poles.
-  bool gains_at_once(const Sample& sample, const StructureMove& move) const {
+  /// A hopeless move ends after a third of its iterations.
+  static FitResult tried(const Sample& sample, const StructureMove& move) {
     FitOptions options = move.options;
-    options.delay_s = sample.data.options.delay_s;
-    options.max_iterations = 1;
-    return sample.worth.criterion(fit_additive_model(sample.data.frf, sample.data.model, options)) <
-           sample.now;
-  }
-
-  /// The trial of a move on the sample. From nothing, the result depends on the structure only.
-  FitResult tried(const Sample& sample, const StructureMove& move) {
-    if (!move.from_nothing) return fit_additive_model(sample.data.frf, move.model, move.options);
-    std::vector<std::size_t> structure = {static_cast<std::size_t>(sample.data.frf.lines())};
-    for (const Submodel& s : move.model.submodels) {
-      structure.push_back(static_cast<std::size_t>(s.integrators));
-      structure.push_back(s.denominator.size());
-      structure.push_back(s.numerator.size());
-    }
-    const auto [at, is_new] = from_nothing_.try_emplace(std::move(structure));
-    if (!is_new) return at->second;
-    FitResult& result = at->second;
-    FitOptions options = move.options;
-    options.max_iterations /= kFartherAway;
-    result = fit_additive_model(sample.data.frf, move.model, options);
-    if (result.status == FitStatus::iteration_limit &&
-        result.model.fit.cost < kHopeless * sample.cost) {
-      options.max_iterations = move.options.max_iterations - options.max_iterations;
-      result = fit_additive_model(sample.data.frf, result.model, options);
-    }
-    return result;
+    options.max_iterations /= 3;
+    FitResult fit = fit_additive_model(sample.data.frf, move.model, options);
+    if (fit.status != FitStatus::iteration_limit || !(fit.model.fit.cost < kHopeless * sample.cost))
+      return fit;
+    options.max_iterations = move.options.max_iterations - options.max_iterations;
+    return fit_additive_model(sample.data.frf, fit.model, options);
   }
 
   /// @returns false if all data do not confirm the move
@@ -393,11 +416,15 @@ class AutomaticFit {
   bool add_one(const std::vector<ResidualMode>& candidates) {
     FitResult best_trial;
     bool found = false;
+    const double price = worth_.price(best_);
+    double reach = kReach;
     for (const ResidualMode& candidate : candidates) {
-      // The matched filter estimates most of the gain of a fit; far below the price, no fit is needed.
-      if (selection_.exactly == 0 && candidate.gain < 0.2 * worth_.price(best_)) continue;
+      if (selection_.exactly == 0 && reach * candidate.gain < price) continue;
       FitResult trial = fit_with({candidate});
       if (trial.status == FitStatus::singular) continue;
+      const double gain =
+          static_cast<double>(frf_.lines()) * (best_.model.fit.cost - trial.model.fit.cost);
+      reach = 2.0 * std::max(1.0, gain / candidate.gain);  // as the last one, with a margin
       const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
       if (better) best_trial = std::move(trial);
       found = true;
@@ -478,8 +505,6 @@ class AutomaticFit {
   int threads_ = 1;
   GrowthWatch watch_;
   FitResult best_;
-  std::map<std::vector<std::size_t>, FitResult>
-      from_nothing_;  ///< results of such moves, by structure
   std::vector<std::string> decisions_;
   std::vector<double> history_;
   // Size of the history when no such move was left; with the same model, none is tried again.

@@ -154,15 +154,16 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
   };
   if (!evidence.low_ranks.empty()) tell(evidence.low_ranks);
   std::vector<std::string> reasons;
-  if (fit.status != FitStatus::singular) judge_modes(frf, evidence, fit, reasons);
+  // Without the delay, modes describe it; what the data say about them is of no use.
+  if (fit.status != FitStatus::singular && !evidence.delay_explains_more)
+    judge_modes(frf, evidence, fit, reasons);
   for (const std::string& reason : reasons) {
     tell(reason);
     if (fit.trustworthy()) fit.distrust(FitStatus::undetermined, reason);
   }
   if (!evidence.growth_ended.empty()) {
     fit.findings.push_back(evidence.growth_ended);
-    if (evidence.delay_explains_more && fit.trustworthy())
-      fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+    if (evidence.delay_explains_more) fit.distrust(FitStatus::unexplained, evidence.growth_ended);
   }
   if (evidence.limit) {
     fit.decisions.push_back(evidence.limit_message);

@@ -12,16 +12,18 @@ namespace stageid {
 
 /// Iterations of a trial: enough to show the gain of a mode or a structure. A mode that still moves is finished later.
 inline constexpr int kGrowthIterations = 12;
-/// Times as many for delays per channel and for springs, whose start is farther away.
+/// Times as many for springs, whose start is farther away.
 inline constexpr int kFartherAway = 3;
-/// A new search is given up if, after a third of its iterations, its cost is this many times that of the model.
+/// A move is given up if, after a third of its iterations, its cost is this many times that of the model.
 inline constexpr double kHopeless = 10.0;
 /// Alternatives tried before the search concludes that none is better: missing modes, merges, pairs.
 inline constexpr std::size_t kTried = 4;
 /// Models of many modes grow by a fifth at a time.
 inline constexpr std::size_t kShareAtOnce = 5;
+/// A fit gains at most this many times what the matched filter estimates for a further mode.
+inline constexpr double kReach = 5.0;
 
-// The part of the data on which moves are tried (structure_study: the same moves as on all data).
+// The part of the data on which the search begins and moves are tried (structure_study: the same moves as on all data).
 
 inline constexpr Eigen::Index kTrialLines = 500;        ///< at least
 inline constexpr Eigen::Index kTrialLinesOfAMode = 20;  ///< at least, per mode

@@ -30,6 +30,11 @@ bool has(const AdditiveModel& model, Predicate is_one) {
   return std::any_of(model.submodels.begin(), model.submodels.end(), is_one);
 }
 
+void make_proportional(AdditiveModel& model) {
+  for (Submodel& s : model.submodels)
+    if (is_general(s)) s.numerator.resize(1);
+}
+
 /// Delays are searched from nothing.
 void free_delays(DelayModel delay, StructureMove& move) {
   move.options.delay = delay;
@@ -70,7 +75,13 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
       springs.options.max_iterations *= kFartherAway;
       std::erase_if(springs.model.submodels, is_rigid_body);
       springs.model.submodels.push_back(suspension_mode(frf, start * frf.frequency_hz[0]));
-      out.push_back(std::move(springs));
+      out.push_back(springs);
+      // Instead of the modes below the lines, too.
+      if (start == kSuspensionStart &&
+          std::erase_if(springs.model.submodels, [&](const Submodel& s) {
+            return is_searched_mode(s) && s.natural_frequency_hz() < frf.frequency_hz[0];
+          }) > 0)
+        out.push_back(std::move(springs));
     }
   } else if (open.rigid_body && !has(model, [](const Submodel& s) {
                return s.integrators > 0 || s.role == SubmodelRole::suspension;
@@ -86,17 +97,13 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
       frf.response.rows() > 1) {
     StructureMove skewed{"--delay per_channel", model, options};
     free_delays(DelayModel::per_channel, skewed);
-    skewed.options.max_iterations *= kFartherAway;
-    skewed.from_nothing = true;
-    // Poles that were fitted to channels with different delays lead to another minimum.
-    std::erase_if(skewed.model.submodels, is_searched_mode);
-    for (Submodel& s : skewed.model.submodels)
-      if (s.role == SubmodelRole::suspension && !s.frequency_held)
-        s = suspension_mode(frf, kSuspensionStart * frf.frequency_hz[0]);
-    const ModelStructure structure{.general_damping = has(model, is_general)};
-    for (const ModeCandidate& peak : pick_modes(frf))
-      skewed.model.submodels.push_back(mode_submodel(frf, structure, peak));
-    out.push_back(std::move(skewed));
+    out.push_back(skewed);
+    // Numerators B_0 + B_1 s stand in for delays.
+    if (open.general_damping && has(model, is_general)) {
+      skewed.flag += " --damping proportional";
+      make_proportional(skewed.model);
+      out.push_back(std::move(skewed));
+    }
   }
   return out;
 }
@@ -106,8 +113,7 @@ std::vector<StructureMove> simpler_structures(const FitOptions& options, const A
   std::vector<StructureMove> out;
   if (open.general_damping && has(model, is_general)) {
     out.push_back({"--damping proportional", model, options});
-    for (Submodel& s : out.back().model.submodels)
-      if (is_general(s)) s.numerator.resize(1);
+    make_proportional(out.back().model);
   }
   if (open.delay && options.delay == DelayModel::per_channel) {
     out.push_back({"--delay estimate", model, options});

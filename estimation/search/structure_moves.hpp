@@ -13,8 +13,6 @@ struct StructureMove {
   std::string flag;  ///< of `stageid fit`, that requests it; else what it does
   AdditiveModel model;
   FitOptions options;
-  bool from_nothing =
-      false;  ///< its modes and delays are searched anew: expensive, and only the structure matters
 };
 
 /// One part more, of those that are open: numerators B_0 + B_1 s, a direct term, a rigid body, a rigid body on springs
