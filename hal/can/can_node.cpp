@@ -43,13 +43,14 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
 }
 
 void CanNode::serve(std::int64_t until_ns) {
+  if (!player_.busy() && until_ns > transport_.now_ns()) transport_.wait(until_ns);
+  // If this node is delayed after this instant, the host may have sent meanwhile: it is not silent.
   const std::int64_t now_ns = transport_.now_ns();
-  if (!player_.busy() && until_ns > now_ns) transport_.wait(until_ns);
   const std::size_t count = transport_.receive(inbox_);
   watch_bus();  // first, because a bus that is off takes precedence over received commands
   for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
-  player_.work(transport_.now_ns(), transport_);
-  stage_.tick(transport_.now_ns());
+  player_.work(now_ns, transport_);
+  stage_.tick(now_ns);
   announce();
   flush();
 }
