@@ -188,6 +188,7 @@ PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
       return judge_reply();
     case LinkStatus::timeout:
     case LinkStatus::disconnected:
+    case LinkStatus::flooded:
       return PeerStatus::link_down;
     case LinkStatus::corrupt:
       return PeerStatus::damaged;

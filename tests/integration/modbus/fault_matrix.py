@@ -143,9 +143,8 @@ OTHER_UNITS = [frame + modbus_crc(frame) for frame in (
 WIRE = [
     altered('replies late by up to a period', MARKED, 'the jitter limit', alter=late_by_up_to_a_period, pace=1,
         misses_allowed=1000, marked=range(50, 1000)),
-    altered('frozen under a flood of old replies', FAILED, 'corrupt', alter=samples(lambda _: False), within_s=20),
-    altered('interrupted under a flood of old replies', INTERRUPTED, 'interrupted', alter=samples(lambda _: False),
-        disturb='interrupt', within_s=20),
+    altered('frozen under a flood of old replies', FAILED, 'sends more than it is asked for',
+        alter=samples(lambda _: False), within_s=5),
     Row('other units on the line, RTU', DONE, '', line='rtu', others=OTHER_UNITS),
 ]
 
