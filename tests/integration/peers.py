@@ -2,7 +2,9 @@
 import binascii
 import contextlib
 import os
+import pathlib
 import pty
+import resource
 import select
 import socket
 import struct
@@ -19,6 +21,10 @@ def words(*numbers):
 
 def number(registers, index=0):
     return registers[index] << 16 | registers[index + 1]
+
+
+def resident_bytes(process):
+    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Connection:

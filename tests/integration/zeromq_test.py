@@ -24,7 +24,7 @@ import unittest
 
 from example_firmware import CAN, ExampleFirmware
 from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
-                   can_command, sealed)
+                   can_command, resident_bytes, sealed)
 
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 UPLOAD_CHUNK = 0x300
@@ -47,10 +47,6 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
-
-
-def resident_bytes(process):
-    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Peer(ZeroMqPeer):
@@ -215,6 +211,7 @@ class ZeroMq(unittest.TestCase):
         dice, sizes = random.Random(5), (0, 1, 8, 71, 72, 72, 73, 300)
         peer = Peer(self.port)
         before = peer.state_after(command(HELLO, 1))[1]
+        memory = resident_bytes(node.pid)
         forged = [command(code, 7, 3, 0, 800, 0, session=dice.getrandbits(32))
                   for code in (START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD)]
         chunk = message(UPLOAD_CHUNK, sealed(UPLOAD_CHUNK, struct.pack("<HBBH", 0, 0, 4, 56), bytes(56), 64))
@@ -230,6 +227,7 @@ class ZeroMq(unittest.TestCase):
                 answer, rejected = peer.state_after(command(HELLO, 1000 + i // 100))
                 self.assertEqual(answer, 1)
         self.assertGreater(rejected - before, 100_000)
+        self.assertLess(resident_bytes(node.pid) - memory, 8 << 20)
         self.assertIsNone(host.poll(), "the run lasts longer than the attack")
         peer.close()
         self.ends(host, 0)
