@@ -44,6 +44,13 @@ class ModbusLink {
   [[nodiscard]] LinkStatus read(int first, std::span<std::uint16_t> registers) noexcept;
 
   void drain() noexcept;
+  /// Makes a request, and again after a drain if it fails.
+  template <typename Request>
+  LinkStatus repeat_once(Request request) {
+    if (const LinkStatus done = request(); done == LinkStatus::ok) return done;
+    drain();
+    return request();
+  }
 
   const ModbusAddress& address() const noexcept { return address_; }
   const ModbusTiming& timing() const noexcept { return timing_; }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_fault.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_pdu.hpp"
@@ -54,12 +55,10 @@ class ModbusNode final : public ModbusRegisters {
   void show_status();
   bool on(ModbusFault::Kind kind) const noexcept;
 
-  std::uint32_t u32(int address) const noexcept;
-  void set_u32(int address, std::uint32_t value) noexcept;
-
   StageNode& node_;
   ModbusFaultScript* faults_;
   std::array<std::uint16_t, modbus_map::kEnd> registers_{};
+  RegisterBlock<std::uint16_t> map_{0, registers_};
   std::uint32_t boot_id_;
   ModbusConnection asking_ = 0;
   std::uint32_t session_ = 0;      // key of the last run begun by this front end; 0: none

@@ -64,7 +64,7 @@ def repeated_rows(line, suffix):
 FIRST = 100  # altered sample
 ALWAYS = 10 ** 9
 # Registers of a measurement, from address 300 on, and of the description.
-BOOT, STATUS_HIGH, STATUS_LOW, VALID, COUNT = 1, 6, 7, 11, 12
+BOOT, KEY, STATUS_HIGH, STATUS_LOW, VALID, COUNT = 1, 4, 6, 7, 11, 12
 MEASUREMENT, DESCRIPTION, FIRST_SCALE = 300, 500, 8
 
 
@@ -90,6 +90,11 @@ def status(outcome=0, state=5, cause=0, missed=0, count=1):
 def first_sample_without_value(first, sample, registers):
     if first == MEASUREMENT and sample is None:
         registers[VALID] = 1
+
+
+def no_key(first, sample, registers):
+    if first == MEASUREMENT and sample is None:
+        registers[KEY:KEY + 2] = 0, 0
 
 
 def coarse_actuators(first, sample, registers):
@@ -134,6 +139,7 @@ STATUS = [
         alter=setting({BOOT: 77})),
     altered('no value before the run', FAILED, 'a sensor has no value before the run begins',
         alter=first_sample_without_value),
+    altered('no key for the run', FAILED, 'replies do not match the requests', alter=no_key),
     altered('a force that the wire cannot carry', FAILED, "exceeds the range of the node's actuator scale",
         alter=coarse_actuators),
 ]
