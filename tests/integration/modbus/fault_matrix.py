@@ -45,7 +45,7 @@ class Row:
     alter: collections.abc.Callable = None  # what the wire makes of a reply: see ModbusRelay
     marked: range = None  # samples in the log
     short: bool = False  # five seconds of one axis at pace 1
-    others: list = None  # frames between the units on the line, after every reply
+    others: tuple = None  # on the line: see SharedLine
     within_s: float = 150.0
     state: tuple = AT_REST  # of the node at the end; empty: unavailable
 
@@ -151,7 +151,9 @@ WIRE = [
         misses_allowed=1000, marked=range(50, 1000)),
     altered('frozen under a flood of old replies', FAILED, 'sends more than it is asked for',
         alter=samples(lambda _: False), within_s=5),
-    Row('other units on the line, RTU', DONE, '', line='rtu', others=OTHER_UNITS),
+    Row('other units on the line, RTU', DONE, '', line='rtu', others=(OTHER_UNITS,)),
+    Row('interrupted on a line that is never silent, RTU', INTERRUPTED, 'interrupted', line='rtu', others=(OTHER_UNITS, 20),
+        disturb='interrupt', misses_allowed=4, within_s=25),
 ]
 
 ROWS = STATUS + WIRE + repeated_rows('tcp', '') + repeated_rows('rtu', ', RTU') + [
@@ -189,7 +191,7 @@ def open_line(bench, row):
     """The node, its TCP port, how to start another one, and the stage file."""
     options = list(row.faults)
     if row.line == 'rtu':
-        here, there = bench.serial_line() if row.others is None else bench.shared_line(row.others)
+        here, there = bench.serial_line() if row.others is None else bench.shared_line(*row.others)
         options += ['--modbus-rtu', there, '--modbus-parity', 'N']
         stage = bench.stage('stage', door=f'rtu: {{device: {here}, parity: N}}')
     node, port = bench.node(*options, own_watchdog=row.own_watchdog)
