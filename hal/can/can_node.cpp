@@ -221,7 +221,7 @@ std::string CanNode::start(const CanCommand& command) {
                      last_sequence_ == 0 && stage_.sample() == 0;
   if (again) return "";
   if (player_.busy()) return "a resident experiment is running; stop it first";
-  const std::string refusal = request(SupervisorCommand::enable);
+  std::string refusal = request(SupervisorCommand::enable);
   if (!refusal.empty()) return refusal;
   Inputs first;
   first.y = y_;
@@ -240,7 +240,7 @@ std::string CanNode::start(const CanCommand& command) {
 }
 
 std::string CanNode::arm(const CanCommand& command) {
-  const std::string refusal = player_.arm(command);
+  std::string refusal = player_.arm(command);
   if (!refusal.empty()) return refusal;
   take_over(command);
   trace_session_ = session_;
