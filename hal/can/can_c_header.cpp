@@ -11,7 +11,8 @@
 namespace stageid {
 namespace {
 
-// Sizes are checked when the header is compiled. Members are aligned to their sizes: no packing is needed.
+// Only what importers of C types support: macros, and named structures of numbers and arrays. Sizes are checked when the
+// header is compiled. Members are aligned to their sizes: no packing is needed.
 constexpr const char* kStructures = R"(/* A message over ZeroMQ. All numbers are little-endian. */
 typedef struct {
   uint16_t id;
@@ -73,7 +74,7 @@ typedef struct {
   uint32_t outcome;
 } stageid_trace_row;
 
-typedef char stageid_sizes_are_right[sizeof(stageid_message) == 72 && sizeof(stageid_header) == 8 &&
+extern char stageid_sizes_are_right[sizeof(stageid_message) == 72 && sizeof(stageid_header) == 8 &&
                                      sizeof(stageid_command) == 40 && sizeof(stageid_state) == 40 &&
                                      sizeof(stageid_trace_row) == 4 * (STAGEID_ACTUATORS + STAGEID_SENSORS + 1)
                                          ? 1 : -1];
@@ -120,7 +121,7 @@ std::string can_c_header(const CanLayout& layout, const StageInfo& info,
   text += fmt::format("#define STAGEID_PROTOCOL_VERSION {}\n", kCanProtocolVersion);
   text += fmt::format("#define STAGEID_FINGERPRINT 0x{:08x}u\n", layout.fingerprint);
   text += fmt::format("#define STAGEID_SAMPLE_RATE_HZ {}\n", number(info.sample_rate_hz));
-  text += fmt::format("enum {{ STAGEID_ACTUATORS = {}, STAGEID_SENSORS = {} }};\n\n",
+  text += fmt::format("#define STAGEID_ACTUATORS {}\n#define STAGEID_SENSORS {}\n\n",
                       info.actuators.size(), info.sensors.size());
   add_channels(text, "ACTUATOR", info.actuators, layout.actuator_scale, limits.actuator_n);
   add_channels(text, "SENSOR", info.sensors, layout.sensor_scale, limits.position_window_m);

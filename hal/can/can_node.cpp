@@ -43,13 +43,14 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
 }
 
 void CanNode::serve(std::int64_t until_ns) {
+  if (!player_.busy() && until_ns > transport_.now_ns()) transport_.wait(until_ns);
+  // If this node is delayed after this instant, the host may have sent meanwhile: it is not silent.
   const std::int64_t now_ns = transport_.now_ns();
-  if (!player_.busy() && until_ns > now_ns) transport_.wait(until_ns);
   const std::size_t count = transport_.receive(inbox_);
   watch_bus();  // first, because a bus that is off takes precedence over received commands
   for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
-  player_.work(transport_.now_ns(), transport_);
-  stage_.tick(transport_.now_ns());
+  player_.work(now_ns, transport_);
+  stage_.tick(now_ns);
   announce();
   flush();
 }
@@ -220,7 +221,7 @@ std::string CanNode::start(const CanCommand& command) {
                      last_sequence_ == 0 && stage_.sample() == 0;
   if (again) return "";
   if (player_.busy()) return "a resident experiment is running; stop it first";
-  const std::string refusal = request(SupervisorCommand::enable);
+  std::string refusal = request(SupervisorCommand::enable);
   if (!refusal.empty()) return refusal;
   Inputs first;
   first.y = y_;
@@ -239,7 +240,7 @@ std::string CanNode::start(const CanCommand& command) {
 }
 
 std::string CanNode::arm(const CanCommand& command) {
-  const std::string refusal = player_.arm(command);
+  std::string refusal = player_.arm(command);
   if (!refusal.empty()) return refusal;
   take_over(command);
   trace_session_ = session_;

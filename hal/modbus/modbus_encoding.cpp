@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 namespace stageid {
-namespace {}  // namespace
 
 bool fits_counts(double value, double si_per_count) noexcept {
   return std::abs(std::nearbyint(value / si_per_count)) <= kLargestModbusCount;  // false for NaN

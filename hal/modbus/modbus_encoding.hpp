@@ -2,7 +2,9 @@
 
 #include <bit>
 #include <cstdint>
+#include <ranges>
 #include <span>
+#include <type_traits>
 
 namespace stageid {
 
@@ -17,35 +19,53 @@ inline constexpr double kLargestModbusCount = 2147483647.0;
 // libmodbus' own helpers are not used: setting and getting a float disagree in Debian's 3.1.6, and
 // between versions of the library.
 
-constexpr void put_u32(std::span<std::uint16_t, 2> r, std::uint32_t value) noexcept {
-  r[0] = static_cast<std::uint16_t>(value >> 16);
-  r[1] = static_cast<std::uint16_t>(value & 0xFFFFU);
-}
-constexpr std::uint32_t get_u32(std::span<const std::uint16_t, 2> r) noexcept {
-  return (static_cast<std::uint32_t>(r[0]) << 16) | r[1];
-}
+/// Numbers in a part of the register map, by their addresses. @tparam Word of registers; const: to read only
+template <typename Word>
+class RegisterBlock {
+ public:
+  /// `words` are the registers from address `first` on, and must outlive the block.
+  constexpr RegisterBlock(int first, std::span<Word> words) noexcept
+      : first_(first), words_(words) {}
 
-constexpr void put_u64(std::span<std::uint16_t, 4> r, std::uint64_t value) noexcept {
-  put_u32(r.first<2>(), static_cast<std::uint32_t>(value >> 32));
-  put_u32(r.last<2>(), static_cast<std::uint32_t>(value & 0xFFFFFFFFU));
-}
-constexpr std::uint64_t get_u64(std::span<const std::uint16_t, 4> r) noexcept {
-  return (static_cast<std::uint64_t>(get_u32(r.first<2>())) << 32) | get_u32(r.last<2>());
-}
+  constexpr std::uint32_t u32(int address) const noexcept {
+    return (static_cast<std::uint32_t>(at(address)) << 16) | at(address + 1);
+  }
+  constexpr std::uint64_t u64(int address) const noexcept {
+    return (static_cast<std::uint64_t>(u32(address)) << 32) | u32(address + 2);
+  }
+  constexpr std::int32_t i32(int address) const noexcept {
+    return std::bit_cast<std::int32_t>(u32(address));
+  }
+  constexpr double f32(int address) const noexcept {
+    return static_cast<double>(std::bit_cast<float>(u32(address)));
+  }
 
-constexpr void put_i32(std::span<std::uint16_t, 2> r, std::int32_t value) noexcept {
-  put_u32(r, std::bit_cast<std::uint32_t>(value));
-}
-constexpr std::int32_t get_i32(std::span<const std::uint16_t, 2> r) noexcept {
-  return std::bit_cast<std::int32_t>(get_u32(r));
-}
+  constexpr void set_u32(int address, std::uint32_t value) const noexcept {
+    at(address) = static_cast<std::uint16_t>(value >> 16);
+    at(address + 1) = static_cast<std::uint16_t>(value & 0xFFFFU);
+  }
+  constexpr void set_u64(int address, std::uint64_t value) const noexcept {
+    set_u32(address, static_cast<std::uint32_t>(value >> 32));
+    set_u32(address + 2, static_cast<std::uint32_t>(value & 0xFFFFFFFFU));
+  }
+  constexpr void set_i32(int address, std::int32_t value) const noexcept {
+    set_u32(address, std::bit_cast<std::uint32_t>(value));
+  }
+  constexpr void set_f32(int address, float value) const noexcept {
+    set_u32(address, std::bit_cast<std::uint32_t>(value));
+  }
 
-constexpr void put_f32(std::span<std::uint16_t, 2> r, float value) noexcept {
-  put_u32(r, std::bit_cast<std::uint32_t>(value));
-}
-constexpr float get_f32(std::span<const std::uint16_t, 2> r) noexcept {
-  return std::bit_cast<float>(get_u32(r));
-}
+ private:
+  constexpr Word& at(int address) const noexcept {
+    return words_[static_cast<std::size_t>(address - first_)];
+  }
+
+  int first_;
+  std::span<Word> words_;
+};
+template <typename Range>
+RegisterBlock(int, Range&&)
+    -> RegisterBlock<std::remove_reference_t<std::ranges::range_reference_t<Range>>>;
 
 /// Whether to_counts() represents `value` without saturation: finite and within +-(2^31 - 1) counts.
 bool fits_counts(double value, double si_per_count) noexcept;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 #include <modbus/modbus.h>
+#include <sys/socket.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -14,6 +16,8 @@
 
 namespace stageid {
 namespace {
+
+constexpr std::size_t kMostLateReplies = 16;
 
 struct Duration {
   std::uint32_t seconds = 0;
@@ -58,8 +62,9 @@ bool ModbusLink::try_connect() noexcept {
     return false;
   }
   connected_ = true;
-  modbus_flush(context_.get());
-  return true;
+  last_ = {};
+  discard();
+  return connected_;
 }
 
 void ModbusLink::close() noexcept {
@@ -90,7 +95,7 @@ LinkStatus ModbusLink::judge(int done, std::size_t wanted) noexcept {
 }
 
 LinkStatus ModbusLink::not_connected() noexcept {
-  last_ = {LinkStatus::disconnected, ENOTCONN};
+  if (last_.status != LinkStatus::flooded) last_ = {LinkStatus::disconnected, ENOTCONN};
   return last_.status;
 }
 
@@ -116,7 +121,21 @@ void ModbusLink::drain() noexcept {
   if (!connected_) return;
   const std::int64_t silent_ns = request_ns_ + std::llround(1e9 * timing_.worst_reply_s);
   std::this_thread::sleep_for(std::chrono::nanoseconds(silent_ns - monotonic_ns()));
-  modbus_flush(context_.get());
+  discard();
+}
+
+// libmodbus would read from a connection for as long as its peer sends.
+void ModbusLink::discard() noexcept {
+  if (address_.serial()) {
+    modbus_flush(context_.get());
+    return;
+  }
+  std::array<char, kMostLateReplies * MODBUS_TCP_MAX_ADU_LENGTH> bytes{};
+  const ssize_t count =
+      ::recv(modbus_get_socket(context_.get()), bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (count < static_cast<ssize_t>(bytes.size())) return;
+  close();
+  last_ = {LinkStatus::flooded, 0};
 }
 
 bool ModbusLink::refused_as_busy() const noexcept {
@@ -141,6 +160,9 @@ std::string ModbusLink::describe(const Trouble& trouble) const {
     case LinkStatus::disconnected:
       return line(fmt::format("not connected: {}; check that the server is running",
                               modbus_strerror(trouble.error)));
+    case LinkStatus::flooded:
+      return line(
+          "the peer sends more than it is asked for; check that it is a Modbus server and works");
   }
   return line("unknown error");
 }

@@ -12,17 +12,19 @@ namespace stageid {
 /// Result of a transaction.
 enum class LinkStatus : std::uint8_t {
   ok,
-  timeout,      ///< no complete reply within the response time
-  corrupt,      ///< the reply failed a check: CRC, length, transaction, unit
-  refused,      ///< an exception reply
-  disconnected  ///< the peer or the device is gone
+  timeout,       ///< no complete reply within the response time
+  corrupt,       ///< the reply failed a check: CRC, length, transaction, unit
+  refused,       ///< an exception reply
+  disconnected,  ///< the peer or the device is gone
+  flooded        ///< disconnected, because the peer never stopped sending
 };
 
 /// A Modbus client for one unit over TCP or RTU. Not safe for concurrent use.
 ///
 /// After any failure except a refusal, call drain() before the next transaction. Replies on a serial line have
 /// no number. A late one would be taken for the answer to the next request, and so would all that follow.
-/// drain() waits until no more replies can arrive and discards the received ones.
+/// drain() waits until no more replies can arrive and discards the received ones. If there are too many of them, it
+/// ends the connection.
 class ModbusLink {
  public:
   /// @throws std::invalid_argument if the address is refused or the times are invalid
@@ -42,6 +44,13 @@ class ModbusLink {
   [[nodiscard]] LinkStatus read(int first, std::span<std::uint16_t> registers) noexcept;
 
   void drain() noexcept;
+  /// Makes a request, and again after a drain if it fails.
+  template <typename Request>
+  LinkStatus repeat_once(Request request) {
+    if (const LinkStatus done = request(); done == LinkStatus::ok) return done;
+    drain();
+    return request();
+  }
 
   const ModbusAddress& address() const noexcept { return address_; }
   const ModbusTiming& timing() const noexcept { return timing_; }
@@ -57,6 +66,7 @@ class ModbusLink {
 
  private:
   void begin() noexcept;
+  void discard() noexcept;
   LinkStatus not_connected() noexcept;
   LinkStatus judge(int done, std::size_t wanted) noexcept;
 

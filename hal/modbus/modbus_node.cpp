@@ -24,10 +24,6 @@ bool touches(int first, std::size_t count, int address) {
   return first < address + 2 && address < first + static_cast<int>(count);
 }
 
-std::span<std::uint16_t, 2> pair_at(std::span<std::uint16_t> registers, int address) {
-  return registers.subspan(static_cast<std::size_t>(address)).first<2>();
-}
-
 void check_sizes(const StageNode& node) {
   const StageInfo& info = node.info();
   if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
@@ -77,21 +73,21 @@ ModbusNode::ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t
   u_.assign(actuator_scale_.size(), 0.0);
   y_.assign(sensor_scale_.size(), 0.0);
   inputs_.y = y_;
-  set_u32(map::kMeasurementBootId, boot_id_);
+  map_.set_u32(map::kMeasurementBootId, boot_id_);
 }
 
 void ModbusNode::describe_stage(const StageLimits& limits) {
   const StageInfo& info = node_.info();
-  set_u32(map::kMagic, map::kMagicValue);
-  set_u32(map::kVersion, map::kVersionValue);
-  set_u32(map::kBootId, boot_id_);
-  set_u32(map::kActuatorCount, static_cast<std::uint32_t>(info.actuators.size()));
-  set_u32(map::kSensorCount, static_cast<std::uint32_t>(info.sensors.size()));
-  set_u32(map::kSampleRate, std::bit_cast<std::uint32_t>(static_cast<float>(info.sample_rate_hz)));
-  set_u32(map::kChannelHash, map::channel_hash(info));
+  map_.set_u32(map::kMagic, map::kMagicValue);
+  map_.set_u32(map::kVersion, map::kVersionValue);
+  map_.set_u32(map::kBootId, boot_id_);
+  map_.set_u32(map::kActuatorCount, static_cast<std::uint32_t>(info.actuators.size()));
+  map_.set_u32(map::kSensorCount, static_cast<std::uint32_t>(info.sensors.size()));
+  map_.set_f32(map::kSampleRate, static_cast<float>(info.sample_rate_hz));
+  map_.set_u32(map::kChannelHash, map::channel_hash(info));
   const auto show = [&](const std::vector<float>& scales, int address, std::vector<double>& out) {
     for (const float scale : scales) {
-      set_u32(address + 2 * static_cast<int>(out.size()), std::bit_cast<std::uint32_t>(scale));
+      map_.set_f32(address + 2 * static_cast<int>(out.size()), scale);
       out.push_back(static_cast<double>(scale));
     }
   };
@@ -99,16 +95,6 @@ void ModbusNode::describe_stage(const StageLimits& limits) {
        actuator_scale_);
   show(modbus_scales(limits.position_window_m, info.sensors.size(), "sensor"), map::kSensorScale,
        sensor_scale_);
-}
-
-std::uint32_t ModbusNode::u32(int address) const noexcept {
-  return get_u32(std::span<const std::uint16_t>(registers_)
-                     .subspan(static_cast<std::size_t>(address))
-                     .first<2>());
-}
-
-void ModbusNode::set_u32(int address, std::uint32_t value) noexcept {
-  put_u32(pair_at(registers_, address), value);
 }
 
 bool ModbusNode::on(ModbusFault::Kind kind) const noexcept {
@@ -128,7 +114,7 @@ void ModbusNode::tick() {
 }
 
 void ModbusNode::watch_heartbeat(std::int64_t now_ns) {
-  const std::uint32_t heartbeat = u32(map::kHeartbeat);
+  const std::uint32_t heartbeat = map_.u32(map::kHeartbeat);
   const NodeState state = node_.state();
   const bool powered = state == NodeState::operation_enabled || state == NodeState::measuring;
   if (heartbeat != last_heartbeat_) {
@@ -174,21 +160,21 @@ ModbusException ModbusNode::write(int first, std::span<const std::uint16_t> valu
     return ModbusException::illegal_address;
   std::array<std::uint16_t, map::kWritableEnd> before{};
   std::copy_n(registers_.begin(), before.size(), before.begin());
-  const std::uint32_t heartbeat = u32(map::kHeartbeat);
-  const std::uint32_t command = u32(map::kCommandSequence);
-  const std::uint32_t run = u32(map::kRunSequence);
+  const std::uint32_t heartbeat = map_.u32(map::kHeartbeat);
+  const std::uint32_t command = map_.u32(map::kCommandSequence);
+  const std::uint32_t run = map_.u32(map::kRunSequence);
   std::copy(values.begin(), values.end(), registers_.begin() + first);
   const ModbusException refused = obey(first, values.size(), heartbeat, command, run);
   if (refused != ModbusException::none) std::copy(before.begin(), before.end(), registers_.begin());
-  set_u32(map::kRunKey, 0);  // the key must not be readable here
+  map_.set_u32(map::kRunKey, 0);  // the key must not be readable here
   return refused;
 }
 
 /// Acts on the changes between the previous values and the current registers.
 ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t heartbeat,
                                  std::uint32_t command, std::uint32_t run) {
-  const bool beats = u32(map::kHeartbeat) != heartbeat;
-  const bool runs = u32(map::kRunSequence) != run;
+  const bool beats = map_.u32(map::kHeartbeat) != heartbeat;
+  const bool runs = map_.u32(map::kRunSequence) != run;
   const bool moves = touches(first, count, map::kSetpointSequence);
   const bool of_the_run = first + static_cast<int>(count) > map::kRunCommand;
   if (beats && counting_ != 0 && counting_ != asking_) return ModbusException::busy;
@@ -197,7 +183,7 @@ ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t hea
     if (const ModbusException refused = take_run_command(); refused != ModbusException::none)
       return refused;
   if (beats) counting_ = asking_;
-  if (u32(map::kCommandSequence) != command) take_supervisor_command();
+  if (map_.u32(map::kCommandSequence) != command) take_supervisor_command();
   if (moves) take_setpoint();
   return ModbusException::none;
 }
@@ -205,31 +191,31 @@ ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t hea
 bool ModbusNode::may_control_the_run(bool commands, bool moves) const {
   const std::uint32_t holder = node_.session();
   const bool began_it = session_ != 0 && asking_ == owner_ && (holder == 0 || holder == session_);
-  if (began_it && u32(map::kRunKey) == session_) return true;
+  if (began_it && map_.u32(map::kRunKey) == session_) return true;
   if (began_it && !commands && !moves) return true;  // a duplicate command
-  return holder == 0 && commands && u32(map::kRunCommand) == map::kRunBegin;
+  return holder == 0 && commands && map_.u32(map::kRunCommand) == map::kRunBegin;
 }
 
 ModbusException ModbusNode::read(int first, std::span<std::uint16_t> values) {
   if (first < 0 || first + static_cast<int>(values.size()) > map::kEnd)
     return ModbusException::illegal_address;
   show_status();
-  set_u32(map::kSession, asking_ == owner_ ? session_ : 0);
+  map_.set_u32(map::kSession, asking_ == owner_ ? session_ : 0);
   std::copy_n(registers_.begin() + first, values.size(), values.begin());
   return ModbusException::none;
 }
 
 void ModbusNode::take_supervisor_command() {
-  const std::uint32_t command = u32(map::kCommand);
+  const std::uint32_t command = map_.u32(map::kCommand);
   const bool known = command >= 1 && command <= 4;
   const bool accepted =
       known && node_.request(static_cast<SupervisorCommand>(command - 1)).accepted;
-  set_u32(map::kCommandEcho, u32(map::kCommandSequence));
-  set_u32(map::kCommandReply, accepted ? map::kReplyAccepted : map::kReplyRefused);
+  map_.set_u32(map::kCommandEcho, map_.u32(map::kCommandSequence));
+  map_.set_u32(map::kCommandReply, accepted ? map::kReplyAccepted : map::kReplyRefused);
 }
 
 ModbusException ModbusNode::take_run_command() {
-  const std::uint32_t command = u32(map::kRunCommand);
+  const std::uint32_t command = map_.u32(map::kRunCommand);
   if (command != map::kRunBegin && command != map::kRunEnd) return ModbusException::illegal_value;
   if (command == map::kRunBegin) {
     const ModbusException refused = begin_run();
@@ -240,16 +226,14 @@ ModbusException ModbusNode::take_run_command() {
     std::fill(y_.begin(), y_.end(), 0.0);
   }
   missed_ = 0;
-  set_u32(map::kSetpointSequence, 0);
+  map_.set_u32(map::kSetpointSequence, 0);
   show_measurement(Outcome::ok, 0);
   return ModbusException::none;
 }
 
 ModbusException ModbusNode::begin_run() {
-  const std::uint64_t seed =
-      (static_cast<std::uint64_t>(u32(map::kRunSeed)) << 32) | u32(map::kRunSeed + 2);
   try {
-    session_ = node_.begin_run(seed, monotonic_ns(), inputs_);
+    session_ = node_.begin_run(map_.u64(map::kRunSeed), monotonic_ns(), inputs_);
   } catch (const StageError&) {  // the state and cause registers contain the reason
     return node_.session() != 0 ? ModbusException::busy : ModbusException::device_failure;
   }
@@ -258,44 +242,41 @@ ModbusException ModbusNode::begin_run() {
 }
 
 void ModbusNode::take_setpoint() {
-  const std::uint32_t sequence = u32(map::kSetpointSequence);
-  const std::uint32_t ahead = sequence - u32(map::kMeasurementSequence);
+  const std::uint32_t sequence = map_.u32(map::kSetpointSequence);
+  const std::uint32_t ahead = sequence - map_.u32(map::kMeasurementSequence);
   // Modular comparison: numbers up to 2^31 - 1 ahead are newer, all others older.
   if (ahead == 0 || ahead > 0x7FFFFFFFU) return;
   missed_ = std::min(kMostMissed, missed_ + (ahead - 1));
   for (std::size_t i = 0; i < u_.size(); ++i)
-    u_[i] =
-        actuator_scale_[i] * get_i32(pair_at(registers_, map::kSetpoint + 2 * static_cast<int>(i)));
+    u_[i] = actuator_scale_[i] * map_.i32(map::kSetpoint + 2 * static_cast<int>(i));
   show_measurement(node_.advance(monotonic_ns(), u_, inputs_), sequence);
 }
 
 void ModbusNode::show_measurement(Outcome outcome, std::uint32_t sequence) {
-  set_u32(map::kMeasurementSequence, sequence);
+  map_.set_u32(map::kMeasurementSequence, sequence);
   const auto state = static_cast<std::uint32_t>(node_.state());
   const auto cause = static_cast<std::uint32_t>(node_.cause());
-  set_u32(map::kMeasurementStatus,
-          static_cast<std::uint32_t>(outcome) | (state << 8) | (cause << 16) | (missed_ << 24));
-  set_u32(map::kValid, static_cast<std::uint32_t>(inputs_.valid >> 32));
-  set_u32(map::kValid + 2, static_cast<std::uint32_t>(inputs_.valid & 0xFFFFFFFFU));
+  map_.set_u32(map::kMeasurementStatus, static_cast<std::uint32_t>(outcome) | (state << 8) |
+                                            (cause << 16) | (missed_ << 24));
+  map_.set_u64(map::kValid, inputs_.valid);
   for (std::size_t i = 0; i < y_.size(); ++i)
-    put_i32(pair_at(registers_, map::kMeasurement + 2 * static_cast<int>(i)),
-            to_counts(y_[i], sensor_scale_[i]));
+    map_.set_i32(map::kMeasurement + 2 * static_cast<int>(i), to_counts(y_[i], sensor_scale_[i]));
 }
 
 void ModbusNode::show_status() {
   const NodePanel panel = node_.panel();
   const NodeState state = node_.state();
   const bool enabled = state == NodeState::operation_enabled || state == NodeState::measuring;
-  if (!on(ModbusFault::Kind::heartbeat)) set_u32(map::kHeartbeatEcho, u32(map::kHeartbeat));
-  set_u32(map::kState, static_cast<std::uint32_t>(state));
-  set_u32(map::kCause, static_cast<std::uint32_t>(node_.cause()));
-  set_u32(map::kFlags, (panel.interlock_closed ? map::kFlagInterlockClosed : 0U) |
-                           (enabled ? map::kFlagEnabled : 0U));
+  if (!on(ModbusFault::Kind::heartbeat))
+    map_.set_u32(map::kHeartbeatEcho, map_.u32(map::kHeartbeat));
+  map_.set_u32(map::kState, static_cast<std::uint32_t>(state));
+  map_.set_u32(map::kCause, static_cast<std::uint32_t>(node_.cause()));
+  map_.set_u32(map::kFlags, (panel.interlock_closed ? map::kFlagInterlockClosed : 0U) |
+                                (enabled ? map::kFlagEnabled : 0U));
   const auto show = [&](const std::vector<double>& values, int count_address, int address) {
-    set_u32(count_address, static_cast<std::uint32_t>(values.size()));
+    map_.set_u32(count_address, static_cast<std::uint32_t>(values.size()));
     for (std::size_t i = 0; i < values.size(); ++i)
-      put_f32(pair_at(registers_, address + 2 * static_cast<int>(i)),
-              static_cast<float>(values[i]));
+      map_.set_f32(address + 2 * static_cast<int>(i), static_cast<float>(values[i]));
   };
   show(panel.gravity_compensator_n, map::kGravityCount, map::kGravity);
   show(panel.temperature_k, map::kTemperatureCount, map::kTemperature);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_fault.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_pdu.hpp"
@@ -31,6 +32,8 @@ class ModbusNode final : public ModbusRegisters {
   /// no range in `limits`, or a fault needs a missing panel value.
   ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t boot_id,
              ModbusFaultScript* faults, double heartbeat_s = 1.0);
+  ModbusNode(const ModbusNode&) = delete;
+  ModbusNode& operator=(const ModbusNode&) = delete;
 
   void begin_request(ModbusConnection from) override;
   void tick() override;
@@ -54,12 +57,10 @@ class ModbusNode final : public ModbusRegisters {
   void show_status();
   bool on(ModbusFault::Kind kind) const noexcept;
 
-  std::uint32_t u32(int address) const noexcept;
-  void set_u32(int address, std::uint32_t value) noexcept;
-
   StageNode& node_;
   ModbusFaultScript* faults_;
   std::array<std::uint16_t, modbus_map::kEnd> registers_{};
+  RegisterBlock<std::uint16_t> map_{0, registers_};
   std::uint32_t boot_id_;
   ModbusConnection asking_ = 0;
   std::uint32_t session_ = 0;      // key of the last run begun by this front end; 0: none

@@ -25,16 +25,12 @@ class Block {
  public:
   Block(ModbusLink& link, int first, std::size_t count)
       : first_(first), registers_(read_registers(link, first, count)) {}
-  std::uint32_t operator[](int address) const {
-    return get_u32(std::span<const std::uint16_t>(registers_)
-                       .subspan(static_cast<std::size_t>(address - first_))
-                       .first<2>());
-  }
+  RegisterBlock<const std::uint16_t> numbers() const { return {first_, registers_}; }
+  std::uint32_t operator[](int address) const { return numbers().u32(address); }
   std::vector<double> scales(int address, std::size_t count) const {
     std::vector<double> values;
     for (std::size_t i = 0; i < count; ++i)
-      values.push_back(
-          static_cast<double>(std::bit_cast<float>((*this)[address + 2 * static_cast<int>(i)])));
+      values.push_back(numbers().f32(address + 2 * static_cast<int>(i)));
     return values;
   }
 
@@ -57,27 +53,18 @@ bool sound(const std::vector<double>& scales) {
                      [](double scale) { return scale > 0.0 && std::isfinite(scale); });
 }
 
-void check_map(ModbusLink& link, const Block& status) {
-  if (status[map::kMagic] != map::kMagicValue)
-    refuse(
-        link,
-        fmt::format("register {} does not contain {:#010x}, so this is not a stage; check the unit",
-                    map::kMagic, map::kMagicValue));
-  if (status[map::kVersion] != map::kVersionValue)
-    refuse(link, PeerStatus::other_version,
-           fmt::format(" (register map {}; expected {}); update the older program",
-                       status[map::kVersion], map::kVersionValue));
-}
-
-/// Repeats the request once if there is no valid answer.
 template <std::size_t Count, typename Answered>
 void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count>& request,
               int read_first, std::span<std::uint16_t> reply, Answered answered) {
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    if (attempt > 0) link.drain();
-    if (link.exchange(first, request, read_first, reply) == LinkStatus::ok && answered()) return;
-  }
-  throw StageError(link.describe(link.last()));
+  bool foreign = false;
+  const LinkStatus done = link.repeat_once([&] {
+    const LinkStatus once = link.exchange(first, request, read_first, reply);
+    foreign = once == LinkStatus::ok && !answered();
+    return foreign ? LinkStatus::corrupt : once;
+  });
+  if (done == LinkStatus::ok) return;
+  throw StageError(foreign ? fmt::format("{}: {}", to_string(link.address()), kForeignReplies)
+                           : link.describe(link.last()));
 }
 
 }  // namespace
@@ -87,9 +74,8 @@ std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size
   std::vector<std::uint16_t> registers(count);
   for (std::size_t at = 0; at < count; at += kMost) {
     const auto part = std::span(registers).subspan(at, std::min(kMost, count - at));
-    if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
-    link.drain();
-    if (link.read(first + static_cast<int>(at), part) == LinkStatus::ok) continue;
+    const auto once = [&] { return link.read(first + static_cast<int>(at), part); };
+    if (link.repeat_once(once) == LinkStatus::ok) continue;
     const std::string trouble = link.describe(link.last());
     link.close();
     throw StageError(trouble);
@@ -97,9 +83,21 @@ std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size
   return registers;
 }
 
+std::string map_trouble(RegisterBlock<const std::uint16_t> status) {
+  if (status.u32(map::kMagic) != map::kMagicValue)
+    return fmt::format(
+        "register {} does not contain {:#010x}, so this is not a stage; check the unit",
+        map::kMagic, map::kMagicValue);
+  if (status.u32(map::kVersion) != map::kVersionValue)
+    return fmt::format("{} (register map {}; expected {}); update the older program",
+                       meaning(PeerStatus::other_version).words, status.u32(map::kVersion),
+                       map::kVersionValue);
+  return "";
+}
+
 ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) {
   const Block status(link, map::kMagic, 6);
-  check_map(link, status);
+  if (const std::string wrong = map_trouble(status.numbers()); !wrong.empty()) refuse(link, wrong);
   const Block block(link, map::kActuatorCount,
                     static_cast<std::size_t>(map::kEnd - map::kActuatorCount));
   if (block[map::kActuatorCount] != expected.actuators.size() ||
@@ -110,7 +108,7 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) 
                        "names differ; use the same stage file on both sides",
                        block[map::kActuatorCount], block[map::kSensorCount],
                        expected.actuators.size(), expected.sensors.size()));
-  const auto rate_hz = static_cast<double>(std::bit_cast<float>(block[map::kSampleRate]));
+  const double rate_hz = block.numbers().f32(map::kSampleRate);
   if (!(std::abs(rate_hz - expected.sample_rate_hz) <= 1e-6 * expected.sample_rate_hz))
     refuse(link, PeerStatus::other_stage,
            fmt::format(": the node runs at {} Hz, the stage file has {} Hz; use the same stage "
@@ -148,17 +146,17 @@ std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uin
                                std::uint32_t session, std::vector<std::uint16_t>& reply) {
   std::random_device random;
   std::array<std::uint16_t, map::kRunRegisters> request{};
-  const std::span<std::uint16_t> out = request;
-  put_u32(out.first<2>(), command);
-  put_u32(out.subspan(map::kRunSequence - map::kRunCommand).first<2>(), random() | 1U);
-  put_u64(out.subspan(map::kRunSeed - map::kRunCommand).first<4>(), run_seed);
-  put_u32(out.subspan(map::kRunKey - map::kRunCommand).first<2>(), session);
-  const auto shown = std::span<const std::uint16_t>(reply)
-                         .subspan(map::kSession - map::kMeasurementBootId)
-                         .first<2>();
+  const RegisterBlock out(map::kRunCommand, request);
+  out.set_u32(map::kRunCommand, command);
+  out.set_u32(map::kRunSequence, random() | 1U);
+  out.set_u64(map::kRunSeed, run_seed);
+  out.set_u32(map::kRunKey, session);
+  const auto shown = [&] {
+    return RegisterBlock(map::kMeasurementBootId, reply).u32(map::kSession);
+  };
   transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
-           [&] { return get_u32(shown) != 0 && (session == 0 || get_u32(shown) == session); });
-  return get_u32(shown);
+           [&] { return shown() != 0 && (session == 0 || shown() == session); });
+  return shown();
 }
 
 }  // namespace
@@ -166,13 +164,14 @@ std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uin
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
   std::array<std::uint16_t, 4> request{};
-  put_u32(std::span(request).first<2>(), static_cast<std::uint32_t>(command) + 1);
-  put_u32(std::span(request).last<2>(), sequence);
+  const RegisterBlock out(map::kCommand, request);
+  out.set_u32(map::kCommand, static_cast<std::uint32_t>(command) + 1);
+  out.set_u32(map::kCommandSequence, sequence);
   std::array<std::uint16_t, 4> reply{};
-  const auto replied = std::span<const std::uint16_t, 4>(reply);
+  const RegisterBlock replied(map::kCommandEcho, reply);
   transact(link, map::kCommand, request, map::kCommandEcho, reply,
-           [&] { return get_u32(replied.first<2>()) == sequence; });
-  if (get_u32(replied.last<2>()) == map::kReplyAccepted) return;
+           [&] { return replied.u32(map::kCommandEcho) == sequence; });
+  if (replied.u32(map::kCommandReply) == map::kReplyAccepted) return;
   throw StageError(fmt::format("{}: the command was refused: {}", to_string(link.address()),
                                describe(read_state(link))));
 }

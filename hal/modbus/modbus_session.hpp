@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_link.hpp"
 #include "hal/stage/stage.hpp"
 #include "hal/stage/supervisor.hpp"
@@ -15,6 +17,13 @@ namespace stageid {
 /// Reads `count` registers starting at `first`, in as many transactions as needed.
 /// @throws StageError, with the link closed.
 std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count);
+
+inline constexpr const char* kForeignReplies =
+    "replies do not match the requests; check that only one program uses the link, and check the "
+    "unit";
+
+/// Describes a mismatch of the register map in the status registers; empty: none.
+std::string map_trouble(RegisterBlock<const std::uint16_t> status);
 
 struct ModbusDescription {
   std::uint32_t boot_id = 0;

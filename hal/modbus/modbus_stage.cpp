@@ -21,10 +21,6 @@ namespace {
 constexpr std::size_t kSetpointHead = map::kSetpoint - map::kRunKey;
 constexpr std::size_t kMeasurementHead = map::kMeasurement - map::kMeasurementBootId;
 
-std::span<const std::uint16_t, 2> pair_at(const std::vector<std::uint16_t>& block, int offset) {
-  return std::span<const std::uint16_t>(block).subspan(static_cast<std::size_t>(offset)).first<2>();
-}
-
 NodeState state_of(std::uint32_t status) { return static_cast<NodeState>((status >> 8) & 0xFFU); }
 FaultCause cause_of(std::uint32_t status) {
   return static_cast<FaultCause>((status >> 16) & 0xFFU);
@@ -80,8 +76,8 @@ ModbusStage::ModbusStage(StageInfo info, const ModbusAddress& address, const Mod
   reply_.assign(kMeasurementHead + 2 * info_.sensors.size(), 0);
 }
 
-std::uint32_t ModbusStage::measured(int address) const noexcept {
-  return get_u32(pair_at(reply_, address - map::kMeasurementBootId));
+RegisterBlock<const std::uint16_t> ModbusStage::measured() const noexcept {
+  return {map::kMeasurementBootId, reply_};
 }
 
 void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
@@ -123,12 +119,13 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
 }
 
 bool ModbusStage::write_setpoint(const Outputs& outputs) noexcept {
-  put_u32(std::span(request_).first<2>(), session_);
-  put_u32(std::span(request_).subspan<2, 2>(), sequence_);
+  const RegisterBlock request(map::kRunKey, request_);
+  request.set_u32(map::kRunKey, session_);
+  request.set_u32(map::kSetpointSequence, sequence_);
   for (std::size_t i = 0; i < outputs.u.size(); ++i) {
     if (!fits_counts(outputs.u[i], description_.actuator_scale[i])) return false;
-    put_i32(std::span(request_).subspan(kSetpointHead + 2 * i).first<2>(),
-            to_counts(outputs.u[i], description_.actuator_scale[i]));
+    request.set_i32(map::kSetpoint + 2 * static_cast<int>(i),
+                    to_counts(outputs.u[i], description_.actuator_scale[i]));
   }
   return true;
 }
@@ -177,7 +174,7 @@ PeerStatus ModbusStage::transact() noexcept {
 bool ModbusStage::restarted() noexcept {
   std::array<std::uint16_t, 2> boot_id{};
   if (link_.read(map::kMeasurementBootId, boot_id) != LinkStatus::ok) return false;
-  return get_u32(std::span<const std::uint16_t, 2>(boot_id)) != description_.boot_id;
+  return RegisterBlock(0, boot_id).u32(0) != description_.boot_id;
 }
 
 PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
@@ -188,6 +185,7 @@ PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
       return judge_reply();
     case LinkStatus::timeout:
     case LinkStatus::disconnected:
+    case LinkStatus::flooded:
       return PeerStatus::link_down;
     case LinkStatus::corrupt:
       return PeerStatus::damaged;
@@ -198,9 +196,9 @@ PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
 }
 
 PeerStatus ModbusStage::judge_reply() noexcept {
-  const std::uint32_t boot_id = measured(map::kMeasurementBootId);
-  if (boot_id == description_.boot_id && measured(map::kMeasurementSequence) == sequence_ &&
-      measured(map::kSession) == session_)
+  const std::uint32_t boot_id = measured().u32(map::kMeasurementBootId);
+  if (boot_id == description_.boot_id && measured().u32(map::kMeasurementSequence) == sequence_ &&
+      measured().u32(map::kSession) == session_)
     return PeerStatus::good;
   // Other devices return zeros, whereas a restarted node has a nonzero boot id of its own.
   const bool other = boot_id != description_.boot_id && boot_id != 0;
@@ -209,10 +207,9 @@ PeerStatus ModbusStage::judge_reply() noexcept {
 }
 
 PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
-  node_status_ = measured(map::kMeasurementStatus);
+  node_status_ = measured().u32(map::kMeasurementStatus);
   inputs.node_state = state_of(node_status_);
-  inputs.valid =
-      (static_cast<std::uint64_t>(measured(map::kValid)) << 32) | measured(map::kValid + 2);
+  inputs.valid = measured().u64(map::kValid);
   PeerReport report;
   report.outcome = static_cast<std::uint8_t>(node_status_ & 0xFFU);
   report.state = inputs.node_state;
@@ -221,7 +218,7 @@ PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
   report.all = ~std::uint64_t{0} >> (64 - inputs.y.size());
   report.setpoints_missed = node_status_ >> 24 > std::exchange(missed_, node_status_ >> 24);
   for (std::size_t i = 0; i < inputs.y.size(); ++i) {
-    const std::int32_t count = get_i32(pair_at(reply_, static_cast<int>(kMeasurementHead + 2 * i)));
+    const std::int32_t count = measured().i32(map::kMeasurement + 2 * static_cast<int>(i));
     inputs.y[i] = description_.sensor_scale[i] * count;
     report.out_of_range |= std::abs(static_cast<double>(count)) >= kLargestModbusCount;
   }
@@ -268,10 +265,7 @@ std::string ModbusStage::trouble() const {
     case Trouble::link:
       return link_.describe(link_trouble_);
     case Trouble::foreign_reply:
-      return fmt::format(
-          "{}: replies do not match the setpoints; check that only one program uses the link, and "
-          "check the unit",
-          to_string(link_.address()));
+      return fmt::format("{}: {}", to_string(link_.address()), kForeignReplies);
     case Trouble::node:
       return describe_report(status_, node_status_);
     case Trouble::not_carried:

@@ -55,7 +55,7 @@ class ModbusStage final : public CyclicStage {
   PeerStatus judge(LinkStatus status) noexcept;
   PeerStatus judge_reply() noexcept;
   PeerStatus take_measurement(Inputs& inputs) noexcept;
-  std::uint32_t measured(int address) const noexcept;
+  RegisterBlock<const std::uint16_t> measured() const noexcept;
   std::string describe_report(PeerStatus status, std::uint32_t node_status) const;
 
   StageInfo info_;

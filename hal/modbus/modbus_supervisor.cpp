@@ -10,6 +10,7 @@
 
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
+#include "hal/modbus/modbus_session.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/peer_status.hpp"
 
@@ -20,47 +21,28 @@ namespace map = modbus_map;
 namespace {
 
 using Seconds = std::chrono::duration<double>;
-using Status = std::span<const std::uint16_t>;
-
-std::span<const std::uint16_t, 2> pair_at(Status status, int address) {
-  return status.subspan(static_cast<std::size_t>(address - map::kMagic)).first<2>();
-}
-
-std::uint32_t u32(Status status, int address) { return get_u32(pair_at(status, address)); }
+using Status = RegisterBlock<const std::uint16_t>;
 
 std::vector<double> numbers(Status status, int count_address, int address) {
   const auto most = static_cast<std::uint32_t>(map::kMostPanelValues);
-  const std::uint32_t count = std::min(most, u32(status, count_address));
+  const std::uint32_t count = std::min(most, status.u32(count_address));
   std::vector<double> values;
-  for (int i = 0; i < static_cast<int>(count); ++i)
-    values.push_back(static_cast<double>(get_f32(pair_at(status, address + 2 * i))));
+  for (int i = 0; i < static_cast<int>(count); ++i) values.push_back(status.f32(address + 2 * i));
   return values;
 }
 
 PlantSnapshot parse(Status status) {
   PlantSnapshot snapshot;
-  const std::uint32_t flags = u32(status, map::kFlags);
+  const std::uint32_t flags = status.u32(map::kFlags);
   snapshot.t_ns = monotonic_ns();
-  snapshot.heartbeat = u32(status, map::kHeartbeatEcho);
+  snapshot.heartbeat = status.u32(map::kHeartbeatEcho);
   snapshot.interlock_closed = (flags & map::kFlagInterlockClosed) != 0;
   snapshot.enabled = (flags & map::kFlagEnabled) != 0;
-  snapshot.state = static_cast<NodeState>(u32(status, map::kState) & 0xFFU);
-  snapshot.cause = static_cast<FaultCause>(u32(status, map::kCause) & 0xFFU);
+  snapshot.state = static_cast<NodeState>(status.u32(map::kState) & 0xFFU);
+  snapshot.cause = static_cast<FaultCause>(status.u32(map::kCause) & 0xFFU);
   snapshot.gravity_compensator_n = numbers(status, map::kGravityCount, map::kGravity);
   snapshot.temperature_k = numbers(status, map::kTemperatureCount, map::kTemperature);
   return snapshot;
-}
-
-/// Describes a mismatch of the register map; empty: none.
-std::string map_trouble(Status status) {
-  if (u32(status, map::kMagic) != map::kMagicValue)
-    return fmt::format("register {} contains {:#010x}; expected {:#010x}. Check the unit",
-                       map::kMagic, u32(status, map::kMagic), map::kMagicValue);
-  if (u32(status, map::kVersion) != map::kVersionValue)
-    return fmt::format("{} (register map {}; expected {}); update the older program",
-                       meaning(PeerStatus::other_version).words, u32(status, map::kVersion),
-                       map::kVersionValue);
-  return "";
 }
 
 void check(const ModbusSupervisorOptions& o) {
@@ -147,15 +129,16 @@ bool ModbusSupervisor::connect() {
     set_trouble(link_.describe(link_.last()));
     return false;
   }
-  std::array<std::uint16_t, map::kStatusRegisters> status{};
-  if (link_.read(map::kMagic, status) != LinkStatus::ok) {
+  std::array<std::uint16_t, map::kStatusRegisters> registers{};
+  const Status status(map::kMagic, registers);
+  if (link_.read(map::kMagic, registers) != LinkStatus::ok) {
     set_trouble(link_.describe(link_.last()));
   } else if (std::string wrong = map_trouble(status); !wrong.empty()) {
     set_trouble(fmt::format("{}: {}", to_string(link_.address()), wrong));
   } else {
-    command_sequence_ = u32(status, map::kCommandEcho);
+    command_sequence_ = status.u32(map::kCommandEcho);
     // Far enough ahead that the first poll is valid only if the echo changes.
-    heartbeat_ = u32(status, map::kHeartbeatEcho) + kEchoPolls;
+    heartbeat_ = status.u32(map::kHeartbeatEcho) + kEchoPolls;
     return true;
   }
   link_.drain();
@@ -174,12 +157,8 @@ bool ModbusSupervisor::poll() {
   }
   ++heartbeat_;
   std::array<std::uint16_t, map::kStatusRegisters> status{};
-  LinkStatus done = transact(status);
-  if (done != LinkStatus::ok) {
-    link_.drain();
-    done = transact(status);
-  }
-  if (done == LinkStatus::ok) return take_status(status);
+  if (link_.repeat_once([&] { return transact(status); }) == LinkStatus::ok)
+    return take_status({map::kMagic, status});
   set_trouble(link_.describe(link_.last()));
   link_.drain();
   link_.close();
@@ -190,19 +169,19 @@ bool ModbusSupervisor::poll() {
 
 LinkStatus ModbusSupervisor::transact(std::span<std::uint16_t> status) {
   std::array<std::uint16_t, map::kSupervisorRegisters> request{};
-  const std::span<std::uint16_t> out = request;
-  put_u32(out.subspan(map::kHeartbeat).first<2>(), heartbeat_);
-  put_u32(out.subspan(map::kCommand).first<2>(), command_);
-  put_u32(out.subspan(map::kCommandSequence).first<2>(), command_sequence_);
+  const RegisterBlock out(map::kHeartbeat, request);
+  out.set_u32(map::kHeartbeat, heartbeat_);
+  out.set_u32(map::kCommand, command_);
+  out.set_u32(map::kCommandSequence, command_sequence_);
   return link_.exchange(map::kHeartbeat, request, map::kMagic, status);
 }
 
-bool ModbusSupervisor::take_status(std::span<const std::uint16_t> status) {
+bool ModbusSupervisor::take_status(RegisterBlock<const std::uint16_t> status) {
   std::string wrong = map_trouble(status);
-  const std::uint32_t age = heartbeat_ - u32(status, map::kHeartbeatEcho);
+  const std::uint32_t age = heartbeat_ - status.u32(map::kHeartbeatEcho);
   if (wrong.empty() && age > kEchoPolls)
     wrong = fmt::format("the heartbeat stopped at {}: the program behind the server hangs",
-                        u32(status, map::kHeartbeatEcho));
+                        status.u32(map::kHeartbeatEcho));
   const std::lock_guard lock(mutex_);
   if (!wrong.empty()) {
     trouble_ = fmt::format("{}: {}", to_string(link_.address()), wrong);
@@ -210,8 +189,8 @@ bool ModbusSupervisor::take_status(std::span<const std::uint16_t> status) {
   }
   trouble_.clear();
   snapshot_ = parse(status);
-  if (wanted_ && sent_ && u32(status, map::kCommandEcho) == command_sequence_) {
-    const bool accepted = u32(status, map::kCommandReply) == map::kReplyAccepted;
+  if (wanted_ && sent_ && status.u32(map::kCommandEcho) == command_sequence_) {
+    const bool accepted = status.u32(map::kCommandReply) == map::kReplyAccepted;
     std::string why;
     if (!accepted)
       why = fmt::format("refused in state {}{}", to_string(snapshot_.state),

@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_link.hpp"
 #include "hal/stage/supervisor.hpp"
 
@@ -45,7 +46,7 @@ class ModbusSupervisor final : public Supervisor {
   bool connect();
   bool poll();
   LinkStatus transact(std::span<std::uint16_t> status);
-  bool take_status(std::span<const std::uint16_t> status);
+  bool take_status(RegisterBlock<const std::uint16_t> status);
   void set_trouble(std::string trouble);
   double reply_allowance_s() const noexcept;
 

@@ -1,5 +1,6 @@
 /* A stage that moves by the wall clock, with or without setpoints. The seed of the run selects its motion:
- *   1: 20 mm/s, out of the window after 0.25 s;   2: 4 mm at 50 Hz, inside of it, but too fast;   others: none. */
+ *   1: 20 mm/s, out of the window after 0.25 s;   2: 4 mm at 12 Hz, inside of it, but half again too fast;   others: none.
+ * A test in the same process moves it by offset_m. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <string.h>
@@ -7,6 +8,7 @@
 
 #include "stage_limits.h"
 
+double offset_m;
 static double began_s, force_n[STAGE_ACTUATORS];
 static uint64_t motion;
 
@@ -28,9 +30,9 @@ void stage_hardware_measure(double y_m[STAGE_SENSORS]) {
   const double t = now_s() - began_s;
   int i;
   for (i = 0; i < STAGE_SENSORS; ++i) {
-    y_m[i] = 0.0;
+    y_m[i] = offset_m;
     if (motion == 1) y_m[i] = 20e-3 * t;
-    if (motion == 2) y_m[i] = 4e-3 * sin(100.0 * 3.14159265 * t);
+    if (motion == 2) y_m[i] = 4e-3 * sin(24.0 * 3.14159265 * t);
   }
 }
 

@@ -2,9 +2,10 @@
 """The example firmware, docs/examples/firmware: built outside the tree, measured over Modbus TCP, disturbed, and
 compared request by request with `stageid node`.
 
-firmware_test.py STAGEID SOURCE_DIR WORK_DIR
+firmware_test.py STAGEID SOURCE_DIR WORK_DIR [TEST ...]
 """
 
+import ctypes
 import json
 import pathlib
 import re
@@ -32,6 +33,26 @@ def run(*words):
     return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=50)
 
 
+class NodeHere(ModbusClient):
+    """The logic of the node in this process, on a clock of its own, and the position of its stage."""
+
+    def __init__(self, library):
+        self.library = ctypes.CDLL(str(library))
+        self.position_m = ctypes.c_double.in_dll(self.library, "offset_m")
+        self.node, self.now_us = ctypes.create_string_buffer(1 << 16), 2 ** 32 - 5000
+        self.library.stage_node_init(self.node, 4711, 1000000)
+        self.tick(0)
+
+    def tick(self, elapsed_us):
+        self.now_us = (self.now_us + elapsed_us) % 2 ** 32
+        self.library.stage_node_tick(self.node, ctypes.c_uint32(self.now_us), 1)
+
+    def send(self, pdu, unit=1):
+        reply = ctypes.create_string_buffer(253)
+        size = self.library.stage_node_answer(self.node, 1, pdu, ctypes.c_size_t(len(pdu)), reply)
+        return reply.raw[:size]
+
+
 class Firmware(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -39,7 +60,9 @@ class Firmware(unittest.TestCase):
         cls.example = ExampleFirmware(SOURCE, WORK)
         cls.stage_text = (WORK / "stage.yaml").read_text()
         cls.example.build("node", MODBUS)
-        cls.example.build("drifting_node", MODBUS, plant=SOURCE / "tests/integration/drifting_plant.c")
+        drifting = SOURCE / "tests/integration/drifting_plant.c"
+        cls.example.build("drifting_node", MODBUS, plant=drifting)
+        cls.example.build("node.so", MODBUS[1:], "-shared", "-fPIC", plant=drifting)
 
     def setUp(self):
         self.nodes = []
@@ -161,6 +184,20 @@ class Firmware(unittest.TestCase):
                 self.check_forces_are_zero(node, FAULT, LIMIT)
                 self.assertEqual(number(host.setpoint(key, 2), 6), 8 | FAULT << 8 | LIMIT << 16)
 
+    def test_the_speed_limit_is_exact(self):
+        # 0.2 m/s by ticks of 1 ms, and noise of 0.1 um between ticks of 10 us.
+        for step_m, tick_us, ticks, state in ((0.19e-3, 1000, 20, MEASURING), (0.21e-3, 1000, 1, FAULT),
+                                              (0.1e-6, 10, 1000, MEASURING)):
+            with self.subTest(step_m=step_m):
+                node = NodeHere(self.work / "node.so")
+                self.assertEqual(node.command(ENABLE), 1)
+                node.run_command(BEGIN, 5)
+                for n in range(ticks):
+                    node.position_m.value = step_m * (n + 1 if tick_us == 1000 else n % 2)
+                    node.tick(tick_us)
+                self.assertEqual(node.state(), state)
+                node.position_m.value = 0
+
     def test_a_lost_heartbeat_stops_the_stage(self):
         node, port = self.firmware()
         client, other = self.client(port), self.client(port)
@@ -274,4 +311,4 @@ class Firmware(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)

@@ -2,7 +2,9 @@
 import binascii
 import contextlib
 import os
+import pathlib
 import pty
+import resource
 import select
 import socket
 import struct
@@ -19,6 +21,10 @@ def words(*numbers):
 
 def number(registers, index=0):
     return registers[index] << 16 | registers[index + 1]
+
+
+def resident_bytes(process):
+    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Connection:
@@ -107,10 +113,11 @@ def modbus_crc(frame):
 
 
 class SharedLine:
-    """A serial line between a host and a node: the frames of other units pass by before the host has its reply."""
+    """A serial line between a host and a node: the frames of other units pass by before the host has its reply. After
+    so many replies, the node is cut off and the frames never end."""
 
-    def __init__(self, frames):
-        self.frames = b"".join(frames)
+    def __init__(self, frames, replies=float("inf")):
+        self.frames, self.replies = b"".join(frames), replies
         pairs = [pty.openpty() for _ in range(2)]
         (self.host, _), (self.node, _) = pairs
         self.ends = []
@@ -130,10 +137,15 @@ class SharedLine:
 
     def carry(self):
         while not self.closed:
-            ready, _, _ = select.select([self.host, self.node], [], [], 0.1)
+            if self.replies <= 0 and select.select([], [self.host], [], 0.1)[1]:
+                os.write(self.host, self.frames)
+            ready, _, _ = select.select([self.host, self.node], [], [], 0.1 if self.replies > 0 else 0)
             for end in ready:
                 data = os.read(end, 4096)
+                if self.replies <= 0:
+                    continue
                 if end == self.node:
+                    self.replies -= 1
                     os.write(self.node, self.frames)
                 os.write(self.node if end == self.host else self.host, data)
 

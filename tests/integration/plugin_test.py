@@ -90,7 +90,7 @@ class Plugin(unittest.TestCase):
         done = run("run", experiment, "-o", log, "--resume")
         self.assertEqual(done.returncode, 0, done.stderr)
 
-    # The stage of the stop matrix: 20 kg, 650 N, a window of 200 um (docs/benchmarks.md).
+    # The stage of the stop matrix: 20 kg, 650 N, a window of 200 um (docs/stops.md).
     AXIS = """
 format: stageid-stage
 name: one axis
@@ -134,11 +134,12 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         """The device has stopped by itself, within two windows."""
         said = self.peers[-1].stdout.readline()
         print(said, end="", file=sys.stderr)
-        found = re.match(r"the host stopped sending.*: (\d+) um, (\d+) N, (\S+) mm/s$", said)
+        found = re.match(r"the host stopped sending.*: (\d+) um, (\d+) N, (\d+) ms, (\S+) mm/s$", said)
         self.assertTrue(found, said)
         self.assertLess(int(found[1]), 400)
         self.assertLessEqual(int(found[2]), 650)
-        self.assertLess(float(found[3]), 1.0)
+        self.assertLess(float(found[4]), 1.0)
+        return [float(value) for value in found.groups()[:3]]
 
     def wait_for_samples(self, log):
         while not log.exists() or log.stat().st_size < 100_000:
@@ -162,7 +163,10 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         _, said = host.communicate(timeout=60)
         self.assertEqual(host.returncode, 1, said)
         self.assertRegex(said, "link down")
-        self.device_rests()
+        told = re.search(r"^\| wire lost \| - \| (\d+) um, (\d+) N, (\d+) ms, 1, 1 \|",
+                         (pathlib.Path(SOURCE) / "docs/stops.md").read_text(), re.M)
+        for here, there in zip(self.device_rests(), told.groups()):
+            self.assertLess(abs(here - float(there)), 2 + 0.05 * here)
         self.check_log(log, 1)
 
     def test_a_killed_device_ends_the_run(self):

@@ -68,8 +68,10 @@ class Device {
     node_->tick(monotonic_ns());
     const bool rests = node_->state() == NodeState::fault;
     if (rests && !rested_) {
-      fmt::print("{}: {:.0f} um, {:.0f} N, {:.3g} mm/s\n", node_->trouble(),
-                 1e6 * watch_->largest_m, watch_->largest_n, 1e3 * watch_->speed_m_s());
+      const auto silent = static_cast<double>(watch_->cycles - node_->sample());
+      fmt::print("{}: {:.0f} um, {:.0f} N, {:.0f} ms, {:.3g} mm/s\n", node_->trouble(),
+                 1e6 * watch_->largest_m, watch_->largest_n,
+                 1e3 * silent / node_->info().sample_rate_hz, 1e3 * watch_->speed_m_s());
       std::fflush(stdout);
     }
     rested_ = rests;

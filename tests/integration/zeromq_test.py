@@ -7,6 +7,7 @@ started again, with a second host, under garbage.
 
 import contextlib
 import csv
+import ctypes
 import json
 import pathlib
 import random
@@ -23,7 +24,7 @@ import unittest
 
 from example_firmware import CAN, ExampleFirmware
 from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
-                   can_command, sealed)
+                   can_command, resident_bytes, sealed)
 
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 UPLOAD_CHUNK = 0x300
@@ -46,10 +47,6 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
-
-
-def resident_bytes(process):
-    return int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 class Peer(ZeroMqPeer):
@@ -214,6 +211,7 @@ class ZeroMq(unittest.TestCase):
         dice, sizes = random.Random(5), (0, 1, 8, 71, 72, 72, 73, 300)
         peer = Peer(self.port)
         before = peer.state_after(command(HELLO, 1))[1]
+        memory = resident_bytes(node.pid)
         forged = [command(code, 7, 3, 0, 800, 0, session=dice.getrandbits(32))
                   for code in (START, STOP, UPLOAD, ARM, TRIGGER, DOWNLOAD)]
         chunk = message(UPLOAD_CHUNK, sealed(UPLOAD_CHUNK, struct.pack("<HBBH", 0, 0, 4, 56), bytes(56), 64))
@@ -229,6 +227,7 @@ class ZeroMq(unittest.TestCase):
                 answer, rejected = peer.state_after(command(HELLO, 1000 + i // 100))
                 self.assertEqual(answer, 1)
         self.assertGreater(rejected - before, 100_000)
+        self.assertLess(resident_bytes(node.pid) - memory, 8 << 20)
         self.assertIsNone(host.poll(), "the run lasts longer than the attack")
         peer.close()
         self.ends(host, 0)
@@ -314,6 +313,37 @@ class ZeroMq(unittest.TestCase):
         stage = (WORK / "stage.yaml").read_text()
         (WORK / "stage.yaml").write_text(stage.replace("mode: resident ", "mode: streaming "))
         self.ends(self.start(), 2, "ZeroMQ carries resident experiments over a single bus; set mode: resident")
+
+    def test_the_header_describes_the_messages(self):
+        """Only structures of numbers and arrays, with names and without padding: what importers of C types support."""
+        for compiler in (["cc", "-std=c99"], ["c++", "-x", "c++"]):
+            subprocess.run([*compiler, "-Wall", "-Wpedantic", "-Wpadded", "-Werror", "-fsyntax-only", "stage.h"], cwd=WORK,
+                           check=True)
+        text = subprocess.run(["cc", "-E", "-P", "stage.h"], cwd=WORK, check=True, capture_output=True, text=True).stdout
+        text = text[text.rindex("typedef struct", 0, text.index("stageid_message")):]  # without the system's
+        structure, member = r"typedef struct \{([^{}]*)\} (stageid_\w+);", r"(\w+) (\w+)(?:\[(\d+)\])?;"
+        numbers = {f"uint{bits}_t": getattr(ctypes, f"c_uint{bits}") for bits in (8, 16, 32, 64)} | {"float": ctypes.c_float}
+        types = {}
+        for members, name in re.findall(structure, text):
+            self.assertEqual(re.sub(member, "", members).split(), [], name)
+            fields = [(field, numbers[kind] * int(size) if size else numbers[kind])
+                      for kind, field, size in re.findall(member, members)]
+            types[name] = type(name, (ctypes.LittleEndianStructure,), {"_fields_": fields})
+        rest = re.sub(structure, "", text).split(";")
+        self.assertEqual([declaration.split()[:2] for declaration in rest if declaration.strip()], [["extern", "char"]])
+
+        order = types["stageid_command"](a=1, b=2, c=3, d=4, host=5, session=6, version=2)
+        self.assertEqual(can_command(HELLO, 7, 1, 2, 3, 4, 5, 6), sealed(CAN_COMMAND, bytes(
+            types["stageid_header"](sequence=7, kind=HELLO))[:6], bytes(order), 48))
+        self.node()
+        with contextlib.closing(Peer(self.port)) as peer:
+            for data in (b"?", command(HELLO, 1, host=77)):
+                peer.send(data)
+            got = types["stageid_message"].from_buffer_copy(peer.frame())
+        state = types["stageid_state"].from_buffer_copy(bytes(got.data)[8:])
+        fingerprint = int(re.search(r"FINGERPRINT 0x(\w+)u", (WORK / "stage.h").read_text())[1], 16)
+        self.assertEqual((got.id, got.length, state.version, state.answer, state.rejected, state.fingerprint, state.host),
+                         (CAN_STATE, 48, 2, 1, 1, fingerprint, 77))
 
     def test_a_header_of_another_stage_is_refused(self):
         other = ExampleFirmware(SOURCE, WORK / "other")

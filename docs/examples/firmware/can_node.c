@@ -249,7 +249,7 @@ void can_node_tick(struct can_node* node, uint32_t now_us, int interlock_closed)
   }
   if (!resident && node->state == MEASURING && now_us - node->setpoint_us > node->watchdog_us)
     can_safe_stop(node, FAULT, HOST_SILENT);
-  if (node->state == MEASURING) {
+  if (node->state == MEASURING && now_us - node->sample_us >= STAGE_WATCH_US) {
     const enum stage_cause cause = stage_watch(1e-6 * (now_us - node->sample_us), node->y_m);
     node->sample_us = now_us;
     if (cause != NO_CAUSE) can_safe_stop(node, FAULT, cause);

@@ -17,21 +17,23 @@
 
 #include "stage_node.h"
 
-enum { CLIENTS = 16, UNIT = 1, HEADER = 7, GATEWAY_TARGET = 11, PATIENCE_MS = 1000 };
+enum { CLIENTS = 16, UNIT = 1, HEADER = 7, GATEWAY_TARGET = 11, PATIENCE_US = 1000000 };
 struct client {
   int socket;          /* -1: unused */
   uint32_t connection; /* never used twice */
-  uint32_t request_ms, byte_ms;
+  uint32_t request; /* number of the last one */
+  uint32_t byte_us; /* when the last one arrived */
   size_t bytes;
   uint8_t data[HEADER + STAGE_LARGEST_PDU];
 };
 static struct client clients[CLIENTS];
 static struct stage_node node;
+static uint32_t requests;
 
-static uint32_t now_ms(void) {
+static uint32_t now_us(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
-  return (uint32_t)t.tv_sec * 1000u + (uint32_t)(t.tv_nsec / 1000000);
+  return (uint32_t)t.tv_sec * 1000000u + (uint32_t)(t.tv_nsec / 1000);
 }
 
 static void hang_up(struct client* client) {
@@ -47,7 +49,7 @@ static struct client* place(void) {
   for (i = 0; i < CLIENTS; ++i) {
     if (clients[i].socket < 0) return &clients[i];
     if (!stage_node_needs(&node, clients[i].connection) &&
-        (oldest == NULL || (int32_t)(clients[i].request_ms - oldest->request_ms) < 0))
+        (oldest == NULL || requests - clients[i].request > requests - oldest->request))
       oldest = &clients[i];
   }
   if (oldest != NULL) hang_up(oldest);
@@ -66,7 +68,8 @@ static void accept_client(int listener) {
   setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on); /* a reply must not wait for the next one */
   client->socket = socket;
   client->connection = ++connections;
-  client->request_ms = client->byte_ms = node.now_ms;
+  client->request = requests;
+  client->byte_us = node.now_us;
   client->bytes = 0;
 }
 
@@ -88,7 +91,7 @@ static int answer(struct client* client) {
     }
     reply[4] = 0;
     reply[5] = (uint8_t)(pdu + 1);
-    client->request_ms = node.now_ms;
+    client->request = ++requests;
     memmove(data, data + whole, client->bytes -= whole);
     if (send(client->socket, reply, HEADER + pdu, MSG_NOSIGNAL) != (ssize_t)(HEADER + pdu)) return 0;
   }
@@ -99,7 +102,7 @@ static void serve(struct client* client) {
   const ssize_t got = recv(client->socket, client->data + client->bytes, sizeof client->data - client->bytes, 0);
   if (got > 0) {
     client->bytes += (size_t)got;
-    client->byte_ms = node.now_ms;
+    client->byte_us = node.now_us;
   }
   if (got <= 0 || !answer(client)) hang_up(client);
 }
@@ -123,7 +126,7 @@ int main(int count, char** arguments) {
   for (i = 0; i < CLIENTS; ++i) clients[i].socket = -1;
   /* Longer than worst_reply_s + response_s + a sample of stage.yaml, so that a lost reply can be repeated. */
   stage_node_init(&node, ((uint32_t)time(NULL) << 8 ^ (uint32_t)getpid()) | 1u,
-                  count > 2 ? (uint32_t)atoi(arguments[2]) : 710);
+                  1000u * (count > 2 ? (uint32_t)atoi(arguments[2]) : 710));
   for (;;) {
     struct pollfd waiting[CLIENTS + 1];
     for (i = 0; i < CLIENTS; ++i) {
@@ -133,11 +136,11 @@ int main(int count, char** arguments) {
     waiting[CLIENTS].fd = listener;
     waiting[CLIENTS].events = POLLIN;
     poll(waiting, CLIENTS + 1, 1);
-    stage_node_tick(&node, now_ms(), 1);
+    stage_node_tick(&node, now_us(), 1);
     for (i = 0; i < CLIENTS; ++i) {
       if (clients[i].socket < 0) continue;
       if (waiting[i].revents != 0) serve(&clients[i]);
-      else if (clients[i].bytes > 0 && node.now_ms - clients[i].byte_ms > PATIENCE_MS) hang_up(&clients[i]);
+      else if (clients[i].bytes > 0 && node.now_us - clients[i].byte_us > PATIENCE_US) hang_up(&clients[i]);
     }
     if (waiting[CLIENTS].revents != 0) accept_client(listener);
     if (shown_state == (int)node.state) continue;

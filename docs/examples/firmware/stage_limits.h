@@ -30,7 +30,8 @@ double stage_hardware_force_n(int actuator);            /* the one that acts now
 /* The limits. `y_m` are the last positions and become the new ones. A cause other than NO_CAUSE: stop the stage. */
 /* u[n] -> y[n+1]. A force beyond its limit is not applied, and not clamped either: y is then NaN. */
 enum stage_cause stage_move(const double u_n[STAGE_ACTUATORS], double y_m[STAGE_SENSORS]);
-/* For every tick without a setpoint, `elapsed_s` after y. */
+/* Without a setpoint: once per STAGE_WATCH_US, `elapsed_s` after y. In less time, noise would look like speed. */
+enum { STAGE_WATCH_US = 1000 };
 enum stage_cause stage_watch(double elapsed_s, double y_m[STAGE_SENSORS]);
 
 #endif

@@ -18,7 +18,7 @@ enum { ILLEGAL_FUNCTION = 1, ILLEGAL_ADDRESS = 2, ILLEGAL_VALUE = 3, DEVICE_FAIL
 enum { ENABLE = 1, DISABLE = 2, QUICK_STOP = 3, RESET_FAULT = 4 };
 enum { RUN_BEGIN = 1, RUN_END = 2 };
 enum { OUTCOME_OK = 0, OUTCOME_FAULT = 8, OUTCOME_LIMIT = 9 };
-enum { HEARTBEAT_TIMEOUT_MS = 1000 };
+enum { HEARTBEAT_TIMEOUT_US = 1000000 };
 static const int32_t largest_count = 2147483647;
 
 static uint32_t get(const struct stage_node* node, int address) {
@@ -73,12 +73,12 @@ static void set_measurement(struct stage_node* node, uint32_t sequence, uint32_t
   set(node, VALID + 2, valid);
 }
 
-void stage_node_init(struct stage_node* node, uint32_t boot_id, uint32_t watchdog_ms) {
+void stage_node_init(struct stage_node* node, uint32_t boot_id, uint32_t watchdog_us) {
   int i;
   memset(node, 0, sizeof *node);
   node->state = SWITCH_ON_DISABLED;
   node->random = boot_id;
-  node->watchdog_ms = watchdog_ms;
+  node->watchdog_us = watchdog_us;
   set(node, MAGIC, 0x53544749u);
   set(node, MAP_VERSION, 2);
   set(node, BOOT_ID, boot_id);
@@ -101,27 +101,27 @@ static void safe_stop(struct stage_node* node, enum stage_state next, enum stage
 
 static void obey_limits(struct stage_node* node, enum stage_cause cause) {
   if (cause != NO_CAUSE) safe_stop(node, FAULT, cause);
-  node->sample_ms = node->now_ms;
+  node->sample_us = node->now_us;
 }
 
 static int powered(const struct stage_node* node) {
   return node->state == OPERATION_ENABLED || node->state == MEASURING;
 }
 
-void stage_node_tick(struct stage_node* node, uint32_t now_ms, int interlock_closed) {
-  node->now_ms = now_ms;
+void stage_node_tick(struct stage_node* node, uint32_t now_us, int interlock_closed) {
+  node->now_us = now_us;
   node->interlock_closed = interlock_closed;
   if (!powered(node)) {
     node->heartbeat_started = 0;
     node->supervisor = 0;
   } else if (!interlock_closed) {
     safe_stop(node, FAULT, INTERLOCK);
-  } else if (node->heartbeat_started && now_ms - node->heartbeat_ms > HEARTBEAT_TIMEOUT_MS) {
+  } else if (node->heartbeat_started && now_us - node->heartbeat_us > HEARTBEAT_TIMEOUT_US) {
     safe_stop(node, FAULT, HEARTBEAT_LOST);
-  } else if (node->state == MEASURING && now_ms - node->setpoint_ms > node->watchdog_ms) {
+  } else if (node->state == MEASURING && now_us - node->setpoint_us > node->watchdog_us) {
     safe_stop(node, FAULT, HOST_SILENT);
-  } else if (node->state == MEASURING) { /* one more, because times are rounded down */
-    obey_limits(node, stage_watch(1e-3 * (now_ms - node->sample_ms + 1), node->y_m));
+  } else if (node->state == MEASURING && now_us - node->sample_us >= STAGE_WATCH_US) {
+    obey_limits(node, stage_watch(1e-6 * (now_us - node->sample_us), node->y_m));
   }
 }
 
@@ -148,7 +148,7 @@ static int take_run_command(struct stage_node* node, uint32_t connection) {
     node->state = MEASURING;
     node->session = draw_key(node);
     node->owner = connection;
-    node->setpoint_ms = node->sample_ms = node->now_ms;
+    node->setpoint_us = node->sample_us = node->now_us;
   } else if (node->state == MEASURING) {
     safe_stop(node, OPERATION_ENABLED, NO_CAUSE);
   }
@@ -170,7 +170,7 @@ static void take_setpoint(struct stage_node* node) {
   if (node->state == MEASURING) {
     for (i = 0; i < STAGE_ACTUATORS; ++i) u_n[i] = STAGE_FORCE_SCALE_N * signed_count(get(node, SETPOINT + 2 * i));
     obey_limits(node, stage_move(u_n, node->y_m));
-    node->setpoint_ms = node->now_ms;
+    node->setpoint_us = node->now_us;
     outcome = node->state == MEASURING ? OUTCOME_OK : OUTCOME_LIMIT;
   }
   set_measurement(node, sequence, outcome, outcome == OUTCOME_FAULT ? NULL : node->y_m);
@@ -198,7 +198,7 @@ static int obey(struct stage_node* node, uint32_t connection, const uint16_t* be
   if (beats) {
     node->supervisor = connection;
     node->heartbeat_started = 1;
-    node->heartbeat_ms = node->now_ms;
+    node->heartbeat_us = node->now_us;
   }
   if (orders) {
     set(node, COMMAND_REPLY, take_command(node, get(node, COMMAND)) ? 1 : 2);

@@ -50,7 +50,6 @@ struct Stopped {
   double speed_m_s = 0.0;   // when the forces were cut
   double coasted_m = 0.0;   // largest excursion in the second after that
   double stopping_s = 0.0;  // from the fault until the forces were cut, as the stage counts time
-  std::uint64_t first_marked = 0;
   std::uint64_t marked = 0;
   double largest_logged_n = 0.0;
 
@@ -109,7 +108,7 @@ Stopped stream(std::unique_ptr<CyclicStage> link, const WaferStageSpec& spec, Di
   const auto words = ring.front(ring.capacity_rows());
   for (std::size_t at = 0; at < words.size(); at += ring.row_words()) {
     const bool marked = unpack_status(std::bit_cast<std::uint64_t>(words[at + 2])).marked;
-    if (marked && result.marked++ == 0) result.first_marked = at / ring.row_words();
+    result.marked += marked ? 1U : 0U;
     result.largest_logged_n = std::max(result.largest_logged_n, std::abs(words[at]));
   }
   return result;

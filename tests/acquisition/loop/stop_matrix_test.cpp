@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <tuple>
 
 #include "tests/acquisition/loop/stop_links.hpp"
+#include "tests/acquisition/loop/stop_table.hpp"
 
 namespace stageid {
 namespace test_stop_matrix {
@@ -57,16 +56,29 @@ WaferStageSpec spec_of(const Case& c) {
   return spec;
 }
 
+std::string length(double m) {
+  if (m < 1e-3) return fmt::format("{:.0f} um", 1e6 * m);
+  return m < 1.0 ? fmt::format("{:.3g} mm", 1e3 * m) : fmt::format("{:.3g} m", m);
+}
+
+/// A wrong controller is wrong from the start.
+std::string time_to_rest(const Case& c, const Stopped& stopped) {
+  const double before_s =
+      c.controller_gain != 1.0 ? kFaultCycle / stop_stage_spec().info.sample_rate_hz : 0.0;
+  return fmt::format("{:.0f} ms", 1e3 * (stopped.stopping_s + before_s));
+}
+
 class StopMatrix : public testing::TestWithParam<std::tuple<StopLink, Case>> {};
 
 TEST_P(StopMatrix, StaysInsideTwoWindows) {
   const auto& [link, c] = GetParam();
   const Stopped stopped = stop_over(link, spec_of(c), c.event);
-  if (std::getenv("STAGEID_STOP_TABLE") != nullptr)
-    fmt::print("| {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.3g} | {:.1f} | {} | {} | {} |\n", c.name,
-               to_string(link), 1e6 * stopped.largest_m, 1e6 * stopped.coasted_m, stopped.largest_n,
-               1e3 * stopped.speed_m_s, 1e3 * stopped.stopping_s, stopped.marked,
-               stopped.host_lost ? "-" : std::to_string(stopped.exit_code()), stopped.message);
+  expect_in_docs(
+      c.name, to_string(link),
+      fmt::format("{}, {:.0f} N, {}, {}, {}", length(stopped.largest_m), stopped.largest_n,
+                  *c.cause == '\0' && !stopped.host_lost ? "-" : time_to_rest(c, stopped),
+                  stopped.host_lost ? "-" : std::to_string(stopped.exit_code()),
+                  stopped.host_lost ? "-" : std::to_string(stopped.marked)));
   EXPECT_LT(stopped.largest_m, c.largest_m);
   EXPECT_LE(stopped.largest_n, kStopForce);
   const bool in_process = link == StopLink::sim || link == StopLink::plugin;
@@ -89,26 +101,29 @@ TEST_P(StopMatrix, StaysInsideTwoWindows) {
 }
 
 const auto kFaults = testing::Values(
-    Case{"healthy"}, Case{"sign flip of the plant", Kind::actuator_gain, -1.0, 1.0, "deviation"},
-    Case{"sign of the controller wrong", Kind::none, 0.0, -1.0, "stopping position"},
+    Case{"none"},
+    Case{"sign of the actuator reversed", Kind::actuator_gain, -1.0, 1.0, "deviation"},
+    Case{"sign of the controller wrong from the start", Kind::none, 0.0, -1.0, "stopping position"},
     Case{"sensor jumps by 300 um", Kind::sensor_offset, 300e-6, 1.0, "jumped"},
     Case{"sensor jumps by 100 um", Kind::sensor_offset, 100e-6, 1.0, "|u| would be"},
     Case{"sensor jumps by 50 um", Kind::sensor_offset, 50e-6},
-    Case{"sensor shows NaN", Kind::nan_sensor, 0.0, 1.0, "not finite"},
+    Case{"sensor reads NaN", Kind::nan_sensor, 0.0, 1.0, "not finite"},
     Case{"sensor stuck", Kind::stuck_sensor, 0.0, 1.0, "has repeated"},
-    Case{"gain x3", Kind::actuator_gain, 3.0},
-    Case{"gain x10", Kind::actuator_gain, 10.0, 1.0, "deviation", 2.0 * kStopWindow, 0.1},
-    Case{"delay +3 samples", Kind::extra_delay, 3.0},
-    Case{"delay +20 samples", Kind::extra_delay, 20.0, 1.0, "deviation", 2.0 * kStopWindow, 0.01},
-    Case{"controller gain x5", Kind::none, 0.0, 5.0, "|u| would be"},
-    Case{"controller gain x30", Kind::none, 0.0, 30.0, "|u| would be"},
+    Case{"gain of the actuator x 3", Kind::actuator_gain, 3.0},
+    Case{"gain of the actuator x 10", Kind::actuator_gain, 10.0, 1.0, "deviation",
+         2.0 * kStopWindow, 0.1},
+    Case{"3 samples more delay", Kind::extra_delay, 3.0},
+    Case{"20 samples more delay", Kind::extra_delay, 20.0, 1.0, "deviation", 2.0 * kStopWindow,
+         0.01},
+    Case{"controller gain x 5", Kind::none, 0.0, 5.0, "|u| would be"},
+    Case{"controller gain x 30", Kind::none, 0.0, 30.0, "|u| would be"},
     // If the only actuator is dead, braking is impossible: the stage coasts at its speed.
     Case{"actuator dead", Kind::actuator_gain, 0.0, 1.0, "not braked", 2.0 * kStopWindow, 2e-3,
          StopReason::limit, LinkEvent::none, "deviation"},
     // The stage continues at its speed, about 1 mm/s.
-    Case{"amplifiers off (interlock)", Kind::interlock, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
-         2e-3, StopReason::fault, LinkEvent::none, "fault"},
-    Case{"nothing arrives any more", Kind::missed_cycle, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
+    Case{"amplifiers off, a fault of the node", Kind::interlock, 0.0, 1.0, "no limit",
+         2.0 * kStopWindow, 2e-3, StopReason::fault, LinkEvent::none, "fault"},
+    Case{"no measurement arrives", Kind::missed_cycle, 0.0, 1.0, "no limit", 2.0 * kStopWindow,
          2e-3, StopReason::misses, LinkEvent::none, "no"},
     // A drifting single sensor looks like a stage at rest, and the loop follows it.
     Case{"sensor drifts by 0.3 mm/s", Kind::sensor_drift, 0.3e-3});
@@ -149,13 +164,10 @@ TEST_P(StopStrategies, TheBrakeIsTheOnlyOneThatStopsEverything) {
   const auto excursion = [](const Stopped& stopped) {
     return std::max(stopped.largest_m, stopped.coasted_m);
   };
-  if (std::getenv("STAGEID_STOP_TABLE") != nullptr) {
-    fmt::print("| {} |", c.name);
-    for (const Stopped& stopped : by)
-      fmt::print(" {:.0f}, {:.3g} mm/s, {:.0f} |", 1e6 * stopped.largest_m, 1e3 * stopped.speed_m_s,
-                 1e6 * excursion(stopped));
-    fmt::print("\n");
-  }
+  constexpr std::array kColumns = {"ramp", "cut", "brake"};
+  for (std::size_t i = 0; i < by.size(); ++i)
+    expect_in_docs(c.name, kColumns[i],
+                   fmt::format("{}, {}", length(by[i].largest_m), length(excursion(by[i]))));
   const Stopped& brake = by[static_cast<std::size_t>(Strategy::brake)];
   for (const Stopped& stopped : by) EXPECT_LE(excursion(brake), 1.5 * excursion(stopped));
   EXPECT_LT(brake.largest_m, 2.0 * kStopWindow);

@@ -19,7 +19,7 @@ TEST(CanCHeader, HasTheChannelsAndTheFingerprint) {
   const std::string text =
       can_c_header(rig.layout(), rig.stage_spec().info, rig.stage_spec().limits);
   EXPECT_THAT(text, HasSubstr(fmt::format("FINGERPRINT 0x{:08x}u\n", rig.layout().fingerprint)));
-  EXPECT_THAT(text, HasSubstr("enum { STAGEID_ACTUATORS = 2, STAGEID_SENSORS = 1 };"));
+  EXPECT_THAT(text, HasSubstr("#define STAGEID_ACTUATORS 2\n#define STAGEID_SENSORS 1\n"));
   EXPECT_THAT(text, HasSubstr("/* a2 [N] */ \"a2\""));
   EXPECT_THAT(text, HasSubstr("#define STAGEID_PROTOCOL_VERSION 2\n"));
 }

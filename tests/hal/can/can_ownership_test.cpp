@@ -14,6 +14,7 @@
 #include "hal/can/can_resident_stage.hpp"
 #include "hal/stage/peer_status.hpp"
 #include "tests/hal/can/can_host.hpp"
+#include "tests/support/process/resident_bytes.hpp"
 
 namespace stageid {
 namespace test_can_ownership {
@@ -138,6 +139,7 @@ TEST(CanOwnership, AHundredThousandRandomFramesChangeNoSample) {
   Host host(rig);
   host.start();
   std::mt19937_64 engine(3);
+  const std::size_t before = test::resident_bytes();
   for (std::size_t n = 0; n < y.size(); ++n) {
     for (int i = 0; i < 50; ++i) {
       CanFrame frame;
@@ -153,6 +155,7 @@ TEST(CanOwnership, AHundredThousandRandomFramesChangeNoSample) {
     ASSERT_EQ(host.y()[0], y[n]) << n;
   }
   EXPECT_EQ(rig.front().rejected(), 50U * y.size());
+  EXPECT_LT(test::resident_bytes() - before, std::size_t{1} << 20);
 }
 
 TEST(CanOwnership, AnybodyMayAskForAQuickStop) {

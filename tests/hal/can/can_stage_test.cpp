@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"
 
 namespace stageid {
@@ -136,6 +137,25 @@ TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
   EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the host stopped sending"));
   rig.serve_ms(110);
   EXPECT_EQ(rig.node().state(), NodeState::fault);
+}
+
+// A busy machine may stop the node between two looks at the bus.
+TEST(CanStage, ADelayOfTheNodeIsNotTheSilenceOfItsHost) {
+  CanRig rig;
+  test::AlteredCan slow(rig.pair().node(), [&](std::span<CanFrame>, std::size_t count) {
+    rig.pair().pass_time(10 * 20'000'000);  // watchdogs
+    return count;
+  });
+  CanNode front(rig.node(), rig.layout(), slow);
+  Inputs first;
+  std::vector<double> y(1);
+  first.y = y;
+  ASSERT_TRUE(rig.node().request(SupervisorCommand::enable).accepted);
+  static_cast<void>(rig.node().begin_run(3, slow.now_ns(), first));
+  front.serve(0);
+  EXPECT_EQ(rig.node().state(), NodeState::measuring) << "the host may have sent meanwhile";
+  front.serve(0);
+  EXPECT_EQ(rig.node().state(), NodeState::fault_reaction) << "it has not";
 }
 
 TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {

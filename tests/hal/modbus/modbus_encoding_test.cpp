@@ -12,26 +12,29 @@ namespace test_modbus_encoding {
 
 TEST(ModbusEncoding, TheMoreSignificantWordComesFirst) {
   std::array<std::uint16_t, 4> r{};
-  put_u32(std::span(r).first<2>(), 0x53544749);
+  const RegisterBlock block(300, r);
+  block.set_u32(300, 0x53544749);
   EXPECT_EQ(r[0], 0x5354);
   EXPECT_EQ(r[1], 0x4749);
-  put_u64(r, 0x0123456789ABCDEF);
+  block.set_u64(300, 0x0123456789ABCDEF);
   EXPECT_EQ(r, (std::array<std::uint16_t, 4>{0x0123, 0x4567, 0x89AB, 0xCDEF}));
-  EXPECT_EQ(get_u64(r), 0x0123456789ABCDEFU);
+  EXPECT_EQ(block.u64(300), 0x0123456789ABCDEFU);
+  EXPECT_EQ(block.u32(302), 0x89ABCDEFU);
 }
 
 // Bit patterns of IEEE 754 and of two's complement, written out.
 TEST(ModbusEncoding, FloatsAndSignedNumbersAreTheirBits) {
   std::array<std::uint16_t, 2> r{};
-  put_f32(r, 1.5F);
+  const RegisterBlock block(0, r);
+  block.set_f32(0, 1.5F);
   EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0x3FC0, 0x0000}));
-  EXPECT_EQ(get_f32(r), 1.5F);
-  put_f32(r, -295.25F);
+  EXPECT_EQ(block.f32(0), 1.5);
+  block.set_f32(0, -295.25F);
   EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0xC393, 0xA000}));
-  EXPECT_EQ(get_f32(r), -295.25F);
-  put_i32(r, -2);
+  EXPECT_EQ(block.f32(0), -295.25);
+  block.set_i32(0, -2);
   EXPECT_EQ(r, (std::array<std::uint16_t, 2>{0xFFFF, 0xFFFE}));
-  EXPECT_EQ(get_i32(r), -2);
+  EXPECT_EQ(block.i32(0), -2);
 }
 
 TEST(ModbusEncoding, CountsAreTheNearestAndSaturate) {

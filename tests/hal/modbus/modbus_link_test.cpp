@@ -2,10 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <chrono>
 #include <thread>
+#include <vector>
 
 #include "hal/stage/stage.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
@@ -105,6 +109,35 @@ TEST(ModbusLink, ADeadServerIsDisconnected) {
   EXPECT_EQ(link.read(0, values), LinkStatus::disconnected);
   EXPECT_FALSE(link.connected());
   EXPECT_THROW(link.connect(), StageError);
+}
+
+// A device that never stops sending keeps every buffer full.
+TEST(ModbusLink, AFloodEndsTheConnection) {
+  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
+  ASSERT_EQ(::listen(listener, 1), 0);  // on any free port
+  sockaddr_in name{};
+  socklen_t size = sizeof name;
+  ::getsockname(listener, reinterpret_cast<sockaddr*>(&name), &size);
+  std::thread flood([listener] {
+    const int peer = ::accept(listener, nullptr, nullptr);
+    const std::vector<char> garbage(1 << 20);
+    while (::send(peer, garbage.data(), garbage.size(), MSG_NOSIGNAL) > 0) {
+    }
+    ::close(peer);
+  });
+  ModbusAddress address;
+  address.port = ntohs(name.sin_port);
+  ModbusLink link(address, test::kQuickTiming);
+  link.connect();
+  Pair values{};
+  EXPECT_EQ(link.read(0, values), LinkStatus::corrupt);
+  link.drain();
+  EXPECT_FALSE(link.connected());
+  EXPECT_EQ(link.read(0, values), LinkStatus::flooded);
+  EXPECT_THAT(link.describe(link.last()), HasSubstr("sends more than it is asked for"));
+  link.close();
+  flood.join();
+  ::close(listener);
 }
 
 TEST(ModbusLink, AddressesAndTimesThatMakeNoSenseAreRefused) {

@@ -34,7 +34,7 @@ class Registers : public testing::Test {
   ModbusException write(ModbusConnection from, int first, const std::vector<std::uint32_t>& pairs) {
     std::vector<std::uint16_t> words(2 * pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i)
-      put_u32(std::span(words).subspan(2 * i).first<2>(), pairs[i]);
+      RegisterBlock(0, words).set_u32(2 * static_cast<int>(i), pairs[i]);
     bench_->registers().begin_request(from);
     return bench_->registers().write(first, words);
   }
@@ -42,7 +42,7 @@ class Registers : public testing::Test {
     std::array<std::uint16_t, 2> words{};
     bench_->registers().begin_request(from);
     EXPECT_EQ(bench_->registers().read(address, words), ModbusException::none);
-    return get_u32(std::span<const std::uint16_t, 2>(words));
+    return RegisterBlock(0, words).u32(0);
   }
   /// Everything that is visible to a client, except the owner.
   std::vector<std::uint16_t> image() {

@@ -200,12 +200,13 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
 std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t session,
                                                  std::uint32_t sequence) {
   std::array<std::uint16_t, 8> request{};
-  put_u32(std::span(request).first<2>(), session);
-  put_u32(std::span(request).subspan<2, 2>(), sequence);
+  const RegisterBlock out(map::kRunKey, request);
+  out.set_u32(map::kRunKey, session);
+  out.set_u32(map::kSetpointSequence, sequence);
   std::array<std::uint16_t, 8> reply{};
   EXPECT_EQ(link.exchange(map::kRunKey, request, map::kMeasurementBootId, reply), LinkStatus::ok);
-  const auto replied = std::span<const std::uint16_t>(reply);
-  return {get_u32(replied.subspan<2, 2>()), get_u32(replied.subspan<6, 2>()) >> 24};
+  const RegisterBlock replied(map::kMeasurementBootId, reply);
+  return {replied.u32(map::kMeasurementSequence), replied.u32(map::kMeasurementStatus) >> 24};
 }
 
 TEST(ModbusNode, OnlyANewerSetpointMovesTheStage) {

@@ -113,8 +113,9 @@ TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
     ModbusException read(int first, std::span<std::uint16_t> values) override {
       std::fill(values.begin(), values.end(), std::uint16_t{0});
       if (version == 0 || first != modbus_map::kMagic || values.size() < 4) return {};
-      put_u32(values.first<2>(), modbus_map::kMagicValue);
-      put_u32(values.subspan<2, 2>(), version);
+      const RegisterBlock out(first, values);
+      out.set_u32(modbus_map::kMagic, modbus_map::kMagicValue);
+      out.set_u32(modbus_map::kVersion, version);
       return ModbusException::none;
     }
     std::uint32_t version = 0;
@@ -125,7 +126,7 @@ TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
     const test::ServerThread server(registers, nullptr);
     const ModbusSupervisor supervisor(server.address(), test::kQuickTiming, kQuick);
     const char* wanted =
-        version == 0 ? "Check the unit" : "different protocol version (register map 1; expected 2)";
+        version == 0 ? "check the unit" : "different protocol version (register map 1; expected 2)";
     EXPECT_TRUE(comes([&] { return supervisor.trouble().find(wanted) != std::string::npos; }))
         << supervisor.trouble();
     EXPECT_EQ(supervisor.snapshot().t_ns, 0);

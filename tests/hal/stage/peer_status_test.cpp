@@ -245,9 +245,8 @@ class LyingRegisters final : public ModbusRegisters {
     return refused;
   }
   void set(int address, std::uint32_t value) {
-    const int at = address - first_;
-    if (at < 0 || at + 2 > static_cast<int>(values_.size())) return;
-    put_u32(values_.subspan(static_cast<std::size_t>(at)).first<2>(), value);
+    if (address < first_ || address + 2 > first_ + static_cast<int>(values_.size())) return;
+    RegisterBlock(first_, values_).set_u32(address, value);
   }
   std::function<void(LyingRegisters&)> say;
   bool always = false;

@@ -70,9 +70,9 @@ class Bench:
             time.sleep(0.01)
         return ends
 
-    def shared_line(self, frames):
-        """Two ends of a line on which other units talk, too."""
-        return self.exit.enter_context(contextlib.closing(SharedLine(frames))).ends
+    def shared_line(self, *words):
+        """Two ends of a line on which other units talk, too: see SharedLine."""
+        return self.exit.enter_context(contextlib.closing(SharedLine(*words))).ends
 
     def node(self, *options, tcp=True, own_watchdog=False):
         """A node that is ready, and its port (TCP). Its watchdog is that of the slowest line it serves, or its own."""

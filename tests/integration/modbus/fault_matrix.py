@@ -45,7 +45,7 @@ class Row:
     alter: collections.abc.Callable = None  # what the wire makes of a reply: see ModbusRelay
     marked: range = None  # samples in the log
     short: bool = False  # five seconds of one axis at pace 1
-    others: list = None  # frames between the units on the line, after every reply
+    others: tuple = None  # on the line: see SharedLine
     within_s: float = 150.0
     state: tuple = AT_REST  # of the node at the end; empty: unavailable
 
@@ -64,7 +64,7 @@ def repeated_rows(line, suffix):
 FIRST = 100  # altered sample
 ALWAYS = 10 ** 9
 # Registers of a measurement, from address 300 on, and of the description.
-BOOT, STATUS_HIGH, STATUS_LOW, VALID, COUNT = 1, 6, 7, 11, 12
+BOOT, KEY, STATUS_HIGH, STATUS_LOW, VALID, COUNT = 1, 4, 6, 7, 11, 12
 MEASUREMENT, DESCRIPTION, FIRST_SCALE = 300, 500, 8
 
 
@@ -90,6 +90,11 @@ def status(outcome=0, state=5, cause=0, missed=0, count=1):
 def first_sample_without_value(first, sample, registers):
     if first == MEASUREMENT and sample is None:
         registers[VALID] = 1
+
+
+def no_key(first, sample, registers):
+    if first == MEASUREMENT and sample is None:
+        registers[KEY:KEY + 2] = 0, 0
 
 
 def coarse_actuators(first, sample, registers):
@@ -134,6 +139,7 @@ STATUS = [
         alter=setting({BOOT: 77})),
     altered('no value before the run', FAILED, 'a sensor has no value before the run begins',
         alter=first_sample_without_value),
+    altered('no key for the run', FAILED, 'replies do not match the requests', alter=no_key),
     altered('a force that the wire cannot carry', FAILED, "exceeds the range of the node's actuator scale",
         alter=coarse_actuators),
 ]
@@ -143,10 +149,11 @@ OTHER_UNITS = [frame + modbus_crc(frame) for frame in (
 WIRE = [
     altered('replies late by up to a period', MARKED, 'the jitter limit', alter=late_by_up_to_a_period, pace=1,
         misses_allowed=1000, marked=range(50, 1000)),
-    altered('frozen under a flood of old replies', FAILED, 'corrupt', alter=samples(lambda _: False), within_s=20),
-    altered('interrupted under a flood of old replies', INTERRUPTED, 'interrupted', alter=samples(lambda _: False),
-        disturb='interrupt', within_s=20),
-    Row('other units on the line, RTU', DONE, '', line='rtu', others=OTHER_UNITS),
+    altered('frozen under a flood of old replies', FAILED, 'sends more than it is asked for',
+        alter=samples(lambda _: False), within_s=5),
+    Row('other units on the line, RTU', DONE, '', line='rtu', others=(OTHER_UNITS,)),
+    Row('interrupted on a line that is never silent, RTU', INTERRUPTED, 'interrupted', line='rtu', others=(OTHER_UNITS, 20),
+        disturb='interrupt', misses_allowed=4, within_s=25),
 ]
 
 ROWS = STATUS + WIRE + repeated_rows('tcp', '') + repeated_rows('rtu', ', RTU') + [
@@ -184,7 +191,7 @@ def open_line(bench, row):
     """The node, its TCP port, how to start another one, and the stage file."""
     options = list(row.faults)
     if row.line == 'rtu':
-        here, there = bench.serial_line() if row.others is None else bench.shared_line(row.others)
+        here, there = bench.serial_line() if row.others is None else bench.shared_line(*row.others)
         options += ['--modbus-rtu', there, '--modbus-parity', 'N']
         stage = bench.stage('stage', door=f'rtu: {{device: {here}, parity: N}}')
     node, port = bench.node(*options, own_watchdog=row.own_watchdog)

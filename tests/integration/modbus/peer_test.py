@@ -8,6 +8,7 @@ mbpoll and pymodbus read what docs/modbus-map.md says; a link that is too slow i
 """
 import json
 import pathlib
+import random
 import shutil
 import signal
 import socket
@@ -22,6 +23,7 @@ import numpy as np
 from pymodbus.client import ModbusTcpClient
 
 from bench import Bench, BOOT_ID, RTU, STATE, STATUS, number, registers, wait_for_state
+from peers import ModbusConnection, resident_bytes
 
 PROGRAM, SOURCE, WORK = sys.argv[1:4]
 MAP = (pathlib.Path(SOURCE) / 'docs/modbus-map.md').read_text()
@@ -34,6 +36,44 @@ def map_row(name):
         if len(cells) == 7 and cells[2].split('[')[0] == name:
             return int(cells[0]), cells[3]
     raise KeyError(name)
+
+
+def forged_request(dice):
+    """Of someone who wants to control the run, and guesses its key."""
+    words = [dice.choice((1, 2, dice.getrandbits(32))) for _ in range(5)]
+    return struct.pack('>BHHHHB5I', 23, 300, 10, dice.choice((16, 24, 26)), 10, 20, *words)
+
+
+def random_request(dice):
+    """Of a function and length that the node knows, or not."""
+    pdu = bytearray(dice.randbytes(dice.randrange(1, 60)))
+    pdu[0] = dice.choice((3, 4, 6, 16, 23))
+    if len(pdu) > 9 and dice.random() < 0.5:  # consistent lengths, low addresses
+        pdu[1] = pdu[3] = pdu[5] = pdu[7] = 0
+        if pdu[0] == 16:
+            pdu[4] = (len(pdu) - 6) // 2
+    # Commands of the supervisor do not belong to the run: any client may ask for a quick stop.
+    at = 6 if pdu[0] == 23 else 2
+    if pdu[0] not in (3, 4) and len(pdu) > at:
+        pdu[at] |= 16
+    return bytes(pdu)
+
+
+def flood_with_requests(port, rounds, connections):
+    """Ten forged and a hundred random requests per round. Returns how many were answered."""
+    dice, answered = random.Random(7), 0
+    clients = [ModbusConnection(port) for _ in range(connections)]
+    for _ in range(rounds // connections):
+        for client in clients:
+            requests = [forged_request(dice) for _ in range(10)] + [random_request(dice) for _ in range(100)]
+            for i, pdu in enumerate(requests):
+                requests[i] = struct.pack('>HHHB', i, 0, len(pdu) + 1, 1) + pdu
+            client.socket.sendall(b''.join(requests))
+        for client in clients:
+            answered += sum(client.frame()[0] == i for i in range(len(requests)))
+    for client in clients:
+        client.close()
+    return answered
 
 
 class ModbusTest(unittest.TestCase):
@@ -192,17 +232,38 @@ class ModbusTest(unittest.TestCase):
         self.assertIn('1 of 1 run complete', out)
         self.assertIn(' 0 missing', out)
 
-    def test_a_run_completes_beside_a_crowd(self):
-        _, port = self.bench.node()
-        for half_a_header in [True] * 16 + [False] * 200:
-            client = socket.create_connection(('127.0.0.1', port))
-            self.addCleanup(client.close)
-            if half_a_header:
-                client.sendall(bytes(5))
+    # 1 000 idle and 100 slow clients, 10 000 forged requests of two connections, 100 000 random ones.
+    def test_a_run_is_the_same_beside_a_crowd_and_forged_requests(self):
+        node, port = self.bench.node()
         stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
-        done = self.bench.run('run', self.bench.experiment(stage), '-o', self.bench.work / 'run.slog', '--pace', 0)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn('3 of 3 runs complete', done.stdout)
+        experiment = self.bench.experiment(stage, short=True)
+        experiment.write_text(experiment.read_text().replace('  periods: 1', '  periods: 1200'))
+
+        def samples(name, meanwhile=lambda run: None):
+            run = self.bench.start_run(experiment, self.bench.work / f'{name}.slog', '--pace', 0)
+            meanwhile(run)
+            out, err = run.communicate(timeout=100)
+            self.assertEqual(run.returncode, 0, out + err)
+            done = self.bench.run('log', 'convert', self.bench.work / f'{name}.slog', '-o', self.bench.work / f'{name}.csv')
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return (self.bench.work / f'{name}.csv').read_bytes()
+
+        def attack(run):
+            self.assertEqual(wait_for_state(port, {'measuring'}), 'measuring')
+            before = resident_bytes(node.pid)
+            for number_of in range(1100):
+                client = socket.create_connection(('127.0.0.1', port))
+                self.addCleanup(client.close)
+                if number_of % 11 == 0:
+                    client.sendall(bytes(5))  # half a header
+            answered = flood_with_requests(port, 1000, connections=10)
+            self.assertIsNone(run.poll(), 'the run lasts longer than the attack')
+            self.assertEqual(answered, 110_000)
+            self.assertLess(resident_bytes(node.pid) - before, 8 << 20)
+
+        quiet = samples('quiet')
+        self.assertGreater(quiet.count(b'\n'), 150_000)
+        self.assertEqual(samples('loud', attack), quiet)
 
     def test_a_node_ends_beside_clients_that_stall(self):
         node, port = self.bench.node()

@@ -100,7 +100,6 @@ class WatchedStage final : public CyclicStage {
       speed = std::max(speed, std::abs(now_m_[i] - before_m_[i]) * rate_hz_);
     return speed;
   }
-  double position_m() const { return now_m_[0]; }
 
   double largest_m = 0.0;
   double largest_n = 0.0;
