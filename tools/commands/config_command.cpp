@@ -1,9 +1,12 @@
-#include "tools/commands/config_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
@@ -12,6 +15,7 @@
 #include "hal/can/can_dbc.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/config_schema.hpp"
+#include "tools/config/stage_config.hpp"
 #include "tools/config/strict_yaml.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
@@ -46,7 +50,26 @@ nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
   return list;
 }
 
-}  // namespace
+/// stageid config schema | check FILE... | dbc STAGE -o FILE | header STAGE -o FILE
+class ConfigCommand {
+ public:
+  ConfigCommand(CLI::App& app, Console& console);
+
+ private:
+  void schema() const;
+  void check() const;
+  void check(const std::filesystem::path& file) const;
+  void dbc() const;
+  void header() const;
+  StageConfig can_stage() const;
+  void write(const std::string& text) const;
+
+  Console& console_;
+  std::string kind_;
+  std::vector<std::filesystem::path> files_;
+  std::filesystem::path stage_file_;
+  std::filesystem::path output_;
+};
 
 ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* config =
@@ -157,6 +180,12 @@ void ConfigCommand::header() const {
   const StageConfig stage = can_stage();
   const StageInfo& info = stage.spec.info;
   write(can_c_header(can_layout(stage.can.spec, info), info, stage.spec.limits));
+}
+
+}  // namespace
+
+std::shared_ptr<void> config_command(CLI::App& app, Console& console) {
+  return std::make_shared<ConfigCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,14 +1,19 @@
-#include "tools/commands/fit_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/fingerprint.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/fit/fit_flags.hpp"
 #include "tools/steps/covariance_file.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
@@ -23,7 +28,25 @@ ExitCode fit_exit_code(const FitResult& result, bool whole) {
   return result.trustworthy() && whole ? kDone : kNotTrustworthy;
 }
 
-}  // namespace
+/// stageid fit FRF -o model.json
+class FitCommand {
+ public:
+  FitCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  FitRequest checked_request() const;
+  void require_covariance_file() const;
+
+  Console& console_;
+  std::filesystem::path frf_;
+  std::filesystem::path output_;
+  std::filesystem::path covariance_;  ///< empty: not requested
+  FitFlags flags_;
+  FitRequest request_;  ///< only its numbers
+  std::vector<double> band_hz_;
+  std::uint64_t seed_ = 0;
+};
 
 FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
@@ -153,6 +176,12 @@ void FitCommand::run() const {
     console_.warning(fmt::format(
         "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
         output_.string(), result.message));
+}
+
+}  // namespace
+
+std::shared_ptr<void> fit_command(CLI::App& app, Console& console) {
+  return std::make_shared<FitCommand>(app, console);
 }
 
 }  // namespace stageid

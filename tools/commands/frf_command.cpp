@@ -1,12 +1,15 @@
-#include "tools/commands/frf_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "acquisition/files/json_members.hpp"
@@ -19,6 +22,7 @@
 #include "tools/commands/command_line.hpp"
 #include "tools/fit/frf_quality.hpp"
 #include "tools/steps/fft_wisdom_file.hpp"
+#include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -65,7 +69,33 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
   return json;
 }
 
-}  // namespace
+/// stageid frf LOG... -o frf.h5
+class FrfCommand {
+ public:
+  FrfCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  FrfStep estimate(const FrfOptions& options) const;
+
+  Console& console_;
+  std::vector<std::filesystem::path> logs_;
+  std::filesystem::path output_;
+  std::filesystem::path stage_;
+  std::filesystem::path fft_wisdom_;
+  bool no_health_ = false;
+  std::vector<std::string> inputs_;
+  std::vector<std::string> outputs_;
+  std::vector<int> realizations_;
+  std::optional<int> transient_periods_;
+  std::optional<double> delay_s_;
+  std::string method_ = "periodic";
+  std::string periods_ = "consistent";
+  int covariance_lines_ = 1;
+  std::string covariance_ = "diagonal";
+  std::string compensate_ = "none";
+  int threads_ = 0;
+};
 
 FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
@@ -176,6 +206,12 @@ void FrfCommand::run() const {
   nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
   if (!no_health_) json["health"] = health_json(step.findings);
   console_.result(json);
+}
+
+}  // namespace
+
+std::shared_ptr<void> frf_command(CLI::App& app, Console& console) {
+  return std::make_shared<FrfCommand>(app, console);
 }
 
 }  // namespace stageid

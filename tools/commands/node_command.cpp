@@ -1,4 +1,4 @@
-#include "tools/commands/node_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,15 +6,22 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/faulty_can.hpp"
+#include "hal/node/stage_node.hpp"
 #include "hal/stage/pacer.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/measure/modbus_front.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -80,7 +87,28 @@ void come_to_rest(StageNode& node, Serve serve) {
   while (forces_act(node.state()) && monotonic_ns() < give_up_ns) serve();
 }
 
-}  // namespace
+/// stageid node STAGE --can IF | --modbus-tcp PORT | --modbus-rtu DEVICE
+///
+/// One StageNode with one front end per requested kind of connection.
+class NodeCommand {
+ public:
+  NodeCommand(CLI::App& app, Console& console);
+
+ private:
+  void run();
+  StageNode make_node(const StageConfig& config) const;
+  double watchdog_s(const StageConfig& config) const;
+  void serve_can(const StageConfig& config, StageNode& node) const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::vector<std::string> can_interfaces_;
+  std::vector<std::string> can_faults_;
+  double pace_ = 0.0;
+  double hold_s_ = 0.1;
+  double watchdog_s_ = 0.0;
+  ModbusFront modbus_;
+};
 
 NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
@@ -194,6 +222,12 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
   while (!interrupt_flag()) front.serve(socket.now_ns() + kTick_ns);
 
   come_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
+}
+
+}  // namespace
+
+std::shared_ptr<void> node_command(CLI::App& app, Console& console) {
+  return std::make_shared<NodeCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,11 +1,13 @@
-#include "tools/commands/run_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 
 #include "acquisition/files/counted.hpp"
 #include "tools/commands/command_line.hpp"
@@ -27,7 +29,27 @@ Backend backend_of(const std::string& name, Backend configured) {
       "--backend: unknown back end '{}'; use sim, can, modbus, plugin or replay", name));
 }
 
-}  // namespace
+/// stageid run CONFIG -o run.slog
+class RunCommand {
+ public:
+  RunCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  std::string backend_;
+  std::filesystem::path replay_;
+  double replay_tolerance_n_ = 1e-9;
+  double pace_ = -1.0;
+  std::filesystem::path excitation_;
+  double until_ = 0.0;
+  std::string dashboard_;
+  bool resume_ = false;
+  bool reset_fault_ = false;
+};
 
 RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
@@ -119,6 +141,12 @@ void RunCommand::run() const {
   if (result.exit_code != 0)
     console_.warning(fmt::format("{}{}", named(output_, result.message),
                                  complete < result.runs_total ? advice_behind(result) : ""));
+}
+
+}  // namespace
+
+std::shared_ptr<void> run_command(CLI::App& app, Console& console) {
+  return std::make_shared<RunCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -17,6 +17,7 @@
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
+#include "tools/steps/model_verdict.hpp"
 
 namespace stageid::report {
 namespace {
@@ -225,19 +226,6 @@ Json modes_json(const ReportData& data) {
                    {"damping_deviation", optional_number(row.damping_deviation())}});
   }
   return out;
-}
-
-Json validation_json(const Validation& validation) {
-  return {{"relative_rms_error", validation.relative_rms_error},
-          {"normalized_error", validation.normalized_error},
-          {"chi_square_per_dof", validation.chi_square_per_dof},
-          {"expected_chi_square", validation.expected_chi_square},
-          {"explained", validation.explained},
-          {"whitened_above_95", validation.whitened_above_95},
-          {"whiteness", validation.whiteness},
-          {"whiteness_limit", validation.whiteness_limit},
-          {"channel_error",
-           std::vector<double>(validation.channel_error.begin(), validation.channel_error.end())}};
 }
 
 Json run_json(const LogRun& run, double sample_rate_hz) {
