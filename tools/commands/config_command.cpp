@@ -15,6 +15,7 @@
 #include "hal/can/can_dbc.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/config_schema.hpp"
+#include "tools/config/controller_file.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/strict_yaml.hpp"
 #include "tools/experiment/config_plan.hpp"
@@ -50,6 +51,15 @@ nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
   return list;
 }
 
+struct FileKind {
+  const char* name;
+  const char* title;
+  void (*describe)(ConfigVisitor&);
+};
+constexpr FileKind kFileKinds[] = {{"experiment", "An experiment", describe_experiment_keys},
+                                   {"stage", "A stage", describe_stage_keys},
+                                   {"controller", "A controller", describe_controller_keys}};
+
 /// stageid config schema | check FILE... | dbc STAGE -o FILE | header STAGE -o FILE
 class ConfigCommand {
  public:
@@ -77,8 +87,8 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
   config->require_subcommand(1);
   CLI::App* schema_command =
       add_command(*config, "schema", "List every key with type, unit, range and default");
-  schema_command->add_option("kind", kind_, "experiment | stage; default: both")
-      ->check(CLI::IsMember({"experiment", "stage"}));
+  schema_command->add_option("kind", kind_, "experiment | stage | controller; default: all")
+      ->check(CLI::IsMember({"experiment", "stage", "controller"}));
   schema_command->final_callback([this] { schema(); });
   CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
   check_command->add_option("files", files_, "YAML files")->required();
@@ -99,17 +109,12 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
 
 void ConfigCommand::schema() const {
   nlohmann::ordered_json json;
-  if (kind_ != "stage") {
-    const std::vector<SchemaEntry> entries = config_schema(describe_experiment_keys);
-    console_.result("# An experiment file. Units are SI and part of the key names.\n" +
-                    schema_text(entries));
-    json["experiment"] = schema_json(entries);
-  }
-  if (kind_ != "experiment") {
-    const std::vector<SchemaEntry> entries = config_schema(describe_stage_keys);
-    console_.result("# A stage file. Units are SI and part of the key names.\n" +
-                    schema_text(entries));
-    json["stage"] = schema_json(entries);
+  for (const FileKind& kind : kFileKinds) {
+    if (!kind_.empty() && kind_ != kind.name) continue;
+    const std::vector<SchemaEntry> entries = config_schema(kind.describe);
+    console_.result(fmt::format("# {} file. Units are SI and part of the key names.\n{}",
+                                kind.title, schema_text(entries)));
+    json[kind.name] = schema_json(entries);
   }
   console_.result(json);
 }

@@ -120,7 +120,7 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
   command
       ->add_option("--accuracy", accuracy_,
                    "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
-                   "the measurement time needed to reach it")
+                   "the measuring time that it needs")
       ->check(kPositive);
   command->add_flag("--force", force_, "write even if a limit would be exceeded");
   command->final_callback([this] { run(); });

@@ -4,20 +4,17 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "acquisition/files/file_kind.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
-#include "tools/exchange/matlab/mat_option.hpp"
 #include "tools/exchange/model/model_export.hpp"
 #include "tools/terminal/output_paths.hpp"
 
@@ -32,13 +29,6 @@ Eigen::VectorXd default_lines(const AdditiveModel& model) {
   const Eigen::ArrayXd exponent =
       Eigen::ArrayXd::LinSpaced(kLines, std::log(low_hz), std::log(high_hz));
   return exponent.exp();
-}
-
-bool is_hdf5(const std::filesystem::path& file) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::array<char, 8> head = {};
-  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
-  return std::string_view(head.data(), head.size()) == kSignature;
 }
 
 Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {

@@ -37,9 +37,7 @@ IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(con
   command->add_flag("--resume", resume_,
                     "continue an interrupted identification; steps that are up to date are kept");
   command->add_flag("--force", force_, "measure even if a limit would be exceeded");
-  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }
 

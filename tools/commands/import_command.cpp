@@ -77,8 +77,8 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
                       "log also a pattern such as 'run_{realization}_{experiment}.mat'");
   command->add_option(
       "-o,--output", output_,
-      "frf.h5; for a log run.slog or run.h5; for the modes of a universal file modes.json, for "
-      "'fit --modes'; without -o the arrays of the file are listed, to help you write a map");
+      "file to write: frf.h5; run.slog or run.h5 for a log; modes.json for the mode shapes of a "
+      "universal file. Default: list the arrays of the file, to help you write a map");
   command->add_option(
       "--map", map_,
       "YAML file with the meaning of the arrays; needed if the format does not define it");

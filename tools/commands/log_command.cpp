@@ -18,7 +18,6 @@
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/matlab/mat_log.hpp"
-#include "tools/exchange/matlab/mat_option.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/report/timing_json.hpp"
 #include "tools/steps/health_step.hpp"

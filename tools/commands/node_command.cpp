@@ -116,17 +116,19 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
       "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
   command->add_option("config", config_, "stage file (.yaml)")->required();
   command
-      ->add_option("--can", can_interfaces_,
-                   "CAN FD interfaces, one per bus of the stage file, in the same order: can0,can1")
+      ->add_option(
+          "--can", can_interfaces_,
+          "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
       ->delimiter(',');
   command
       ->add_option("--can-fault", can_faults_,
-                   "corrupt measurement frames: lost@100x3, repeated@, swapped@, late@100:0.004, "
-                   "corrupt@, shortened@, foreign@ (KIND@FRAME[xCOUNT][:SECONDS])")
+                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
+                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
+                   "lost@100x3,late@500:0.004")
       ->delimiter(',');
   command
       ->add_option("--pace", pace_,
-                   "speed of resident experiments; 0: as fast as possible, 1: wall clock")
+                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
       ->check(kNotNegative)
       ->capture_default_str();
   command
@@ -137,10 +139,10 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
       ->capture_default_str();
   modbus_.add_options(*command);
   command
-      ->add_option("--watchdog", watchdog_s_,
-                   "the node stops if a measuring host is silent for this many seconds; 0, the "
-                   "default: 'watchdog_s' of the group 'can', or over Modbus a sample longer than "
-                   "a repeated request takes")
+      ->add_option(
+          "--watchdog", watchdog_s_,
+          "stop the stage if a measuring host is silent for this many seconds; 0: 'watchdog_s' of "
+          "the group 'can', or over Modbus one sample longer than a repeated request takes")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([this] { run(); });
 }

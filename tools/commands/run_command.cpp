@@ -57,30 +57,29 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
   command->add_option("--backend", backend_,
                       "sim | can | modbus | plugin | replay; default: from the stage file");
-  command->add_option("--replay", replay_, "backend replay: the log to replay");
+  command->add_option("--replay", replay_, "log to replay with --backend replay");
   command
-      ->add_option(
-          "--replay-tolerance", replay_tolerance_n_,
-          "backend replay: largest allowed difference between a command and the recorded one, in "
-          "the unit of the actuators")
+      ->add_option("--replay-tolerance", replay_tolerance_n_,
+                   "largest allowed difference between a command and the replayed one, in the unit "
+                   "of the actuator")
       ->capture_default_str();
   command
       ->add_option("--pace", pace_,
                    "0: as fast as possible; 1: wall clock; default: from the stage file")
       ->check(kNotNegative);
   command->add_option("--excitation", excitation_,
-                      "excitation.h5 of 'stageid design': use it instead of a new design");
+                      "play this result of 'stageid design' instead of designing again");
   command
       ->add_option("--until", until_,
-                   "VARIANCE: stop as soon as the mean relative variance of the response is at "
-                   "most this, e.g. 1e-6 for 0.1 %; checked after every realization")
+                   "VARIANCE: stop after the realization that lowers the mean relative variance of "
+                   "the response to this value, e.g. 1e-6 for 0.1 %")
       ->check(kPositive);
   command->add_flag("--resume", resume_,
-                    "continue an interrupted log: complete runs are not repeated");
+                    "continue an interrupted log; complete runs are not repeated");
   command->add_option("--dashboard", dashboard_,
-                      "PORT: show the experiment in a browser on this machine (0: any free port); "
-                      "HOST:PORT: also on other machines, which need the token in the printed "
-                      "address; stopping the run always needs the token");
+                      "live view in a browser. PORT: on this machine (0: any free port) | "
+                      "HOST:PORT: also on others. The printed address contains the token that "
+                      "other machines and the stop button need");
   command->add_flag("--reset-fault", reset_fault_,
                     "clear a fault of the node or plant before the first run");
   command->final_callback([this] { run(); });

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,6 +14,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -34,11 +34,7 @@ namespace {
 
 /// An HDF5 file with the format of an FRF; all other files are treated as logs.
 bool is_frf(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  char head[8] = {};
-  stream.read(head, sizeof head);
-  constexpr char kHdf5[8] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
-  if (!std::equal(std::begin(head), std::end(head), std::begin(kHdf5))) return false;
+  if (!is_hdf5(file)) return false;
   const Hdf5File hdf5 = Hdf5File::open(file);
   if (hdf5.has_attribute("/", "format"))
     return hdf5.read_text_attribute("/", "format") == "stageid-frf";
@@ -101,9 +97,7 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
   command->add_option(
       "--stage", stage_,
       "stage file for the health checks of a log; default: the one stored in the log");
-  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }
 

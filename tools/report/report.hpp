@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,15 +25,6 @@ struct TrueMode {
   /// false: no sensor of the sub-plant observes it, so it need not be found
   bool observable = true;
 };
-
-/// Information that the reader needs before trusting the numbers, one line.
-struct ReportMessage {
-  enum class Severity : std::uint8_t { note, warning, error };
-  Severity severity = Severity::note;
-  std::string text;
-};
-
-const char* to_string(ReportMessage::Severity severity) noexcept;  ///< "note", "warning", "error"
 
 /// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
 struct ReportFigure {
@@ -96,8 +86,9 @@ struct ReportData {
   double period_s = 0.0;          ///< of the loop, by wall clock; 0: virtual time
   std::vector<ReportStep> steps;
 
-  std::vector<ReportFigure> figures;    ///< further figures for the header
-  std::vector<ReportMessage> messages;  ///< findings; the page shows the gravest first
+  std::vector<ReportFigure> figures;  ///< further figures for the header
+  std::vector<std::string> doubts;    ///< about the result, besides the findings; one line each
+  std::vector<std::string> notes;     ///< about the page itself; one line each
   std::vector<ReportDocument> documents;
   std::string provenance_json = "{}";  ///< of the job; those of frf and model are shown as well
 };

@@ -253,13 +253,8 @@ Json provenance(const std::string& text) {
 }
 
 Json texts_json(const ReportData& data) {
-  std::vector<ReportMessage> sorted = data.messages;
-  std::ranges::stable_sort(sorted, std::ranges::greater{}, &ReportMessage::severity);
   Json out;
-  out["messages"] = Json::array();
-  for (const ReportMessage& message : sorted)
-    out["messages"].push_back(
-        {{"severity", stageid::to_string(message.severity)}, {"text", message.text}});
+  out["notes"] = data.notes;
   out["figures"] = Json::array();
   for (const ReportFigure& figure : data.figures)
     out["figures"].push_back({{"label", figure.label}, {"value", figure.value}});
