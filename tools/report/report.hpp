@@ -80,7 +80,7 @@ struct ReportData {
   std::vector<double> cost;            ///< one entry per iterate; empty: cost_history of the model
   std::vector<std::string> decisions;  ///< in order
 
-  std::vector<Finding> findings;  ///< of the checks of the data, in any order
+  std::vector<Finding> findings;  ///< of the checks of the data, as `log info --health` orders them
   std::vector<LogRun> runs;       ///< timing and health of the measurement
   double sample_rate_hz = 0.0;    ///< of the runs; to show their speed relative to real time
   double period_s = 0.0;          ///< of the loop, by wall clock; 0: virtual time

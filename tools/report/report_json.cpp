@@ -17,6 +17,7 @@
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
+#include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 
 namespace stageid::report {
@@ -327,7 +328,7 @@ PageContent page_content(const ReportData& data) {
                               {"inputs", channels(data.model->inputs)}};
     json["geometry"] = geometry_json(data.geometry, data.model->outputs, data.model->inputs);
   }
-  json["findings"] = findings_json(data.findings);
+  json["findings"] = health_json(data.findings);
   if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
   if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
   if (data.comparison) json["comparison"] = comparison_json(data);
