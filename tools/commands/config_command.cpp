@@ -30,8 +30,7 @@ namespace {
 /// The value of the key `format`, the kind of the file.
 std::string format_of(const std::filesystem::path& file) {
   const YamlDocument document = YamlDocument::read(file);
-  for (const YamlNode::Entry& entry : document.root().entries)
-    if (entry.key == "format") return document.node(entry.value).text;
+  if (const YamlNode* format = document.value(document.root(), "format")) return format->text;
   document.fail(
       document.root().mark,
       "key 'format' is missing; write 'format: stageid-experiment' or 'format: stageid-stage'");

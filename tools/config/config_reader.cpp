@@ -173,23 +173,18 @@ class MapReader final : public ConfigVisitor {
   }
   void require(bool holds, const char* key, const std::string& message) override {
     if (holds) return;
-    const YamlNode::Entry* entry = entry_of(key);
-    broken_.emplace_back(entry == nullptr ? map_.mark : document_.node(entry->value).mark, message);
+    const YamlNode* value = document_.value(map_, key);
+    broken_.emplace_back(value == nullptr ? map_.mark : value->mark, message);
   }
 
  private:
-  const YamlNode::Entry* entry_of(std::string_view key) const {
-    const auto found = std::find_if(map_.entries.begin(), map_.entries.end(),
-                                    [&](const YamlNode::Entry& entry) { return entry.key == key; });
-    return found == map_.entries.end() ? nullptr : &*found;
-  }
   /// Calls `take` with the value of a key, if the map has it; collects the errors.
   template <typename Take>
   void read(const char* key, Presence presence, const char* help, Take take) {
     known_.emplace_back(key);
-    const YamlNode::Entry* entry = entry_of(key);
-    if (entry != nullptr)
-      errors_.attempt([&] { take(document_.node(entry->value)); });
+    const YamlNode* value = document_.value(map_, key);
+    if (value != nullptr)
+      errors_.attempt([&] { take(*value); });
     else if (presence == Presence::required)
       missing_.emplace_back(key, help);
   }

@@ -240,13 +240,8 @@ class ExperimentChecker {
 
  private:
   const YamlNode* find(std::string_view section, std::string_view key) const {
-    const YamlNode* node = child(document_.root(), section);
-    return node == nullptr ? nullptr : child(*node, key);
-  }
-  const YamlNode* child(const YamlNode& node, std::string_view key) const {
-    for (const YamlNode::Entry& entry : node.entries)
-      if (entry.key == key) return &document_.node(entry.value);
-    return nullptr;
+    const YamlNode* node = document_.value(document_.root(), section);
+    return node == nullptr ? nullptr : document_.value(*node, key);
   }
   const YamlDocument& document_;
   const StageConfig& stage_;
@@ -344,13 +339,11 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
                                     const std::string& stage) {
   std::filesystem::path file = (path.parent_path() / stage).lexically_normal();
   if (std::filesystem::exists(file)) return file;
-  for (const YamlNode::Entry& entry : document.root().entries)
-    if (entry.key == "stage")
-      document.fail(
-          document.node(entry.value).mark,
-          fmt::format(
-              "stage: no such file: {}; write the path of a stage file, relative to this one",
-              file.string()));
+  if (const YamlNode* value = document.value(document.root(), "stage"))
+    document.fail(
+        value->mark,
+        fmt::format("stage: no such file: {}; write the path of a stage file, relative to this one",
+                    file.string()));
   return file;
 }
 
