@@ -70,9 +70,8 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   f.config.present = true;
   choose(v, "mode", f.config.mode, {"streaming", "resident"}, kOptional,
          "streaming: sample by sample; resident: the node runs the experiment in its own loop");
-  v.items(
-      "buses", [&](ConfigVisitor& bus) { describe_bus(bus, f.buses); }, {1, 16}, kRequired,
-      "CAN FD buses; the first one also carries commands and transfers");
+  items(v, "buses", describe_bus, f.buses, {1, 16}, kRequired,
+        "CAN FD buses; the first one also carries commands and transfers");
   v.numbers(
       "actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per actuator; omitted: 1.25 times limit_n");

@@ -146,13 +146,10 @@ void describe_plant(ConfigVisitor& v, StageFile& f) {
             "suspension by the gravity compensators: x y z Rx Ry Rz; 0: free");
   v.number("suspension_damping", s.suspension_damping, {"", 0.0, 0.999}, kOptional,
            "damping ratio of the suspension");
-  v.group(
-      "plate", [&](ConfigVisitor& plate) { describe_plate(plate, s); }, kRequired,
-      "free rectangular plate: the flexible modes out of plane");
-  v.items(
-      "in_plane_modes",
-      [&](ConfigVisitor& mode) { describe_in_plane_mode(mode, f.in_plane_modes); }, {}, kOptional,
-      "flexible modes in plane");
+  group(v, "plate", describe_plate, s, kRequired,
+        "free rectangular plate: the flexible modes out of plane");
+  items(v, "in_plane_modes", describe_in_plane_mode, f.in_plane_modes, {}, kOptional,
+        "flexible modes in plane");
   v.number("cubic_stiffness_n_m3", s.cubic_stiffness_n_m3, not_negative("N/m^3"), kOptional,
            "on the rigid z motion; 0: linear");
   v.number("actuator_saturation_n", s.actuator_saturation_n, not_negative("N"), kOptional,
@@ -202,9 +199,7 @@ void describe_axis(ConfigVisitor& v, AxisController& a) {
            "corner of the second-order low pass; 0: none");
   v.number("lowpass_damping", a.lowpass_damping, {"", 0.0, 1.0, true}, kOptional,
            "damping ratio of the low pass");
-  v.items(
-      "notches", [&](ConfigVisitor& notch) { describe_notch(notch, a.notches); }, {}, kOptional,
-      "second-order notches");
+  items(v, "notches", describe_notch, a.notches, {}, kOptional, "second-order notches");
   v.choice("emergency", emergency, {"brake", "cut"}, kOptional,
            "action if the loop is faulty. brake: brake the known motion; cut: zero force");
   a.brake = emergency == 0;
@@ -212,9 +207,8 @@ void describe_axis(ConfigVisitor& v, AxisController& a) {
 
 void describe_controller(ConfigVisitor& v, StageFile& f) {
   for (std::size_t i = 0; i < kRigidAxes; ++i)
-    v.group(
-        kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
-        "controller of this degree of freedom; omitted: open loop");
+    group(v, kRigidAxisNames[i], describe_axis, f.axes[i], kOptional,
+          "controller of this degree of freedom; omitted: open loop");
   for (const ChannelConfig& sensor : f.sensors) f.linear.sensors.push_back(sensor.channel.name);
   for (const ChannelConfig& actuator : f.actuators)
     f.linear.actuators.push_back(actuator.channel.name);
@@ -301,12 +295,9 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
            "sample rate of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
            "delay from the computed command to the change of the hold; any number of samples");
-  v.items(
-      "actuators", [&](ConfigVisitor& item) { describe_actuator(item, f.actuators); }, {1, 64},
-      kRequired, "in the order of the log");
-  v.items(
-      "sensors", [&](ConfigVisitor& item) { describe_sensor(item, f.sensors); }, {1, 64}, kRequired,
-      "in the order of the log");
+  items(v, "actuators", describe_actuator, f.actuators, {1, 64}, kRequired,
+        "in the order of the log");
+  items(v, "sensors", describe_sensor, f.sensors, {1, 64}, kRequired, "in the order of the log");
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
            "stop if a sensor repeats one value for this long; 0 disables the check");
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
@@ -318,14 +309,10 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "time constant of the average that thermal_rms_n limits");
   const bool simulated = f.backend == static_cast<std::size_t>(Backend::sim);
-  v.group(
-      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); },
-      simulated ? kRequired : kOptional,
-      "the simulated stage. Optional for other back ends, which without it need a prior to test "
-      "the loop and to predict signals");
-  v.group(
-      "noise", [&](ConfigVisitor& noise) { describe_noise(noise, s); }, kOptional,
-      "noise of the simulated stage");
+  group(v, "plant", describe_plant, f, simulated ? kRequired : kOptional,
+        "the simulated stage. Optional for other back ends, which without it need a prior to test "
+        "the loop and to predict signals");
+  group(v, "noise", describe_noise, s, kOptional, "noise of the simulated stage");
   v.group_or_text(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
       f.controller, kRequired,
@@ -334,9 +321,8 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "one; or peer: the stage closes the loop itself");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
-  v.group(
-      "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
-      "settings of the loop thread; ignored in virtual time");
+  group(v, "realtime", describe_real_time, f.real_time, kOptional,
+        "settings of the loop thread; ignored in virtual time");
   describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
   v.group(
       "plugin",
@@ -346,9 +332,8 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       },
       f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
       "a user-written back end, see docs/plugins.md");
-  v.items(
-      "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
-      "injected faults, to test the safety functions");
+  items(v, "faults", describe_fault, f.faults, {}, kOptional,
+        "injected faults, to test the safety functions");
   v.group(
       "can",
       [&](ConfigVisitor& can) {

@@ -71,8 +71,8 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   rule.rule = positive("");
   describe_neutral(v, "rms", "rms_n", f.rms_n, rule);
   describe_neutral(v, "peak", "peak_n", f.peak_n, rule);
-  v.group(
-      "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
+  group(
+      v, "limits", describe_limits, f.limits, kOptional,
       "instead: as large as the limits allow, distributed for the smallest mean relative variance");
   const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
   v.require(
@@ -111,9 +111,7 @@ void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
   choose(v, "scheme", f.spec.scheme,
          {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
          "distribution of the axes over the experiments");
-  v.group(
-      "level", [&](ConfigVisitor& level) { describe_level(level, f); }, kRequired,
-      "size of the excitation");
+  group(v, "level", describe_level, f, kRequired, "size of the excitation");
   describe_lines(v, f);
   v.number("period_s", f.period_s, positive("s"), kRequired, "period of the multisine");
   count(v, "transient_periods", f.spec.transient_periods, 0, 1000, kOptional,
@@ -152,15 +150,9 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
 void describe(ConfigVisitor& v, ExperimentFile& f) {
   v.choice("format", f.format, {"stageid-experiment"}, kRequired, "file type");
   v.text("stage", f.stage, kRequired, "stage file, relative to this one");
-  v.group(
-      "experiment", [&](ConfigVisitor& e) { describe_experiment(e, f); }, kRequired,
-      "the measurement");
-  v.group(
-      "frf", [&](ConfigVisitor& frf) { describe_frf(frf, f.frf); }, kOptional,
-      "estimation of the frequency response");
-  v.group(
-      "fit", [&](ConfigVisitor& fit) { describe_fit_keys(fit, f.fit); }, kOptional,
-      "fit of the model");
+  group(v, "experiment", describe_experiment, f, kRequired, "the measurement");
+  group(v, "frf", describe_frf, f.frf, kOptional, "estimation of the frequency response");
+  group(v, "fit", describe_fit_keys, f.fit, kOptional, "fit of the model");
   v.group(
       "validation",
       [&](ConfigVisitor& validation) {
