@@ -38,11 +38,12 @@ constexpr std::array kOurs = {
     FileKind{"stageid-experiment", "an experiment file", kTakesConfigurations},
     FileKind{"stageid-stage", "a stage file", "use it with 'stageid config check' or 'node'"}};
 
+constexpr std::string_view kHdf5Head = "\x89HDF\r\n\x1a\n";
+
 /// By the first bytes.
 constexpr std::array kByHead = {
     FileKind{"\x89SLOG", "a native log", kTakesLogs},
-    FileKind{"\x89HDF\r\n\x1a\n", "an HDF5 file of another program",
-             "convert it with 'stageid import'"},
+    FileKind{kHdf5Head, "an HDF5 file of another program", "convert it with 'stageid import'"},
     FileKind{"MATLAB", "a MATLAB file", "convert it with 'stageid import'"},
     FileKind{"PK\x03\x04", "a ZIP archive (possibly .npz)",
              "convert .npz files with 'stageid import'"},
@@ -80,13 +81,22 @@ std::string named_format(const std::filesystem::path& file, const std::string& h
   return std::regex_search(head, found, text) ? found[1].str() : "";
 }
 
-}  // namespace
-
-std::string other_kind(const std::filesystem::path& file, const std::string& wanted) {
-  std::string head(2048, '\0');
+std::string head_of(const std::filesystem::path& file, std::size_t bytes) {
+  std::string head(bytes, '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(stream.gcount()));
+  return head;
+}
+
+}  // namespace
+
+bool is_hdf5(const std::filesystem::path& file) {
+  return head_of(file, kHdf5Head.size()) == kHdf5Head;
+}
+
+std::string other_kind(const std::filesystem::path& file, const std::string& wanted) {
+  const std::string head = head_of(file, 2048);
   const std::string format = named_format(file, head);
   if (const std::string ours = sentence_of_format(format, wanted); !ours.empty()) return ours;
   for (const FileKind& kind : kByHead)

@@ -5,6 +5,9 @@
 
 namespace stageid {
 
+/// By the first bytes; false also if the file cannot be read.
+bool is_hdf5(const std::filesystem::path& file);
+
 /// Describes the kind of a file by its content, and the commands that accept it:
 /// "is a native log, not a model; use it with 'stageid frf', 'validate', 'report' or 'log'".
 ///

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "acquisition/files/file_error.hpp"
-#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/formats/hdf5_log.hpp"
@@ -104,15 +104,12 @@ void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& fil
                          ConvertProgress& progress) {
   const LogInfo& info = reader.info();
   const std::string group = "/runs/" + slog_run_name(run);
-  const RowMajor excitation = reader.excitation(run);
+  const Eigen::MatrixXd excitation = reader.excitation(run);
   {
     const std::lock_guard lock(hdf5_mutex());
     file.create_group(group);
     write_run_attributes(file, group, reader.runs()[run]);
-    file.write_reals(
-        group + "/excitation",
-        {static_cast<hsize_t>(excitation.rows()), static_cast<hsize_t>(excitation.cols())},
-        excitation.data());
+    write_matrix(file, group + "/excitation", excitation);
     file.create_growing(group + "/actuators", info.actuators.size(), H5T_IEEE_F64LE, kPieceRows);
     file.create_growing(group + "/sensors", info.sensors.size(), H5T_IEEE_F64LE, kPieceRows);
     file.create_growing(group + "/marked", 0, H5T_STD_U8LE, kPieceRows);

@@ -334,24 +334,8 @@ void Hdf5LogReader::read(std::size_t run, std::uint64_t first, std::uint64_t cou
   read_columns(place.actuators, first, out.actuators);
   read_columns(place.sensors, first, out.sensors);
   read_marked(place.marked, first, out);
-  if (!out.actuators.allFinite() || !out.sensors.allFinite()) {
-    report_not_finite(which, first, out);
-  }
-}
-
-void Hdf5LogReader::report_not_finite(const LogRun& run, std::uint64_t first,
-                                      const LogSamples& samples) const {
-  for (Eigen::Index row = 0; row < samples.marked.size(); ++row) {
-    for (Eigen::Index c = 0; c < samples.actuators.cols() + samples.sensors.cols(); ++c) {
-      const double value = c < samples.actuators.cols()
-                               ? samples.actuators(row, c)
-                               : samples.sensors(row, c - samples.actuators.cols());
-      if (std::isfinite(value)) continue;
-      throw_not_finite(path_, info_, run, first + static_cast<std::uint64_t>(row),
-                       static_cast<std::size_t>(c));
-    }
-  }
-  throw std::logic_error("a value that is not finite was seen and not found again");
+  if (!out.actuators.allFinite() || !out.sensors.allFinite())
+    throw_not_finite(path_, info_, which, first, out, 0, out.marked.size());
 }
 
 }  // namespace stageid

@@ -70,8 +70,6 @@ class Hdf5LogReader final : public LogReader {
                         const Eigen::MatrixXd& period) const;
   void read_columns(const Dataset& dataset, std::uint64_t first, Eigen::MatrixXd& out) const;
   void read_marked(const std::string& dataset, std::uint64_t first, LogSamples& out) const;
-  [[noreturn]] void report_not_finite(const LogRun& run, std::uint64_t first,
-                                      const LogSamples& samples) const;
 
   std::filesystem::path path_;
   std::optional<Hdf5File> file_;  ///< optional, so that it can be closed under the lock

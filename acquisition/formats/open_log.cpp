@@ -10,12 +10,6 @@
 
 namespace stageid {
 
-namespace {
-
-constexpr std::array<unsigned char, 8> kHdf5Magic = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1A, '\n'};
-
-}  // namespace
-
 std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool damaged_is_error) {
   std::array<unsigned char, 8> magic{};
   {
@@ -26,7 +20,7 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
     source.read(0, magic.data(), std::min<std::uint64_t>(magic.size(), source.bytes()));
   }
   if (magic == kSlogMagic) return std::make_unique<SlogReader>(file, damaged_is_error);
-  if (magic == kHdf5Magic) return std::make_unique<Hdf5LogReader>(file);
+  if (is_hdf5(file)) return std::make_unique<Hdf5LogReader>(file);
   // A native log whose first block is damaged may have intact blocks.
   if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
   if (const std::string other = other_kind(file, "a log"); !other.empty())

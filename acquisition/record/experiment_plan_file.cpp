@@ -31,7 +31,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
-#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "excitation/multisine/multisine_lines.hpp"
@@ -63,18 +63,6 @@ std::string realization_group(int realization) {
 
 // Writing --------------------------------------------------------------------------------------
 
-void write_matrix(Hdf5File& file, const std::string& dataset, const MatrixXd& matrix) {
-  const RowMajor<double> rows = matrix;
-  file.write_reals(dataset, {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(rows.cols())},
-                   rows.data());
-}
-
-void write_matrix(Hdf5File& file, const std::string& dataset, const MatrixXcd& matrix) {
-  const RowMajor<std::complex<double>> rows = matrix;
-  file.write_complex(
-      dataset, {static_cast<hsize_t>(rows.rows()), static_cast<hsize_t>(rows.cols())}, rows.data());
-}
-
 void write_spec(Hdf5File& file, const ExperimentPlan& plan) {
   const ExperimentSpec& spec = plan.spec();
   const auto integer = [&file](const char* name, long long value) {
@@ -98,10 +86,8 @@ void write_spec(Hdf5File& file, const ExperimentPlan& plan) {
 
 void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
   const FrequencyGrid& grid = plan.grid();
-  const hsize_t lines = grid.lines().size();
-  const std::vector<long long> line_numbers(grid.lines().begin(), grid.lines().end());
-  file.write_integers("/lines", {lines}, line_numbers.data());
-  file.write_reals("/frequency_hz", {lines}, grid.frequency_hz().data());
+  write_vector(file, "/lines", std::vector<long long>(grid.lines().begin(), grid.lines().end()));
+  write_vector(file, "/frequency_hz", grid.frequency_hz());
 
   std::vector<std::string> channels;
   std::vector<double> levels;
@@ -113,7 +99,7 @@ void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
     levels.push_back(axis.level);
   }
   file.write_texts("/axes", channels);
-  file.write_reals("/level", {levels.size()}, levels.data());
+  write_vector(file, "/level", levels);
   if (!shape.isZero(0.0)) write_matrix(file, "/shape", shape);
 }
 

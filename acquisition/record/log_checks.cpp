@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -66,15 +67,24 @@ void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out) {
 }
 
 void throw_not_finite(const std::filesystem::path& file, const LogInfo& info, const LogRun& run,
-                      std::uint64_t row, std::size_t channel) {
-  const std::size_t actuators = info.actuators.size();
-  const bool is_actuator = channel < actuators;
-  const std::string& name =
-      is_actuator ? info.actuators.names[channel] : info.sensors.names[channel - actuators];
-  throw FormatError(
-      file, "/runs/" + run.name,
-      fmt::format("row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
-                  row, is_actuator ? "actuator" : "sensor", name));
+                      std::uint64_t first, const LogSamples& samples, Eigen::Index from,
+                      Eigen::Index count) {
+  const auto check = [&](Eigen::Index row, const Eigen::MatrixXd& columns, const char* kind,
+                         const ChannelList& channels) {
+    for (Eigen::Index c = 0; c < columns.cols(); ++c)
+      if (!std::isfinite(columns(row, c)))
+        throw FormatError(
+            file, "/runs/" + run.name,
+            fmt::format(
+                "row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
+                first + static_cast<std::uint64_t>(row), kind,
+                channels.names[static_cast<std::size_t>(c)]));
+  };
+  for (Eigen::Index row = from; row < from + count; ++row) {
+    check(row, samples.actuators, "actuator", info.actuators);
+    check(row, samples.sensors, "sensor", info.sensors);
+  }
+  throw std::logic_error("a value that is not finite was seen and not found again");
 }
 
 }  // namespace stageid

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-// Checks common to both log readers, with the same messages.
+// Checks common to all log readers, with the same messages.
 
 /// Every complete run has transient_periods and at least one more period, all whole. Realization and experiment
 /// are not negative, and complete runs are unique.
@@ -28,8 +28,11 @@ void check_row_range(const std::filesystem::path& file, const LogRun& run, std::
 /// Resizes the matrices of `out`; allocates nothing if they have the right sizes.
 void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out);
 
-/// `channel` counts actuators first, then sensors. @throws FormatError always.
+/// Names the first number that is not finite in `count` rows of `samples`, beginning with row `from`.
+/// @param first row of the run that is row 0 of `samples`   @throws FormatError always
 [[noreturn]] void throw_not_finite(const std::filesystem::path& file, const LogInfo& info,
-                                   const LogRun& run, std::uint64_t row, std::size_t channel);
+                                   const LogRun& run, std::uint64_t first,
+                                   const LogSamples& samples, Eigen::Index from,
+                                   Eigen::Index count);
 
 }  // namespace stageid

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
@@ -113,7 +112,8 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
     }
     if (!finite) {
       if (!payload_intact(source_, block)) break;  // damage has priority, because it is the cause
-      report_not_finite(run, rows, from, count);
+      throw_not_finite(path(), index_.info, run.run, target.first, target.out,
+                       static_cast<Eigen::Index>(to), static_cast<Eigen::Index>(count));
     }
   }
   if (done < padded || crc != block.header.payload_crc) {
@@ -123,19 +123,6 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
                                   run.run.name, block.header.first_row,
                                   block.header.first_row + block.header.rows - 1, describe(block)));
   }
-}
-
-void SlogReader::report_not_finite(const SlogRunIndex& run, const double* rows,
-                                   std::uint64_t first_row, std::size_t count) const {
-  const std::size_t words = slog_row_words(index_.info);
-  const std::size_t channels = index_.info.actuators.size() + index_.info.sensors.size();
-  for (std::size_t r = 0; r < count; ++r) {
-    for (std::size_t c = 0; c < channels; ++c) {
-      if (std::isfinite(rows[r * words + c])) continue;
-      throw_not_finite(path(), index_.info, run.run, first_row + r, c);
-    }
-  }
-  throw std::logic_error("a value that is not finite was seen and not found again");
 }
 
 }  // namespace stageid

@@ -36,8 +36,6 @@ class SlogReader final : public LogReader {
   struct Target;
   const SlogRunIndex& run_index(std::size_t run) const;
   void read_block(const SlogRunIndex& run, const SlogBlock& block, const Target& target) const;
-  [[noreturn]] void report_not_finite(const SlogRunIndex& run, const double* rows,
-                                      std::uint64_t first_row, std::size_t count) const;
 
   SlogSource source_;
   SlogIndex index_;

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Keeps the arrows of the architecture, between floors and between their rooms.
 
-A floor is a top-level folder, a room a folder with sources; a room's CMakeLists.txt names what it may include:
+A floor is a top-level folder, a room a folder with sources; a room's CMakeLists.txt says what is in it and names what
+it may include:
 
+    # Submodels and the mode indicator.
     stageid_room(estimation USES estimation/model frf/response SOURCES cmif.cpp INSTALLED cmif.hpp)
 
 Checked: each include is of the room itself or of a room in USES, no entry of USES is unused, the rooms have no
@@ -65,8 +67,9 @@ WORDS = ("USES", "SOURCES", "INSTALLED", "LIBRARIES")
 
 
 class Room:
-    def __init__(self, library, words):
+    def __init__(self, library, words, about):
         self.library = library
+        self.about = about  # one line for people
         self.parts = {word: [] for word in WORDS}
         part = None
         for word in words:
@@ -91,10 +94,11 @@ class Tree:
         self.installed |= {f"{floor}/{floor}.hpp" for floor in FLOORS}
 
     def _read_cmake(self, path):
+        about = re.match(r"# (.+)\.\n", path.read_text())
         text = COMMENT.sub("", path.read_text())
         name = path.parent.relative_to(self.root).as_posix()
         for call in re.finditer(r"stageid_room\(\s*(\w+)([^)]*)\)", text):
-            self.rooms[name] = Room(call.group(1), call.group(2).split())
+            self.rooms[name] = Room(call.group(1), call.group(2).split(), about.group(1) if about else "")
         for call in re.finditer(r"target_link_libraries\(\s*stageid_(\w+)([^)]*)\)", text):
             self.links.setdefault(call.group(1), set()).update(re.findall(r"stageid::(\w+)", call.group(2)))
 
@@ -161,6 +165,8 @@ def is_standard(header):
 
 def room_faults(tree, used):
     for name, room in tree.rooms.items():
+        if not room.about:
+            yield f"{name}: its CMakeLists.txt does not begin with a line '# What is in this room.'"
         for other in room.uses:
             if other not in tree.rooms:
                 yield f"{name}: USES {other}, which is not a room"
@@ -255,11 +261,12 @@ def direct_uses(tree, name):
 
 
 def drawing(root):
-    """The page: per floor a Mermaid graph of its rooms, and a table of what each room uses of other floors."""
+    """The page: per floor a Mermaid graph of its rooms, and a table of what each contains and uses of other floors."""
     tree = Tree(root)
     lines = ["# Rooms", "",
-             "Made by `tests/integration/layering_test.py . --draw`, from the USES of each room; `integration.layering`",
-             "holds the sources to them. An arrow points to what a room uses; arrows that others imply are left out.", ""]
+             "Made by `tests/integration/layering_test.py . --draw`, from the CMakeLists.txt of each room; `integration.layering`",
+             "holds the sources to them. An arrow points to what a room uses; arrows that others imply are left out.",
+             "The bindings for Python are in tools/python, above all rooms.", ""]
     for floor in FLOORS:
         rooms = {name: room for name, room in tree.rooms.items() if name.split("/")[0] == floor}
         lines += [f"## {floor}", "", "```mermaid", "graph BT"]
@@ -268,10 +275,10 @@ def drawing(root):
             lines.append(f"  {short[name]}[{name[len(floor) + 1:]}]")
         for name in rooms:
             lines += [f"  {short[name]} --> {short[other]}" for other in direct_uses(tree, name) if other in rooms]
-        lines += ["```", "", "| room | sources | of other floors |", "| --- | --- | --- |"]
+        lines += ["```", "", "| room | contents | of other floors |", "| --- | --- | --- |"]
         for name, room in rooms.items():
             others = " ".join(other for other in room.uses if other not in rooms)
-            lines.append(f"| {name} | {len(room.parts['SOURCES'])} | {others} |")
+            lines.append(f"| {name} | {room.about} | {others} |")
         lines.append("")
     return "\n".join(lines)
 
@@ -282,18 +289,18 @@ class SelfTest(unittest.TestCase):
     FILES = {
         "excitation/CMakeLists.txt": "",
         "excitation/multisine/CMakeLists.txt":
-            "stageid_room(excitation SOURCES grid.cpp INSTALLED grid.hpp)",
+            "# Room.\nstageid_room(excitation SOURCES grid.cpp INSTALLED grid.hpp)",
         "excitation/multisine/grid.hpp": "#pragma once\n#include <Eigen/Core>\n#include <vector>\n",
         "excitation/multisine/grid.cpp": '#include "excitation/multisine/grid.hpp"\n#include <fftw3.h>\n',
-        "hal/stage/CMakeLists.txt": "stageid_room(hal INSTALLED stage.hpp)",
+        "hal/stage/CMakeLists.txt": "# Room.\nstageid_room(hal INSTALLED stage.hpp)",
         "hal/stage/stage.hpp": "#pragma once\n",
         "acquisition/CMakeLists.txt":
             "target_link_libraries(stageid_record PUBLIC stageid::excitation)\n"
             "target_link_libraries(stageid_acquisition PUBLIC stageid::record stageid::hal)\n",
         "acquisition/record/CMakeLists.txt":
-            "stageid_room(record USES excitation/multisine SOURCES log.cpp INSTALLED log.hpp)\n",
+            "# Room.\nstageid_room(record USES excitation/multisine SOURCES log.cpp INSTALLED log.hpp)\n",
         "acquisition/loop/CMakeLists.txt":
-            "stageid_room(acquisition USES acquisition/record hal/stage INSTALLED loop.hpp)\n",
+            "# Room.\nstageid_room(acquisition USES acquisition/record hal/stage INSTALLED loop.hpp)\n",
         "acquisition/record/log.hpp": '#pragma once\n#include "excitation/multisine/grid.hpp"\n',
         "acquisition/record/log.cpp": '#include "acquisition/record/detail.hpp"\n#include <nlohmann/json.hpp>\n',
         "acquisition/record/detail.hpp": "#pragma once\n",
@@ -310,13 +317,15 @@ class SelfTest(unittest.TestCase):
         "acquisition/record may not include acquisition/loop/loop.hpp":
             ("acquisition/record/log.hpp", '#pragma once\n  #  include "acquisition/loop/loop.hpp"\n'),
         "hal/stage: hal may not use acquisition/loop of acquisition":
-            ("hal/stage/CMakeLists.txt", "stageid_room(hal USES acquisition/loop INSTALLED stage.hpp)"),
+            ("hal/stage/CMakeLists.txt", "# Room.\nstageid_room(hal USES acquisition/loop INSTALLED stage.hpp)"),
         "acquisition/record: USES excitation/multisine, but includes nothing of it":
             ("acquisition/record/log.hpp", "#pragma once\n"),
-        "which is not a room": ("hal/stage/CMakeLists.txt", "stageid_room(hal USES hal/attic INSTALLED stage.hpp)"),
+        "hal/stage: its CMakeLists.txt does not begin with a line":
+            ("hal/stage/CMakeLists.txt", "stageid_room(hal INSTALLED stage.hpp)"),
+        "which is not a room": ("hal/stage/CMakeLists.txt", "# Room.\nstageid_room(hal USES hal/attic INSTALLED stage.hpp)"),
         "in a circle: acquisition/loop, acquisition/record":
             ("acquisition/record/CMakeLists.txt",
-             "stageid_room(record USES excitation/multisine acquisition/loop SOURCES log.cpp INSTALLED log.hpp)\n"),
+             "# Room.\nstageid_room(record USES excitation/multisine acquisition/loop SOURCES log.cpp INSTALLED log.hpp)\n"),
         "<yaml-cpp/yaml.h> may be included by tools only":
             ("hal/stage/stage.hpp", "#pragma once\n#include <yaml-cpp/yaml.h>\n"),
         "<CLI/CLI.hpp> may be included by tools only":

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "tools/exchange/matlab/mat_file.hpp"
+
 namespace stageid {
 
 /// A subcommand that takes --json and --verbosity on either side of its name.
@@ -27,5 +29,26 @@ inline CLI::Validator number_check(bool zero_is_one, const char* name) {
 inline const CLI::Validator kNotNegative = number_check(true, "NONNEGATIVE");
 /// For options > 0.
 inline const CLI::Validator kPositive = number_check(false, "POSITIVE");
+
+inline void add_threads(CLI::App& command, int& threads) {
+  command
+      .add_option("--threads", threads,
+                  "number of threads; 0: all cores. The result does not depend on it")
+      ->check(kNotNegative)
+      ->capture_default_str();
+}
+
+/// For .mat files that the command writes.
+inline void add_mat_version(CLI::App& command, MatVersion& version) {
+  command
+      .add_option_function<std::string>(
+          "--mat-version",
+          [&version](const std::string& text) {
+            version = text == "5" ? MatVersion::v5 : MatVersion::v73;
+          },
+          "version of a .mat file: 5 or 7.3 (HDF5)")
+      ->check(CLI::IsMember({"5", "7.3"}))
+      ->default_str("5");
+}
 
 }  // namespace stageid

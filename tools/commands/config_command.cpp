@@ -1,9 +1,12 @@
-#include "tools/commands/config_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
@@ -12,6 +15,8 @@
 #include "hal/can/can_dbc.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/config_schema.hpp"
+#include "tools/config/controller_file.hpp"
+#include "tools/config/stage_config.hpp"
 #include "tools/config/strict_yaml.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
@@ -25,8 +30,7 @@ namespace {
 /// The value of the key `format`, the kind of the file.
 std::string format_of(const std::filesystem::path& file) {
   const YamlDocument document = YamlDocument::read(file);
-  for (const YamlNode::Entry& entry : document.root().entries)
-    if (entry.key == "format") return document.node(entry.value).text;
+  if (const YamlNode* format = document.value(document.root(), "format")) return format->text;
   document.fail(
       document.root().mark,
       "key 'format' is missing; write 'format: stageid-experiment' or 'format: stageid-stage'");
@@ -46,7 +50,35 @@ nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
   return list;
 }
 
-}  // namespace
+struct FileKind {
+  const char* name;
+  const char* title;
+  void (*describe)(ConfigVisitor&);
+};
+constexpr FileKind kFileKinds[] = {{"experiment", "An experiment", describe_experiment_keys},
+                                   {"stage", "A stage", describe_stage_keys},
+                                   {"controller", "A controller", describe_controller_keys}};
+
+/// stageid config schema | check FILE... | dbc STAGE -o FILE | header STAGE -o FILE
+class ConfigCommand {
+ public:
+  ConfigCommand(CLI::App& app, Console& console);
+
+ private:
+  void schema() const;
+  void check() const;
+  void check(const std::filesystem::path& file) const;
+  void dbc() const;
+  void header() const;
+  StageConfig can_stage() const;
+  void write(const std::string& text) const;
+
+  Console& console_;
+  std::string kind_;
+  std::vector<std::filesystem::path> files_;
+  std::filesystem::path stage_file_;
+  std::filesystem::path output_;
+};
 
 ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* config =
@@ -54,8 +86,8 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
   config->require_subcommand(1);
   CLI::App* schema_command =
       add_command(*config, "schema", "List every key with type, unit, range and default");
-  schema_command->add_option("kind", kind_, "experiment | stage; default: both")
-      ->check(CLI::IsMember({"experiment", "stage"}));
+  schema_command->add_option("kind", kind_, "experiment | stage | controller; default: all")
+      ->check(CLI::IsMember({"experiment", "stage", "controller"}));
   schema_command->final_callback([this] { schema(); });
   CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
   check_command->add_option("files", files_, "YAML files")->required();
@@ -76,17 +108,12 @@ ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console
 
 void ConfigCommand::schema() const {
   nlohmann::ordered_json json;
-  if (kind_ != "stage") {
-    const std::vector<SchemaEntry> entries = config_schema(describe_experiment_keys);
-    console_.result("# An experiment file. Units are SI and part of the key names.\n" +
-                    schema_text(entries));
-    json["experiment"] = schema_json(entries);
-  }
-  if (kind_ != "experiment") {
-    const std::vector<SchemaEntry> entries = config_schema(describe_stage_keys);
-    console_.result("# A stage file. Units are SI and part of the key names.\n" +
-                    schema_text(entries));
-    json["stage"] = schema_json(entries);
+  for (const FileKind& kind : kFileKinds) {
+    if (!kind_.empty() && kind_ != kind.name) continue;
+    const std::vector<SchemaEntry> entries = config_schema(kind.describe);
+    console_.result(fmt::format("# {} file. Units are SI and part of the key names.\n{}",
+                                kind.title, schema_text(entries)));
+    json[kind.name] = schema_json(entries);
   }
   console_.result(json);
 }
@@ -157,6 +184,12 @@ void ConfigCommand::header() const {
   const StageConfig stage = can_stage();
   const StageInfo& info = stage.spec.info;
   write(can_c_header(can_layout(stage.can.spec, info), info, stage.spec.limits));
+}
+
+}  // namespace
+
+std::shared_ptr<void> config_command(CLI::App& app, Console& console) {
+  return std::make_shared<ConfigCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,17 +1,20 @@
-#include "tools/commands/design_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/limited_plan.hpp"
 #include "tools/experiment/link_load.hpp"
 #include "tools/experiment/loop_check.hpp"
@@ -56,7 +59,21 @@ Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
   return json;
 }
 
-}  // namespace
+/// stageid design CONFIG -o excitation.h5
+class DesignCommand {
+ public:
+  DesignCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  void write_limited(const ExperimentConfig& config, const LimitedPlan& limited) const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  double accuracy_ = 0.0;
+  bool force_ = false;
+};
 
 std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
                                       const DesignPrediction& prediction) {
@@ -94,25 +111,6 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   return lines;
 }
 
-void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction) {
-  const std::vector<std::string> violations = prediction.violations();
-  if (violations.empty()) return;
-  const std::string more =
-      violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
-  throw FormatError(
-      config.file, "",
-      fmt::format("{}{}; lower the level, or override with --force", violations.front(), more));
-}
-
-void warn_of_prediction(const ExperimentConfig& config, const Console& console) {
-  const std::string reason = why_unpredictable(config.stage.spec);
-  if (reason.empty()) return;
-  console.warning(
-      fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "
-                  "are enforced by stopping the run. Begin with a low level",
-                  config.stage.file.string(), reason));
-}
-
 DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
       app, "design",
@@ -122,7 +120,7 @@ DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console
   command
       ->add_option("--accuracy", accuracy_,
                    "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
-                   "the measurement time needed to reach it")
+                   "the measuring time that it needs")
       ->check(kPositive);
   command->add_flag("--force", force_, "write even if a limit would be exceeded");
   command->final_callback([this] { run(); });
@@ -169,6 +167,12 @@ void DesignCommand::write_limited(const ExperimentConfig& config,
                {"lines", plan.grid().size()}};
   json.update(limited_json(limited, accuracy_));
   console_.result(json);
+}
+
+}  // namespace
+
+std::shared_ptr<void> design_command(CLI::App& app, Console& console) {
+  return std::make_shared<DesignCommand>(app, console);
 }
 
 }  // namespace stageid

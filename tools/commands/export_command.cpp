@@ -1,19 +1,20 @@
-#include "tools/commands/export_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
-#include <string_view>
+#include <string>
+#include <vector>
 
+#include "acquisition/files/file_kind.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
-#include "tools/exchange/matlab/mat_option.hpp"
+#include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/model/model_export.hpp"
 #include "tools/terminal/output_paths.hpp"
 
@@ -30,13 +31,6 @@ Eigen::VectorXd default_lines(const AdditiveModel& model) {
   return exponent.exp();
 }
 
-bool is_hdf5(const std::filesystem::path& file) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::array<char, 8> head = {};
-  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
-  return std::string_view(head.data(), head.size()) == kSignature;
-}
-
 Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {
   const auto found = std::find(channels.names.begin(), channels.names.end(), name);
   if (found == channels.names.end())
@@ -46,7 +40,23 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
   return found - channels.names.begin();
 }
 
-}  // namespace
+/// stageid export MODEL|FRF -o FILE.{json,h5,csv,mat,npz,unv,uff,py,m}
+class ExportCommand {
+ public:
+  ExportCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  void export_from_model() const;
+  void export_from_frf() const;
+
+  Console& console_;
+  std::filesystem::path input_;
+  std::filesystem::path output_;
+  std::filesystem::path frf_;
+  std::vector<std::string> driving_point_;
+  MatVersion mat_version_ = MatVersion::v5;
+};
 
 ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "export",
@@ -114,6 +124,12 @@ void ExportCommand::run() const {
   console_.result(
       fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
   console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace
+
+std::shared_ptr<void> export_command(CLI::App& app, Console& console) {
+  return std::make_shared<ExportCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,15 +1,19 @@
-#include "tools/commands/fit_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/fingerprint.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
-#include "tools/steps/covariance_file.hpp"
+#include "tools/exchange/model/covariance_file.hpp"
+#include "tools/fit/fit_flags.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -23,16 +27,32 @@ ExitCode fit_exit_code(const FitResult& result, bool whole) {
   return result.trustworthy() && whole ? kDone : kNotTrustworthy;
 }
 
-}  // namespace
+/// stageid fit FRF -o model.json
+class FitCommand {
+ public:
+  FitCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  FitRequest checked_request() const;
+  void require_covariance_file() const;
+
+  Console& console_;
+  std::filesystem::path frf_;
+  std::filesystem::path output_;
+  std::filesystem::path covariance_;  ///< empty: not requested
+  FitFlags flags_;
+  FitRequest request_;  ///< only its numbers
+  std::vector<double> band_hz_;
+};
 
 FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "model.json to write")->required();
-  command->add_option(
-      "--covariance", covariance_,
-      "FILE.h5 to write: covariance of all parameters (sandwich and maximum likelihood) with names "
-      "and units, and the model response with its variance and 95 % radius");
+  command->add_option("--covariance", covariance_,
+                      "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
+                      "radius of the model response");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
   command->add_option("--modes", flags_.modes,
                       "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
@@ -41,52 +61,49 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "--weighting", flags_.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
-  command->add_option("--hold", flags_.hold, "none | phase | sinc | exact; default: from the FRF");
-  command->add_option(
-      "--delay", flags_.delay,
-      "SECONDS | estimate | per_channel; default: from the FRF, per_channel if the data "
-      "require it");
-  command->add_option(
-      "--rigid-body", flags_.rigid_body,
-      "none | full | RANK: the term B_0 / s^2 | suspension: a mode below the lines instead, for a "
-      "rigid body on weak springs | suspension:F1:F2: at these known frequencies, Hz | auto: none, "
-      "full or suspension, as the data require; default: auto, or none with --submodel or if the "
-      "outputs are accelerations");
-  command->add_option(
-      "--direct-term", flags_.direct_term,
-      "none | full: a constant, the compliance of modes above the band; default: as "
-      "the data require, full if the outputs are accelerations");
+  command->add_option("--hold", flags_.hold,
+                      "none | phase: half a sample of delay | sinc: also its magnitude | exact: "
+                      "hold, delay and sampler, including aliasing. Default: from the FRF");
+  command->add_option("--delay", flags_.delay,
+                      "SECONDS | estimate | per_channel. Default: from the FRF; per_channel if the "
+                      "data require it");
+  command->add_option("--rigid-body", flags_.rigid_body,
+                      "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
+                      "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
+                      "known frequencies in Hz | auto: chosen from the data. Default: auto, or "
+                      "none with --submodel or if the outputs are accelerations");
+  command->add_option("--direct-term", flags_.direct_term,
+                      "none | full: a constant, the compliance of modes above the band. Default: "
+                      "chosen from the data; full if the outputs are accelerations");
   command
       ->add_option("--residue-rank", flags_.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
       ->capture_default_str();
   command
-      ->add_option(
-          "--submodel", flags_.submodels,
-          "(B_0 + ... + B_m s^m) / (s^l A), A of order n: l=0,n=4,m=3,f=120:180,zeta=0.01; "
-          "repeatable. Default of m: n + l - 1. f: starting frequencies of the poles in Hz, one "
-          "per pair, the real pole of an odd n last; default: a search. n=auto: one denominator "
-          "for all modes that a search finds")
+      ->add_option("--submodel", flags_.submodels,
+                   "adds the term (B_0 + ... + B_m s^m) / (s^l A) with A of order n, such as "
+                   "n=4,m=3,f=120:180,zeta=0.01; repeatable. m: n + l - 1 if omitted. f: starting "
+                   "frequencies in Hz, one per pole pair, then the real pole of an odd n; found by "
+                   "a search if omitted. n=auto: one denominator for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option(
-      "--damping", flags_.damping,
-      "proportional | general: numerators B_0, or B_0 + B_1 s; default: as the data "
-      "require, general if the outputs are accelerations");
-  command->add_option("--method", flags_.method, "riv | gn | sk")->capture_default_str();
+  command->add_option("--damping", flags_.damping,
+                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
+                      "the data; general if the outputs are accelerations");
+  command
+      ->add_option(
+          "--method", flags_.method,
+          "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
+      ->capture_default_str();
   command->add_option("--max-iterations", request_.max_iterations, "iterations per fit")
       ->capture_default_str();
   command
       ->add_option("--search-seconds", request_.search_seconds,
-                   "budget of the mode search, in seconds of a typical core; counted in work, so "
-                   "the result does not depend on the machine. When it is used up, the best model "
-                   "so far is written and the exit code is 3. 0: unlimited")
+                   "budget of the mode search in seconds of a typical core, counted as work so "
+                   "that the result does not depend on the machine. If it is used up, the best "
+                   "model so far is written and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)
       ->capture_default_str();
-  command->add_option("--seed", seed_, "ignored: the fit is deterministic");
-  command
-      ->add_option("--threads", request_.threads, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, request_.threads);
   command->final_callback([this] { run(); });
 }
 
@@ -153,6 +170,12 @@ void FitCommand::run() const {
     console_.warning(fmt::format(
         "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
         output_.string(), result.message));
+}
+
+}  // namespace
+
+std::shared_ptr<void> fit_command(CLI::App& app, Console& console) {
+  return std::make_shared<FitCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,12 +1,15 @@
-#include "tools/commands/frf_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "acquisition/files/json_members.hpp"
@@ -19,6 +22,7 @@
 #include "tools/commands/command_line.hpp"
 #include "tools/fit/frf_quality.hpp"
 #include "tools/steps/fft_wisdom_file.hpp"
+#include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -65,7 +69,33 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
   return json;
 }
 
-}  // namespace
+/// stageid frf LOG... -o frf.h5
+class FrfCommand {
+ public:
+  FrfCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  FrfStep estimate(const FrfOptions& options) const;
+
+  Console& console_;
+  std::vector<std::filesystem::path> logs_;
+  std::filesystem::path output_;
+  std::filesystem::path stage_;
+  std::filesystem::path fft_wisdom_;
+  bool no_health_ = false;
+  std::vector<std::string> inputs_;
+  std::vector<std::string> outputs_;
+  std::vector<int> realizations_;
+  std::optional<int> transient_periods_;
+  std::optional<double> delay_s_;
+  std::string method_ = "periodic";
+  std::string periods_ = "consistent";
+  int covariance_lines_ = 1;
+  std::string covariance_ = "diagonal";
+  std::string compensate_ = "none";
+  int threads_ = 0;
+};
 
 FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
@@ -74,38 +104,42 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("--inputs", inputs_, "actuators A,B,...; default: the excited ones")
       ->delimiter(',');
   command->add_option("--outputs", outputs_, "sensors C,D,...; default: all")->delimiter(',');
-  command->add_option("--realizations", realizations_, "1-based; default: all complete ones")
+  command->add_option("--realizations", realizations_, "counted from 1; default: all complete ones")
       ->delimiter(',');
   command->add_option(
       "--transient-periods", transient_periods_,
-      "periods to discard at the start of each run; default: as declared in the log (lpm: 0)");
-  command->add_option("--method", method_, "periodic | lpm (whole records, transient modelled)")
+      "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
+  command
+      ->add_option("--method", method_,
+                   "periodic: means over periods | lpm: whole records, transient modelled")
       ->check(CLI::IsMember({"periodic", "lpm"}))
       ->capture_default_str();
   command
       ->add_option("--periods", periods_,
-                   "consistent (without glitches, bumps and transients; lpm: without glitches) | "
-                   "unmarked (all)")
+                   "consistent: discard periods with glitches, bumps or transients (lpm: only "
+                   "glitches) | unmarked: use all periods without marked samples")
       ->check(CLI::IsMember({"consistent", "unmarked"}))
       ->capture_default_str();
   command
       ->add_option("--smooth-covariance", covariance_lines_,
-                   "average the noise covariance over LINES (odd) neighbouring lines; raises its "
-                   "degrees of freedom")
+                   "odd number of neighbouring lines over which the noise covariance is averaged; "
+                   "more lines give it more degrees of freedom")
       ->type_name("LINES")
       ->check(kPositive)
       ->capture_default_str();
-  command->add_option("--covariance", covariance_, "diagonal | full")
+  command
+      ->add_option("--covariance", covariance_,
+                   "diagonal: variances | full: also the covariances between channels")
       ->check(CLI::IsMember({"diagonal", "full"}))
       ->capture_default_str();
   command
       ->add_option("--compensate", compensate_,
-                   "remove from the response: none | delay | hold (and delay)")
+                   "remove from the response: none | delay | hold: hold and delay")
       ->check(CLI::IsMember({"none", "delay", "hold"}))
       ->capture_default_str();
   command->add_option("--delay", delay_s_,
-                      "with --compensate: delay in addition to the half sample of the hold, s; "
-                      "default: as declared in the log");
+                      "delay to remove with --compensate, in s, without the half sample of the "
+                      "hold; default: as declared in the log");
   command->add_option(
       "--stage", stage_,
       "stage file for the health checks of the data; default: the one stored in the log");
@@ -114,9 +148,7 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
       ->add_option("--fft-wisdom", fft_wisdom_,
                    "store FFT plans found by timing in FILE and reuse those already there")
       ->type_name("FILE");
-  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }
 
@@ -176,6 +208,12 @@ void FrfCommand::run() const {
   nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
   if (!no_health_) json["health"] = health_json(step.findings);
   console_.result(json);
+}
+
+}  // namespace
+
+std::shared_ptr<void> frf_command(CLI::App& app, Console& console) {
+  return std::make_shared<FrfCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,18 +1,35 @@
-#include "tools/commands/help_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "acquisition/files/key_suggestion.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/manual/command_tree.hpp"
 
 namespace stageid {
+namespace {
 
-HelpCommand::HelpCommand(CLI::App& app) : app_(app) {
+/// stageid help [COMMAND ...]: what `stageid COMMAND ... --help` prints.
+class HelpCommand {
+ public:
+  /// Must be created after all other commands, because it completes their names.
+  HelpCommand(CLI::App& app, Console& console);
+
+ private:
+  /// @throws std::invalid_argument for an unknown command, naming the nearest one
+  void run() const;
+
+  const CLI::App& app_;
+  std::vector<std::string> words_;
+};
+
+HelpCommand::HelpCommand(CLI::App& app, Console&) : app_(app) {
   const std::vector<std::string> names = names_of(command_tree(app).commands);
   CLI::App* command = add_command(app, "help", "Describe a command and its options");
   command
@@ -36,6 +53,12 @@ void HelpCommand::run() const {
   // Not help(): that of the program would print the help of the called command, which is this one.
   fmt::print("{}", command->get_formatter()->make_help(command, app_.get_name() + path,
                                                        CLI::AppFormatMode::Normal));
+}
+
+}  // namespace
+
+std::shared_ptr<void> help_command(CLI::App& app, Console& console) {
+  return std::make_shared<HelpCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,7 +1,8 @@
-#include "tools/commands/identify_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <stdexcept>
 
 #include "tools/commands/command_line.hpp"
@@ -9,6 +10,23 @@
 #include "tools/experiment/loop_check.hpp"
 
 namespace stageid {
+namespace {
+
+/// stageid identify CONFIG -o DIR
+class IdentifyCommand {
+ public:
+  IdentifyCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  bool resume_ = false;
+  bool force_ = false;
+  int threads_ = 0;
+};
 
 IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "identify",
@@ -19,9 +37,7 @@ IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(con
   command->add_flag("--resume", resume_,
                     "continue an interrupted identification; steps that are up to date are kept");
   command->add_flag("--force", force_, "measure even if a limit would be exceeded");
-  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }
 
@@ -35,6 +51,12 @@ void IdentifyCommand::run() const {
   require_stable_loop(config, console_);
   Identification identification(config, {output_, resume_, force_, threads_}, console_);
   console_.exit_code = identification.run();
+}
+
+}  // namespace
+
+std::shared_ptr<void> identify_command(CLI::App& app, Console& console) {
+  return std::make_shared<IdentifyCommand>(app, console);
 }
 
 }  // namespace stageid

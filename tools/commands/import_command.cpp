@@ -1,8 +1,9 @@
-#include "tools/commands/import_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -16,6 +17,7 @@
 #include "tools/exchange/import/foreign_frf.hpp"
 #include "tools/exchange/import/import_frf.hpp"
 #include "tools/exchange/import/import_log.hpp"
+#include "tools/exchange/import/import_summary.hpp"
 #include "tools/exchange/import/si_unit.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
@@ -49,7 +51,23 @@ ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate fr
   return summary_of(frf, notes);
 }
 
-}  // namespace
+/// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]; without -o it lists the
+/// content of the file.
+class ImportCommand {
+ public:
+  ImportCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  void list() const;
+  void require_input() const;
+  ImportSummary import_with_map() const;
+
+  Console& console_;
+  std::filesystem::path input_;
+  std::filesystem::path output_;
+  std::filesystem::path map_;
+};
 
 ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
@@ -59,8 +77,8 @@ ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console
                       "log also a pattern such as 'run_{realization}_{experiment}.mat'");
   command->add_option(
       "-o,--output", output_,
-      "frf.h5; for a log run.slog or run.h5; for the modes of a universal file modes.json, for "
-      "'fit --modes'; without -o the arrays of the file are listed, to help you write a map");
+      "file to write: frf.h5; run.slog or run.h5 for a log; modes.json for the mode shapes of a "
+      "universal file. Default: list the arrays of the file, to help you write a map");
   command->add_option(
       "--map", map_,
       "YAML file with the meaning of the arrays; needed if the format does not define it");
@@ -134,6 +152,12 @@ void ImportCommand::run() const {
   nlohmann::ordered_json json = {{"output", output_.string()}, {"bytes", bytes}};
   json.update(summary.json);
   console_.result(json);
+}
+
+}  // namespace
+
+std::shared_ptr<void> import_command(CLI::App& app, Console& console) {
+  return std::make_shared<ImportCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,8 +1,9 @@
-#include "tools/commands/log_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -15,8 +16,8 @@
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_recover.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/matlab/mat_log.hpp"
-#include "tools/exchange/matlab/mat_option.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/report/timing_json.hpp"
 #include "tools/steps/health_step.hpp"
@@ -89,7 +90,25 @@ Json info_json(const LogReader& log) {
   return json;
 }
 
-}  // namespace
+/// stageid log info | verify | recover | convert FILE ...
+class LogCommand {
+ public:
+  LogCommand(CLI::App& app, Console& console);
+
+ private:
+  void info() const;
+  void verify() const;
+  void recover() const;
+  void convert() const;
+
+  Console& console_;
+  std::filesystem::path file_;
+  std::filesystem::path output_;
+  bool complete_only_ = false;
+  MatVersion mat_version_ = MatVersion::v5;
+  bool health_ = false;
+  std::filesystem::path stage_;
+};
 
 LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* log = add_command(app, "log", "Inspect, verify, recover or convert a log");
@@ -227,6 +246,12 @@ void LogCommand::convert() const {
   console_.result(fmt::format("wrote {}, {:.1f} MB", output_.string(),
                               static_cast<double>(std::filesystem::file_size(output_)) / 1e6));
   console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace
+
+std::shared_ptr<void> log_command(CLI::App& app, Console& console) {
+  return std::make_shared<LogCommand>(app, console);
 }
 
 }  // namespace stageid

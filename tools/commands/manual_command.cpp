@@ -1,7 +1,8 @@
-#include "tools/commands/manual_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -15,6 +16,21 @@
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
+namespace {
+
+/// stageid manual -o DIR
+class ManualCommand {
+ public:
+  /// The commands of `app` are read when this command runs, because all of them exist by then.
+  ManualCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  const CLI::App& app_;
+  Console& console_;
+  std::filesystem::path output_;
+};
 
 ManualCommand::ManualCommand(CLI::App& app, Console& console) : app_(app), console_(console) {
   CLI::App* command =
@@ -46,6 +62,12 @@ void ManualCommand::run() const {
   write(functions / ("_" + program.name), zsh_completion(program));
   console_.result(fmt::format("wrote {} files below {}", written.size(), output_.string()));
   console_.result(nlohmann::ordered_json{{"written", written}});
+}
+
+}  // namespace
+
+std::shared_ptr<void> manual_command(CLI::App& app, Console& console) {
+  return std::make_shared<ManualCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,10 +1,13 @@
-#include "tools/commands/modes_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "estimation/model/cmif.hpp"
 #include "frf/file/frf_file.hpp"
@@ -13,6 +16,23 @@
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
+namespace {
+
+/// stageid modes FRF [-o modes.json]
+class ModesCommand {
+ public:
+  ModesCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path frf_;
+  std::filesystem::path output_;
+  std::vector<double> band_hz_;
+  std::string kind_ = "accelerance";
+  double prominence_db_ = 3.0;
+};
 
 ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
@@ -59,6 +79,12 @@ void ModesCommand::run() const {
   for (const std::string& line : table_lines(rows)) console_.result(line);
   if (!output_.empty()) console_.result(fmt::format("wrote {}", output_.string()));
   console_.result({{"modes", list}, {"output", output_.string()}});
+}
+
+}  // namespace
+
+std::shared_ptr<void> modes_command(CLI::App& app, Console& console) {
+  return std::make_shared<ModesCommand>(app, console);
 }
 
 }  // namespace stageid

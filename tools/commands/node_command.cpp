@@ -1,4 +1,4 @@
-#include "tools/commands/node_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,15 +6,22 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/faulty_can.hpp"
+#include "hal/node/stage_node.hpp"
 #include "hal/stage/pacer.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/measure/modbus_front.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -80,7 +87,28 @@ void come_to_rest(StageNode& node, Serve serve) {
   while (forces_act(node.state()) && monotonic_ns() < give_up_ns) serve();
 }
 
-}  // namespace
+/// stageid node STAGE --can IF | --modbus-tcp PORT | --modbus-rtu DEVICE
+///
+/// One StageNode with one front end per requested kind of connection.
+class NodeCommand {
+ public:
+  NodeCommand(CLI::App& app, Console& console);
+
+ private:
+  void run();
+  StageNode make_node(const StageConfig& config) const;
+  double watchdog_s(const StageConfig& config) const;
+  void serve_can(const StageConfig& config, StageNode& node) const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::vector<std::string> can_interfaces_;
+  std::vector<std::string> can_faults_;
+  double pace_ = 0.0;
+  double hold_s_ = 0.1;
+  double watchdog_s_ = 0.0;
+  ModbusFront modbus_;
+};
 
 NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(
@@ -88,17 +116,19 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
       "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
   command->add_option("config", config_, "stage file (.yaml)")->required();
   command
-      ->add_option("--can", can_interfaces_,
-                   "CAN FD interfaces, one per bus of the stage file, in the same order: can0,can1")
+      ->add_option(
+          "--can", can_interfaces_,
+          "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
       ->delimiter(',');
   command
       ->add_option("--can-fault", can_faults_,
-                   "corrupt measurement frames: lost@100x3, repeated@, swapped@, late@100:0.004, "
-                   "corrupt@, shortened@, foreign@ (KIND@FRAME[xCOUNT][:SECONDS])")
+                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
+                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
+                   "lost@100x3,late@500:0.004")
       ->delimiter(',');
   command
       ->add_option("--pace", pace_,
-                   "speed of resident experiments; 0: as fast as possible, 1: wall clock")
+                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
       ->check(kNotNegative)
       ->capture_default_str();
   command
@@ -109,10 +139,10 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
       ->capture_default_str();
   modbus_.add_options(*command);
   command
-      ->add_option("--watchdog", watchdog_s_,
-                   "the node stops if a measuring host is silent for this many seconds; 0, the "
-                   "default: 'watchdog_s' of the group 'can', or over Modbus a sample longer than "
-                   "a repeated request takes")
+      ->add_option(
+          "--watchdog", watchdog_s_,
+          "stop the stage if a measuring host is silent for this many seconds; 0: 'watchdog_s' of "
+          "the group 'can', or over Modbus one sample longer than a repeated request takes")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([this] { run(); });
 }
@@ -194,6 +224,12 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
   while (!interrupt_flag()) front.serve(socket.now_ns() + kTick_ns);
 
   come_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
+}
+
+}  // namespace
+
+std::shared_ptr<void> node_command(CLI::App& app, Console& console) {
+  return std::make_shared<NodeCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,17 +1,22 @@
-#include "tools/commands/plot_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <numeric>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "estimation/model/cmif.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/plot/gnuplot.hpp"
+#include "tools/plot/picture.hpp"
 #include "tools/plot/response_pictures.hpp"
+#include "tools/report/report.hpp"
 #include "tools/report/report_input.hpp"
 #include "tools/terminal/output_paths.hpp"
 
@@ -44,7 +49,24 @@ Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
   return all[0];
 }
 
-}  // namespace
+/// stageid plot {cmif|bode|entry} FRF [MODEL] -o FILE.{pdf,svg,png}
+class PlotCommand {
+ public:
+  PlotCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+  Picture picture(const ReportData& data) const;
+  Picture cmif(const ReportData& data) const;
+  Picture entry(const ReportData& data) const;
+
+  Console& console_;
+  std::string figure_;
+  std::vector<std::filesystem::path> inputs_;
+  std::vector<std::string> output_channels_;
+  std::vector<std::string> input_channels_;
+  std::filesystem::path output_;
+};
 
 PlotCommand::PlotCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
@@ -113,6 +135,12 @@ void PlotCommand::run() const {
   console_.result({{"output", output_.string()},
                    {"figure", figure_},
                    {"bytes", std::filesystem::file_size(output_)}});
+}
+
+}  // namespace
+
+std::shared_ptr<void> plot_command(CLI::App& app, Console& console) {
+  return std::make_shared<PlotCommand>(app, console);
 }
 
 }  // namespace stageid

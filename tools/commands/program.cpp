@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -15,23 +16,8 @@
 #include "acquisition/files/key_suggestion.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/files/version.hpp"
-#include "tools/commands/config_command.hpp"
-#include "tools/commands/design_command.hpp"
-#include "tools/commands/export_command.hpp"
-#include "tools/commands/fit_command.hpp"
-#include "tools/commands/frf_command.hpp"
-#include "tools/commands/help_command.hpp"
-#include "tools/commands/identify_command.hpp"
-#include "tools/commands/import_command.hpp"
-#include "tools/commands/log_command.hpp"
-#include "tools/commands/manual_command.hpp"
-#include "tools/commands/modes_command.hpp"
-#include "tools/commands/node_command.hpp"
-#include "tools/commands/plot_command.hpp"
-#include "tools/commands/report_command.hpp"
-#include "tools/commands/run_command.hpp"
+#include "tools/commands/commands.hpp"
 #include "tools/commands/usage_problem.hpp"
-#include "tools/commands/validate_command.hpp"
 #include "tools/manual/command_tree.hpp"
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -59,23 +45,12 @@ not to be trusted, the result contains the reason; 4 stopped for safety; 130 int
 /// The CLI11 parser and the commands.
 class Program {
  public:
-  Program()
-      : identify_(app_, console_),
-        design_(app_, console_),
-        run_(app_, console_),
-        log_(app_, console_),
-        frf_(app_, console_),
-        modes_(app_, console_),
-        fit_(app_, console_),
-        validate_(app_, console_),
-        export_(app_, console_),
-        import_(app_, console_),
-        report_(app_, console_),
-        plot_(app_, console_),
-        config_(app_, console_),
-        node_(app_, console_),
-        manual_(app_, console_),
-        help_(app_) {
+  Program() {
+    for (const auto command :
+         {identify_command, design_command, run_command, log_command, frf_command, modes_command,
+          fit_command, validate_command, export_command, import_command, report_command,
+          plot_command, config_command, node_command, manual_command, help_command})
+      commands_.push_back(command(app_, console_));
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
@@ -175,22 +150,7 @@ class Program {
 
   Console console_;
   CLI::App app_{"Measures and identifies multivariable motion stages in closed loop"};
-  IdentifyCommand identify_;
-  DesignCommand design_;
-  RunCommand run_;
-  LogCommand log_;
-  FrfCommand frf_;
-  ModesCommand modes_;
-  FitCommand fit_;
-  ValidateCommand validate_;
-  ExportCommand export_;
-  ImportCommand import_;
-  ReportCommand report_;
-  PlotCommand plot_;
-  ConfigCommand config_;
-  NodeCommand node_;
-  ManualCommand manual_;
-  HelpCommand help_;
+  std::vector<std::shared_ptr<void>> commands_;
 };
 
 }  // namespace

@@ -1,10 +1,12 @@
-#include "tools/commands/report_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "tools/commands/command_line.hpp"
 #include "tools/report/report_input.hpp"
@@ -13,6 +15,21 @@
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
+namespace {
+
+/// stageid report DIR|FILE... -o report.html
+class ReportCommand {
+ public:
+  ReportCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::vector<std::filesystem::path> inputs_;
+  std::vector<std::filesystem::path> compare_;
+  std::filesystem::path output_;
+};
 
 ReportCommand::ReportCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "report", "Write a self-contained interactive HTML page");
@@ -51,6 +68,12 @@ void ReportCommand::run() const {
   console_.exit_code = kNotTrustworthy;
   console_.warning(
       fmt::format("{}: not to be trusted: {}", output_.string(), fmt::join(verdict.reasons, "; ")));
+}
+
+}  // namespace
+
+std::shared_ptr<void> report_command(CLI::App& app, Console& console) {
+  return std::make_shared<ReportCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -1,11 +1,13 @@
-#include "tools/commands/run_command.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 
 #include "acquisition/files/counted.hpp"
 #include "tools/commands/command_line.hpp"
@@ -27,7 +29,27 @@ Backend backend_of(const std::string& name, Backend configured) {
       "--backend: unknown back end '{}'; use sim, can, modbus, plugin or replay", name));
 }
 
-}  // namespace
+/// stageid run CONFIG -o run.slog
+class RunCommand {
+ public:
+  RunCommand(CLI::App& app, Console& console);
+
+ private:
+  void run() const;
+
+  Console& console_;
+  std::filesystem::path config_;
+  std::filesystem::path output_;
+  std::string backend_;
+  std::filesystem::path replay_;
+  double replay_tolerance_n_ = 1e-9;
+  double pace_ = -1.0;
+  std::filesystem::path excitation_;
+  double until_ = 0.0;
+  std::string dashboard_;
+  bool resume_ = false;
+  bool reset_fault_ = false;
+};
 
 RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
@@ -35,30 +57,29 @@ RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option("-o,--output", output_, "log to write (.slog)")->required();
   command->add_option("--backend", backend_,
                       "sim | can | modbus | plugin | replay; default: from the stage file");
-  command->add_option("--replay", replay_, "backend replay: the log to replay");
+  command->add_option("--replay", replay_, "log to replay with --backend replay");
   command
-      ->add_option(
-          "--replay-tolerance", replay_tolerance_n_,
-          "backend replay: largest allowed difference between a command and the recorded one, in "
-          "the unit of the actuators")
+      ->add_option("--replay-tolerance", replay_tolerance_n_,
+                   "largest allowed difference between a command and the replayed one, in the unit "
+                   "of the actuator")
       ->capture_default_str();
   command
       ->add_option("--pace", pace_,
                    "0: as fast as possible; 1: wall clock; default: from the stage file")
       ->check(kNotNegative);
   command->add_option("--excitation", excitation_,
-                      "excitation.h5 of 'stageid design': use it instead of a new design");
+                      "play this result of 'stageid design' instead of designing again");
   command
       ->add_option("--until", until_,
-                   "VARIANCE: stop as soon as the mean relative variance of the response is at "
-                   "most this, e.g. 1e-6 for 0.1 %; checked after every realization")
+                   "VARIANCE: stop after the realization that lowers the mean relative variance of "
+                   "the response to this value, e.g. 1e-6 for 0.1 %")
       ->check(kPositive);
   command->add_flag("--resume", resume_,
-                    "continue an interrupted log: complete runs are not repeated");
+                    "continue an interrupted log; complete runs are not repeated");
   command->add_option("--dashboard", dashboard_,
-                      "PORT: show the experiment in a browser on this machine (0: any free port); "
-                      "HOST:PORT: also on other machines, which need the token in the printed "
-                      "address; stopping the run always needs the token");
+                      "live view in a browser. PORT: on this machine (0: any free port) | "
+                      "HOST:PORT: also on others. The printed address contains the token that "
+                      "other machines and the stop button need");
   command->add_flag("--reset-fault", reset_fault_,
                     "clear a fault of the node or plant before the first run");
   command->final_callback([this] { run(); });
@@ -119,6 +140,12 @@ void RunCommand::run() const {
   if (result.exit_code != 0)
     console_.warning(fmt::format("{}{}", named(output_, result.message),
                                  complete < result.runs_total ? advice_behind(result) : ""));
+}
+
+}  // namespace
+
+std::shared_ptr<void> run_command(CLI::App& app, Console& console) {
+  return std::make_shared<RunCommand>(app, console);
 }
 
 }  // namespace stageid

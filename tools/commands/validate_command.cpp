@@ -1,24 +1,29 @@
-#include "tools/commands/validate_command.hpp"
-#include "tools/steps/fit_step.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/modal/prediction_error.hpp"
+#include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
+#include "tools/steps/fit_step.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
@@ -29,11 +34,7 @@ namespace {
 
 /// An HDF5 file with the format of an FRF; all other files are treated as logs.
 bool is_frf(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  char head[8] = {};
-  stream.read(head, sizeof head);
-  constexpr char kHdf5[8] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
-  if (!std::equal(std::begin(head), std::end(head), std::begin(kHdf5))) return false;
+  if (!is_hdf5(file)) return false;
   const Hdf5File hdf5 = Hdf5File::open(file);
   if (hdf5.has_attribute("/", "format"))
     return hdf5.read_text_attribute("/", "format") == "stageid-frf";
@@ -64,44 +65,24 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
   return lines;
 }
 
-}  // namespace
+/// stageid validate MODEL FRF|LOG|MODE_SHAPES
+class ValidateCommand {
+ public:
+  ValidateCommand(CLI::App& app, Console& console);
 
-std::vector<std::string> validation_lines(const Validation& v) {
-  std::vector<std::string> lines = {
-      "no channel exceeds its noise, so a relative error is undefined"};
-  if (std::isfinite(v.relative_rms_error))
-    lines[0] = fmt::format("relative error {:.4e} (channels that respond), {:.4e} (whole response)",
-                           v.relative_rms_error, v.normalized_error);
-  if (v.chi_square_per_dof > 0.0) {
-    const std::string expected = v.expected_chi_square > 0.0
-                                     ? fmt::format("{:.3f}", v.expected_chi_square)
-                                     : "undefined, the variances are too uncertain";
-    lines.push_back(fmt::format(
-        "chi-square per degree of freedom {:.3f}; expected from {} alone: {}", v.chi_square_per_dof,
-        v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
-    lines.push_back(
-        fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
-                    "limit {:.4f}",
-                    100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
-  } else {
-    lines.push_back("the data have no variances, so the error cannot be compared with noise");
-  }
-  return lines;
-}
+ private:
+  void run() const;
+  /// @throws FormatError if the model has a channel that the data lack
+  void require_channels(const std::vector<std::string>& of_data,
+                        const std::vector<std::string>& of_model, const char* kind) const;
 
-nlohmann::ordered_json validation_json(const Validation& v) {
-  return {{"relative_rms_error", v.relative_rms_error},
-          {"normalized_error", v.normalized_error},
-          {"chi_square_per_dof", v.chi_square_per_dof},
-          {"expected_chi_square", v.expected_chi_square},
-          {"variance", to_string(v.variance)},
-          {"explained", v.explained},
-          {"reason", v.reason},
-          {"whitened_above_95", v.whitened_above_95},
-          {"whiteness", v.whiteness},
-          {"whiteness_limit", v.whiteness_limit},
-          {"channel_error", std::vector<double>(v.channel_error.begin(), v.channel_error.end())}};
-}
+  Console& console_;
+  std::filesystem::path model_;
+  std::filesystem::path data_;
+  std::filesystem::path stage_;
+  std::vector<double> band_hz_;
+  int threads_ = 0;
+};
 
 ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
   CLI::App* command =
@@ -116,9 +97,7 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
   command->add_option(
       "--stage", stage_,
       "stage file for the health checks of a log; default: the one stored in the log");
-  command->add_option("--threads", threads_, "0: all cores; the result does not depend on it")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }
 
@@ -183,6 +162,12 @@ void ValidateCommand::run() const {
   json.update(verdict_json(verdict));
   if (!verdict.trustworthy) console_.exit_code = kNotTrustworthy;
   console_.result(json);
+}
+
+}  // namespace
+
+std::shared_ptr<void> validate_command(CLI::App& app, Console& console) {
+  return std::make_shared<ValidateCommand>(app, console);
 }
 
 }  // namespace stageid

@@ -18,13 +18,13 @@ constexpr double kLeastWatchdog_s = 20e-3;
 void describe_bus(ConfigVisitor& v, std::vector<CanFile::Bus>& list) {
   CanFile::Bus bus;
   v.text("interface", bus.spec.interface, kRequired,
-         "interface name on the host and the node, e.g. can0; with mode: resident also "
-         "tcp://HOST:PORT, "
-         "a node behind ZeroMQ");
-  v.number("nominal_bit_rate_hz", bus.spec.nominal_bit_rate_hz, positive("bit/s"), kOptional,
-           "of the arbitration phase; used for the bus load only, 'ip link' sets it");
+         "name of the interface on host and node, such as can0; with mode: resident also "
+         "tcp://HOST:PORT, a node behind ZeroMQ");
+  v.number(
+      "nominal_bit_rate_hz", bus.spec.nominal_bit_rate_hz, positive("bit/s"), kOptional,
+      "bit rate of the arbitration phase, used for the bus load only; 'ip link' sets the real one");
   v.number("data_bit_rate_hz", bus.spec.data_bit_rate_hz, positive("bit/s"), kOptional,
-           "of the data phase; used for the bus load only");
+           "bit rate of the data phase, used for the bus load only");
   v.texts("actuators", bus.actuators, {}, kOptional, "names; omitted with a single bus: all");
   v.texts("sensors", bus.sensors, {}, kOptional, "names; omitted with a single bus: all");
   list.push_back(std::move(bus));
@@ -70,9 +70,8 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
   f.config.present = true;
   choose(v, "mode", f.config.mode, {"streaming", "resident"}, kOptional,
          "streaming: sample by sample; resident: the node runs the experiment in its own loop");
-  v.items(
-      "buses", [&](ConfigVisitor& bus) { describe_bus(bus, f.buses); }, {1, 16}, kRequired,
-      "CAN FD buses; the first one also carries commands and transfers");
+  items(v, "buses", describe_bus, f.buses, {1, 16}, kRequired,
+        "CAN FD buses; the first one also carries commands and transfers");
   v.numbers(
       "actuator_range_n", f.actuator_range_n, positive("N"), {}, kOptional,
       "full scale of 2^23 counts; one for all or one per actuator; omitted: 1.25 times limit_n");
@@ -85,14 +84,14 @@ void describe_can(ConfigVisitor& v, CanFile& f) {
             "the same in the units of the sensors");
   std::size_t clock = spec.node_clock ? 1 : 0;
   v.choice("clock", clock, {"host", "node"}, kOptional,
-           "of the samples; node: the node samples at its own ticks and the host follows it, with "
-           "pace: 1");
+           "clock of the samples. node: the node samples at its own ticks, and the host follows it "
+           "with pace: 1");
   spec.node_clock = clock == 1;
   v.number("reply_timeout_s", spec.reply_timeout_s, positive("s"), kOptional,
            "the host waits this long for a reply");
   v.number("watchdog_s", f.watchdog_s, not_negative("s"), kOptional,
-           "the node stops if it receives no setpoint for this long; 0: a period longer than the "
-           "replacement of a lost frame takes, at least 20 ms");
+           "the node stops if it receives no setpoint for this long. 0: one period more than it "
+           "takes to replace a lost frame, at least 20 ms");
   v.number("largest_load", spec.largest_load, {"", 0.0, 1.0, true}, kOptional,
            "largest load of a bus; experiments that need more are refused");
 }

@@ -74,164 +74,140 @@ class MapReader final : public ConfigVisitor {
 
   void number(const char* key, double& value, const NumberRule& rule, Presence presence,
               const char* help) override {
-    errors_.attempt([&] {
-      if (const YamlNode* node = find(key, presence, help)) value = parse_number(key, *node, rule);
-    });
+    read(key, presence, help, [&](const YamlNode& node) { value = parse_number(key, node, rule); });
   }
   void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
                CountRule count, Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      values.clear();
-      for (const std::size_t item : list(key, *node, count))
-        errors_.attempt([&] { values.push_back(parse_number(key, document_.node(item), rule)); });
-    });
+    read_list(key, values, count, presence, help,
+              [&](const YamlNode& item) { values.push_back(parse_number(key, item, rule)); });
   }
   void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
                Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      const char* end = node->text.data() + node->text.size();
+    read(key, presence, help, [&](const YamlNode& node) {
+      const char* end = node.text.data() + node.text.size();
       std::int64_t parsed = 0;
-      const auto [stop, error] = std::from_chars(node->text.data(), end, parsed);
-      if (node->kind != YamlNode::Kind::scalar || !node->plain || stop != end ||
-          error != std::errc{})
-        wrong(key, *node, "a whole number");
+      const auto [stop, error] = std::from_chars(node.text.data(), end, parsed);
+      if (node.kind != YamlNode::Kind::scalar || !node.plain || stop != end || error != std::errc{})
+        wrong(key, node, "a whole number");
       if (parsed < low || parsed > high)
-        document_.fail(node->mark, fmt::format("{}: {} is out of range; expected {}", key, parsed,
-                                               describe_range(low, high)));
+        document_.fail(node.mark, fmt::format("{}: {} is out of range; expected {}", key, parsed,
+                                              describe_range(low, high)));
       value = parsed;
     });
   }
   void text(const char* key, std::string& value, Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      if (const YamlNode* node = find(key, presence, help)) value = parse_text(key, *node);
-    });
+    read(key, presence, help, [&](const YamlNode& node) { value = parse_text(key, node); });
   }
   void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
              const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      values.clear();
-      for (const std::size_t item : list(key, *node, count))
-        errors_.attempt([&] {
-          values.push_back(parse_text(key, document_.node(item)));
-          if (std::count(values.begin(), values.end(), values.back()) > 1)
-            document_.fail(document_.node(item).mark,
-                           fmt::format("{}: duplicate entry '{}'; keep one", key, values.back()));
-        });
+    read_list(key, values, count, presence, help, [&](const YamlNode& item) {
+      values.push_back(parse_text(key, item));
+      if (std::count(values.begin(), values.end(), values.back()) > 1)
+        document_.fail(item.mark,
+                       fmt::format("{}: duplicate entry '{}'; keep one", key, values.back()));
     });
   }
   void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
               Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      const auto found = std::find(names.begin(), names.end(), node->text);
-      if (node->kind != YamlNode::Kind::scalar || found == names.end())
-        wrong_word(key, *node, names);
+    read(key, presence, help, [&](const YamlNode& node) {
+      const auto found = std::find(names.begin(), names.end(), node.text);
+      if (node.kind != YamlNode::Kind::scalar || found == names.end()) wrong_word(key, node, names);
       index = static_cast<std::size_t>(found - names.begin());
     });
   }
   void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
                 const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
+    read(key, presence, help, [&](const YamlNode& node) {
       FlexibleValue given;  // keeps the default if invalid, so that later checks can continue
       const std::size_t errors = errors_.size();
-      if (node->kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
+      if (node.kind == YamlNode::Kind::sequence && (rule.list || rule.pairs)) {
         given.is_list = true;
-        for (const std::size_t item : list(key, *node, {1}))
+        for (const std::size_t item : list(key, node, {1}))
           errors_.attempt([&] { read_item(key, document_.node(item), rule, given); });
-      } else if (node->kind == YamlNode::Kind::scalar && is_word(*node, rule)) {
-        given.word = node->text;
-      } else if (node->kind == YamlNode::Kind::scalar && rule.number && looks_numeric(*node)) {
-        given.numbers = {parse_number(key, *node, rule.rule)};
-      } else if (node->kind == YamlNode::Kind::scalar && rule.any_text && !node->text.empty()) {
-        given.word = node->text;
+      } else if (node.kind == YamlNode::Kind::scalar && is_word(node, rule)) {
+        given.word = node.text;
+      } else if (node.kind == YamlNode::Kind::scalar && rule.number && looks_numeric(node)) {
+        given.numbers = {parse_number(key, node, rule.rule)};
+      } else if (node.kind == YamlNode::Kind::scalar && rule.any_text && !node.text.empty()) {
+        given.word = node.text;
       } else {
-        wrong(key, *node, describe_forms(rule) + nearest_of(*node, rule.words));
+        wrong(key, node, describe_forms(rule) + nearest_of(node, rule.words));
       }
       if (errors_.size() == errors) value = std::move(given);
     });
   }
   void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
                      const NumberRule& rule, Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: number, ...}");
-      values.clear();
-      for (const YamlNode::Entry& entry : node->entries)
-        errors_.attempt([&] {
-          values.emplace_back(entry.key,
-                              parse_number(entry.key.c_str(), document_.node(entry.value), rule));
-        });
-    });
+    read_names(
+        key, values, "a map {name: number, ...}", presence, help,
+        [&](const char* name, const YamlNode& value) { return parse_number(name, value, rule); });
   }
   void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>& values,
                    Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      if (node->kind != YamlNode::Kind::map) wrong(key, *node, "a map {name: text, ...}");
-      values.clear();
-      for (const YamlNode::Entry& entry : node->entries)
-        errors_.attempt([&] {
-          const YamlNode& value = document_.node(entry.value);
-          if (value.kind != YamlNode::Kind::scalar) wrong(entry.key.c_str(), value, "a text");
-          values.emplace_back(entry.key, value.text);
-        });
-    });
+    read_names(key, values, "a map {name: text, ...}", presence, help,
+               [&](const char* name, const YamlNode& value) {
+                 if (value.kind != YamlNode::Kind::scalar) wrong(name, value, "a text");
+                 return value.text;
+               });
   }
   void group(const char* key, const Describe& describe, Presence presence,
              const char* help) override {
-    errors_.attempt([&] {
-      if (const YamlNode* node = find(key, presence, help)) read_map(key, *node, describe);
-    });
+    read(key, presence, help, [&](const YamlNode& node) { read_map(key, node, describe); });
   }
   void group_or_text(const char* key, const Describe& describe, std::string& text,
                      Presence presence, const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
-      if (node->kind == YamlNode::Kind::scalar && !node->text.empty())
-        text = node->text;
+    read(key, presence, help, [&](const YamlNode& node) {
+      if (node.kind == YamlNode::Kind::scalar && !node.text.empty())
+        text = node.text;
       else
-        read_map(key, *node, describe);
+        read_map(key, node, describe);
     });
   }
   void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
              const char* help) override {
-    errors_.attempt([&] {
-      const YamlNode* node = find(key, presence, help);
-      if (node == nullptr) return;
+    read(key, presence, help, [&](const YamlNode& node) {
       std::size_t index = 0;
-      for (const std::size_t item : list(key, *node, count))
+      for (const std::size_t item : list(key, node, count))
         read_map(fmt::format("{} {}", key, ++index), document_.node(item), describe_item);
     });
   }
   void require(bool holds, const char* key, const std::string& message) override {
     if (holds) return;
-    const YamlNode::Entry* entry = entry_of(key);
-    broken_.emplace_back(entry == nullptr ? map_.mark : document_.node(entry->value).mark, message);
+    const YamlNode* value = document_.value(map_, key);
+    broken_.emplace_back(value == nullptr ? map_.mark : value->mark, message);
   }
 
  private:
-  const YamlNode::Entry* entry_of(std::string_view key) const {
-    const auto found = std::find_if(map_.entries.begin(), map_.entries.end(),
-                                    [&](const YamlNode::Entry& entry) { return entry.key == key; });
-    return found == map_.entries.end() ? nullptr : &*found;
-  }
-  const YamlNode* find(const char* key, Presence presence, const char* help) {
+  /// Calls `take` with the value of a key, if the map has it; collects the errors.
+  template <typename Take>
+  void read(const char* key, Presence presence, const char* help, Take take) {
     known_.emplace_back(key);
-    if (const YamlNode::Entry* entry = entry_of(key)) return &document_.node(entry->value);
-    if (presence == Presence::required) missing_.emplace_back(key, help);
-    return nullptr;
+    const YamlNode* value = document_.value(map_, key);
+    if (value != nullptr)
+      errors_.attempt([&] { take(*value); });
+    else if (presence == Presence::required)
+      missing_.emplace_back(key, help);
+  }
+  template <typename Values, typename Take>
+  void read_list(const char* key, Values& values, CountRule count, Presence presence,
+                 const char* help, Take take) {
+    read(key, presence, help, [&](const YamlNode& node) {
+      values.clear();
+      for (const std::size_t item : list(key, node, count))
+        errors_.attempt([&] { take(document_.node(item)); });
+    });
+  }
+  template <typename Values, typename Parse>
+  void read_names(const char* key, Values& values, const char* right, Presence presence,
+                  const char* help, Parse parse) {
+    read(key, presence, help, [&](const YamlNode& node) {
+      if (node.kind != YamlNode::Kind::map) wrong(key, node, right);
+      values.clear();
+      for (const YamlNode::Entry& entry : node.entries)
+        errors_.attempt([&] {
+          values.emplace_back(entry.key, parse(entry.key.c_str(), document_.node(entry.value)));
+        });
+    });
   }
   void read_map(const std::string& name, const YamlNode& node, const Describe& describe) {
     errors_.attempt([&] {

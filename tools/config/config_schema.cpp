@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "tools/config/number_range.hpp"
 
@@ -57,6 +58,7 @@ class SchemaCollector final : public ConfigVisitor {
   void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>&,
                    Presence presence, const char* help) override {
     add(key, "map of name: text", {}, "{}", presence, help);
+    entries_.back().range.clear();
   }
   void group(const char* key, const Describe& describe, Presence presence,
              const char* help) override {
@@ -102,6 +104,29 @@ class SchemaCollector final : public ConfigVisitor {
   std::vector<SchemaEntry> entries_;
 };
 
+/// One past the last key in the group at `k`; k + 1 if it is no group.
+std::size_t end_of_group(const std::vector<SchemaEntry>& entries, std::size_t k) {
+  std::size_t end = k + 1;
+  while (end < entries.size() && entries[end].depth > entries[k].depth) ++end;
+  return end;
+}
+
+/// The key of the first of the equal groups just before [k, end); null if there is none.
+const std::string* same_group_before(const std::vector<SchemaEntry>& entries, std::size_t k,
+                                     std::size_t end) {
+  const std::size_t size = end - k;
+  if (k < size || end_of_group(entries, k - size) != k) return nullptr;
+  const auto first = entries.begin() + static_cast<std::ptrdiff_t>(k - size);
+  const auto same = [](const SchemaEntry& a, const SchemaEntry& b) {
+    return std::tie(a.depth, a.key, a.type, a.range, a.default_value, a.required, a.help) ==
+           std::tie(b.depth, b.key, b.type, b.range, b.default_value, b.required, b.help);
+  };
+  const auto last = first + static_cast<std::ptrdiff_t>(size);
+  if (!std::equal(first + 1, last, last + 1, same)) return nullptr;
+  const std::string* earlier = same_group_before(entries, k - size, k);
+  return earlier != nullptr ? earlier : &first->key;
+}
+
 }  // namespace
 
 std::vector<SchemaEntry> config_schema(const ConfigVisitor::Describe& describe) {
@@ -112,15 +137,20 @@ std::vector<SchemaEntry> config_schema(const ConfigVisitor::Describe& describe) 
 
 std::string schema_text(const std::vector<SchemaEntry>& entries) {
   std::string text;
-  for (const SchemaEntry& entry : entries) {
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    const SchemaEntry& entry = entries[k];
     std::vector<std::string> notes = {entry.type};
     if (!entry.range.empty()) notes.push_back(entry.range);
     if (entry.required) notes.emplace_back("required");
     if (!entry.default_value.empty())
       notes.push_back(fmt::format("default {}", entry.default_value));
+    const std::size_t end = end_of_group(entries, k);
+    const std::string* like = end > k + 1 ? same_group_before(entries, k, end) : nullptr;
+    if (like != nullptr) notes = {fmt::format("the keys of {}", *like)};
     const std::string key =
         std::string(static_cast<std::size_t>(2 * entry.depth), ' ') + entry.key + ":";
-    text += fmt::format("{:<28} # {}. {}\n", key, fmt::join(notes, "; "), entry.help);
+    text += fmt::format("{:<28} # {} ({})\n", key, entry.help, fmt::join(notes, "; "));
+    if (like != nullptr) k = end - 1;
   }
   return text;
 }

@@ -102,6 +102,22 @@ void choose(ConfigVisitor& visitor, const char* key, Enum& value,
   value = static_cast<Enum>(index);
 }
 
+/// group() whose keys fill one object.
+template <typename Keys>
+void group(ConfigVisitor& visitor, const char* key, void (*describe)(ConfigVisitor&, Keys&),
+           Keys& keys, Presence presence, const char* help) {
+  visitor.group(
+      key, [&](ConfigVisitor& inner) { describe(inner, keys); }, presence, help);
+}
+
+/// items() that each add an element to a list.
+template <typename List>
+void items(ConfigVisitor& visitor, const char* key, void (*describe)(ConfigVisitor&, List&),
+           List& list, CountRule count, Presence presence, const char* help) {
+  visitor.items(
+      key, [&](ConfigVisitor& item) { describe(item, list); }, count, presence, help);
+}
+
 /// integer() for a value of another integer type.
 template <typename Integer>
 void count(ConfigVisitor& visitor, const char* key, Integer& value, std::int64_t low,

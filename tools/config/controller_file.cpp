@@ -154,10 +154,8 @@ ControllerFile read_keys(const YamlDocument& document) {
 }  // namespace
 
 bool is_controller_file(const YamlDocument& document) {
-  const auto& entries = document.root().entries;
-  return std::any_of(entries.begin(), entries.end(), [&](const YamlNode::Entry& entry) {
-    return entry.key == "format" && document.node(entry.value).text == "stageid-controller";
-  });
+  const YamlNode* format = document.value(document.root(), "format");
+  return format != nullptr && format->text == "stageid-controller";
 }
 
 LinearControllerKeys read_discrete_controller(const YamlDocument& document,

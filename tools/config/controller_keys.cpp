@@ -87,12 +87,10 @@ std::vector<Index> positions(const std::vector<std::string>& names,
 }  // namespace
 
 void describe_linear_controller(ConfigVisitor& v, LinearControllerKeys& keys) {
-  v.group(
-      "state_space", [&](ConfigVisitor& group) { describe_state_space(group, keys); }, kOptional,
-      "matrices from y to C y, u = r - C y");
-  v.items(
-      "transfer", [&](ConfigVisitor& item) { describe_transfer(item, keys); }, {}, kOptional,
-      "transfer functions from y to C y, u = r - C y; omitted pairs: zero");
+  group(v, "state_space", describe_state_space, keys, kOptional,
+        "matrices from y to C y, u = r - C y");
+  items(v, "transfer", describe_transfer, keys, {}, kOptional,
+        "transfer functions from y to C y, u = r - C y; omitted pairs: zero");
 }
 
 Eigen::MatrixXd matrix_of(const std::vector<double>& values, Index rows, Index columns) {

@@ -62,11 +62,9 @@ void describe_modbus(ConfigVisitor& v, ModbusConfig& c) {
 }
 
 void describe_supervisor(ConfigVisitor& v, SupervisorConfig& c) {
-  v.group(
-      "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, c.link); }, kRequired,
-      "address of the supervisor");
+  group(v, "modbus", describe_modbus, c.link, kRequired, "address of the supervisor");
   v.number("poll_period_s", c.options.poll_period_s, {"s", 0.001, 60.0}, kOptional,
-           "the run ends after three periods without a good status");
+           "period of the status requests; the run ends after three without a good status");
   describe_range(v, "gravity_compensator_n", c.conditions.gravity_low_n,
                  c.conditions.gravity_high_n, "N", "[low, high] of every gravity compensator");
   describe_range(v, "temperature_k", c.conditions.temperature_low_k,

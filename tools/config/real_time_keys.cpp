@@ -13,12 +13,12 @@ void describe_real_time(ConfigVisitor& visitor, RealTimeKeys& keys) {
   visitor.choice("lock_memory", lock, {"false", "true"}, kOptional,
                  "lock the memory so that it is never swapped");
   keys.options.lock_memory = lock == 1;
-  visitor.number(
-      "jitter_s", keys.jitter_s, not_negative("s"), kOptional,
-      "on the wall clock, samples whose instant deviates by more are marked; 0: by half a sample, "
-      "or if the phase of the highest excited frequency would deviate by 0.1 rad rms in a run");
+  visitor.number("jitter_s", keys.jitter_s, not_negative("s"), kOptional,
+                 "on the wall clock, samples that are off by more are marked. 0: half a sample, "
+                 "and 0.1 rad rms of phase at the highest excited frequency in a run");
   count(visitor, "misses_allowed", keys.misses_allowed, 0, 1'000'000, kOptional,
-        "leaky bucket: +2 per bad cycle, -1 per good one; above this value the run is stopped");
+        "the run is stopped if a counter exceeds this value: +2 per bad cycle, -1 per good one, at "
+        "least 0");
 }
 
 }  // namespace stageid

@@ -16,14 +16,14 @@ void describe_channel(ConfigVisitor& v, ChannelConfig& c, const std::vector<std:
                       const char* gain) {
   std::size_t unit = 0;
   v.text("name", c.channel.name, kRequired, "name used in logs and models");
-  v.choice("unit", unit, units, kOptional, "of its values in commands, logs and models");
+  v.choice("unit", unit, units, kOptional, "unit of its values in commands, logs and models");
   c.channel.unit = units.at(unit);
   v.number("gain", c.channel.gain, any_number(""), kOptional, gain);
   v.require(c.channel.gain != 0.0, "gain", "gain: must not be zero");
   v.numbers("position_m", c.position_m, any_number("m"), {3, 3}, kRequired,
             "x, y, z from the centre of mass");
   v.numbers("direction", c.direction, any_number(""), {3, 3}, kOptional,
-            "unit vector; of a rotation: its axis");
+            "unit vector; for a rotation, its axis");
   const double length =
       c.direction.size() == 3 ? std::hypot(c.direction[0], c.direction[1], c.direction[2]) : 1.0;
   v.require(std::abs(length - 1.0) < 1e-6, "direction",
@@ -69,8 +69,9 @@ void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelCon
 void describe_actuator(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
   describe_channel(v, c, {"N", "Nm", "A", "V"}, "force in N, or torque in Nm, per unit");
-  describe_number(v, c, c.limit_n, {"limit_n", "N", "limit"}, positive(""),
-                  "largest |u|, required; the stage is stopped if it is exceeded");
+  describe_number(
+      v, c, c.limit_n, {"limit_n", "N", "limit"}, positive(""),
+      "largest |u|; the stage is stopped if it is exceeded. This key or limit is required");
   v.require(std::isfinite(c.limit_n), "name",
             "key 'limit' is missing; add it (largest |u|, in the unit of the channel)");
   describe_number(v, c, c.slew_n_s, {"slew_n_s", "N/s", "slew"}, positive(""),
@@ -90,16 +91,17 @@ void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   ChannelConfig c;
   describe_channel(v, c, {"m", "rad", "m/s^2", "rad/s^2", "V"},
                    "units per m or rad, or per m/s^2 or rad/s^2");
-  describe_number(v, c, c.window_m, {"window_m", "m", "window"}, positive(""),
-                  "largest |y|, required; the stage is stopped if it is exceeded");
+  describe_number(
+      v, c, c.window_m, {"window_m", "m", "window"}, positive(""),
+      "largest |y|; the stage is stopped if it is exceeded. This key or window is required");
   v.require(std::isfinite(c.window_m), "name",
             "key 'window' is missing; add it (largest |y|, in the unit of the channel)");
   describe_number(v, c, c.hard_window_m, {"hard_window_m", "m", "hard_window"}, not_negative(""),
                   "|y| at which forces are cut; 0: twice window_m");
   describe_number(
       v, c, c.deviation_m, {"deviation_m", "m", "deviation"}, not_negative(""),
-      "largest difference from the motion predicted from the forces; if exceeded, the "
-      "loop is opened and the stage braked; 0: half of window_m; not for accelerations");
+      "largest difference from the motion predicted from the forces; the loop is opened and the "
+      "stage braked if it is exceeded. 0: half of window_m; ignored for accelerations");
   describe_number(v, c, c.speed_m_s, {"speed_m_s", "m/s", "speed"}, positive(""),
                   "largest speed; the stage is braked if it is exceeded; inf: the speed that full "
                   "force can stop");
@@ -112,11 +114,12 @@ void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
 }
 
 void describe_plate(ConfigVisitor& v, WaferStageSpec& s) {
-  v.number("length_x_m", s.length_x_m, positive("m"), kRequired, "of the plate");
-  v.number("length_y_m", s.length_y_m, positive("m"), kRequired, "of the plate");
+  v.number("length_x_m", s.length_x_m, positive("m"), kRequired, "size of the plate along x");
+  v.number("length_y_m", s.length_y_m, positive("m"), kRequired, "size of the plate along y");
   v.number("first_mode_hz", s.first_mode_hz, positive("Hz"), kRequired,
            "scales the stiffness of the plate");
-  v.number("poisson_ratio", s.poisson_ratio, {"", 0.0, 0.499}, kOptional, "of the plate");
+  v.number("poisson_ratio", s.poisson_ratio, {"", 0.0, 0.499}, kOptional,
+           "Poisson's ratio of the plate");
   count(v, "modes", s.flexible_modes, 0, 40, kRequired, "number of flexible modes");
   v.numbers("damping", s.flexible_damping, {"", 0.0, 0.999}, {1}, kRequired,
             "damping ratio of each mode; the last one repeats");
@@ -128,9 +131,9 @@ void describe_in_plane_mode(ConfigVisitor& v, std::vector<InPlaneModeConfig>& li
   v.number("damping_ratio", m.damping_ratio, {"", 0.0, 0.999}, kRequired,
            "fraction of critical damping");
   v.named_numbers("actuators", m.actuators, any_number("kg^-1/2"), kRequired,
-                  "mass-normalized shape at the actuators that drive this mode");
+                  "mass-normalized shape at the actuators that drive it");
   v.named_numbers("sensors", m.sensors, any_number("kg^-1/2"), kRequired,
-                  "mass-normalized shape at the sensors that measure this mode");
+                  "mass-normalized shape at the sensors that measure it");
   list.push_back(std::move(m));
 }
 
@@ -143,66 +146,69 @@ void describe_plant(ConfigVisitor& v, StageFile& f) {
             "suspension by the gravity compensators: x y z Rx Ry Rz; 0: free");
   v.number("suspension_damping", s.suspension_damping, {"", 0.0, 0.999}, kOptional,
            "damping ratio of the suspension");
-  v.group(
-      "plate", [&](ConfigVisitor& plate) { describe_plate(plate, s); }, kRequired,
-      "free rectangular plate: the flexible modes out of plane");
-  v.items(
-      "in_plane_modes",
-      [&](ConfigVisitor& mode) { describe_in_plane_mode(mode, f.in_plane_modes); }, {}, kOptional,
-      "flexible modes in plane");
+  group(v, "plate", describe_plate, s, kRequired,
+        "free rectangular plate: the flexible modes out of plane");
+  items(v, "in_plane_modes", describe_in_plane_mode, f.in_plane_modes, {}, kOptional,
+        "flexible modes in plane");
   v.number("cubic_stiffness_n_m3", s.cubic_stiffness_n_m3, not_negative("N/m^3"), kOptional,
            "on the rigid z motion; 0: linear");
   v.number("actuator_saturation_n", s.actuator_saturation_n, not_negative("N"), kOptional,
-           "0: off");
+           "largest force of an actuator; 0: unlimited");
 }
 
 void describe_noise(ConfigVisitor& v, WaferStageSpec& s) {
   v.number("sensor_m", s.sensor_noise_m, not_negative("m rms"), kOptional,
-           "white sensor noise, in the unit of each sensor");
+           "white noise of every sensor, in its unit");
   v.number("sensor_coloured_m", s.sensor_noise_coloured_m, not_negative("m rms"), kOptional,
            "coloured floor of the sensors");
   v.number("sensor_corner_hz", s.sensor_noise_corner_hz, positive("Hz"), kOptional,
            "corner of the coloured floor");
   v.number("force_n", s.force_noise_n, not_negative("N rms"), kOptional,
            "white force disturbance at every actuator, in its unit");
-  v.number("sensor_quantum_m", s.sensor_quantum_m, not_negative("m"), kOptional, "0: off");
-  v.number("actuator_quantum_n", s.actuator_quantum_n, not_negative("N"), kOptional, "0: off");
+  v.number("sensor_quantum_m", s.sensor_quantum_m, not_negative("m"), kOptional,
+           "step of the converters of the sensors; 0: none");
+  v.number("actuator_quantum_n", s.actuator_quantum_n, not_negative("N"), kOptional,
+           "step of the converters of the actuators; 0: none");
   count(v, "seed", s.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
         "the same seed gives the same noise");
 }
 
 void describe_notch(ConfigVisitor& v, std::vector<AxisController::Notch>& list) {
   AxisController::Notch n;
-  v.number("frequency_hz", n.frequency_hz, positive("Hz"), kRequired, "of the notch");
-  v.number("zero_damping", n.zero_damping, {"", 0.0, 1.0}, kRequired, "of the numerator");
-  v.number("pole_damping", n.pole_damping, {"", 0.0, 1.0, true}, kRequired, "of the denominator");
+  v.number("frequency_hz", n.frequency_hz, positive("Hz"), kRequired, "frequency of the notch");
+  v.number("zero_damping", n.zero_damping, {"", 0.0, 1.0}, kRequired,
+           "damping ratio of its numerator");
+  v.number("pole_damping", n.pole_damping, {"", 0.0, 1.0, true}, kRequired,
+           "damping ratio of its denominator");
   list.push_back(n);
 }
 
 void describe_axis(ConfigVisitor& v, AxisController& a) {
   std::size_t emergency = a.brake ? 0 : 1;
-  v.number("crossover_hz", a.crossover_hz, positive("Hz"), kRequired, "of the open loop");
+  v.number("crossover_hz", a.crossover_hz, positive("Hz"), kRequired,
+           "crossover frequency of the open loop");
   v.number("gain", a.gain, not_negative("N/m or N m/rad"), kOptional,
-           "0: from the crossover and the inertia");
-  v.number("integrator_hz", a.integrator_hz, not_negative("Hz"), kOptional, "0: none");
-  v.number("lead_zero_hz", a.lead_zero_hz, not_negative("Hz"), kOptional, "0: none");
-  v.number("lead_pole_hz", a.lead_pole_hz, not_negative("Hz"), kOptional, "0: none");
-  v.number("lowpass_hz", a.lowpass_hz, not_negative("Hz"), kOptional, "second order; 0: none");
+           "gain of the controller; 0: from the crossover and the inertia");
+  v.number("integrator_hz", a.integrator_hz, not_negative("Hz"), kOptional,
+           "corner of the integrator; 0: none");
+  v.number("lead_zero_hz", a.lead_zero_hz, not_negative("Hz"), kOptional,
+           "zero of the lead; 0: none");
+  v.number("lead_pole_hz", a.lead_pole_hz, not_negative("Hz"), kOptional,
+           "pole of the lead; 0: none");
+  v.number("lowpass_hz", a.lowpass_hz, not_negative("Hz"), kOptional,
+           "corner of the second-order low pass; 0: none");
   v.number("lowpass_damping", a.lowpass_damping, {"", 0.0, 1.0, true}, kOptional,
            "damping ratio of the low pass");
-  v.items(
-      "notches", [&](ConfigVisitor& notch) { describe_notch(notch, a.notches); }, {}, kOptional,
-      "second-order notches");
+  items(v, "notches", describe_notch, a.notches, {}, kOptional, "second-order notches");
   v.choice("emergency", emergency, {"brake", "cut"}, kOptional,
-           "action if the loop is faulty: brake: brake the known motion; cut: zero force");
+           "action if the loop is faulty. brake: brake the known motion; cut: zero force");
   a.brake = emergency == 0;
 }
 
 void describe_controller(ConfigVisitor& v, StageFile& f) {
   for (std::size_t i = 0; i < kRigidAxes; ++i)
-    v.group(
-        kRigidAxisNames[i], [&](ConfigVisitor& axis) { describe_axis(axis, f.axes[i]); }, kOptional,
-        "loop of this degree of freedom; omitted: open");
+    group(v, kRigidAxisNames[i], describe_axis, f.axes[i], kOptional,
+          "controller of this degree of freedom; omitted: open loop");
   for (const ChannelConfig& sensor : f.sensors) f.linear.sensors.push_back(sensor.channel.name);
   for (const ChannelConfig& actuator : f.actuators)
     f.linear.actuators.push_back(actuator.channel.name);
@@ -224,7 +230,7 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
            kRequired, "kind of the fault");
   f.fault.kind = static_cast<Kind>(kind + 1);
   v.text("channel", f.channel, kOptional,
-         "name of the sensor or actuator; the last four kinds without a name: all");
+         "name of the sensor or actuator; if omitted, the last four kinds act on all");
   const bool needs_channel =
       f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
       f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
@@ -289,43 +295,34 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
            "sample rate of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
            "delay from the computed command to the change of the hold; any number of samples");
-  v.items(
-      "actuators", [&](ConfigVisitor& item) { describe_actuator(item, f.actuators); }, {1, 64},
-      kRequired, "in the order of the log");
-  v.items(
-      "sensors", [&](ConfigVisitor& item) { describe_sensor(item, f.sensors); }, {1, 64}, kRequired,
-      "in the order of the log");
+  items(v, "actuators", describe_actuator, f.actuators, {1, 64}, kRequired,
+        "in the order of the log");
+  items(v, "sensors", describe_sensor, f.sensors, {1, 64}, kRequired, "in the order of the log");
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
            "stop if a sensor repeats one value for this long; 0 disables the check");
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
            "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
            "trusted");
   choose(v, "between_runs", f.between_runs, {"release", "hold"}, kOptional,
-         "release: forces are cut after every run; hold: the controller keeps the stage between "
-         "the runs of an experiment");
+         "release: forces are cut after every run; hold: the loop stays closed between the runs of "
+         "an experiment");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
-           "of the thermal rms limit");
+           "time constant of the average that thermal_rms_n limits");
   const bool simulated = f.backend == static_cast<std::size_t>(Backend::sim);
-  v.group(
-      "plant", [&](ConfigVisitor& plant) { describe_plant(plant, f); },
-      simulated ? kRequired : kOptional,
-      "the simulated stage; other back ends do without it, but then the loop is tested and signals "
-      "are predicted only with a prior");
-  v.group(
-      "noise", [&](ConfigVisitor& noise) { describe_noise(noise, s); }, kOptional,
-      "of the simulated stage");
+  group(v, "plant", describe_plant, f, simulated ? kRequired : kOptional,
+        "the simulated stage. Optional for other back ends, which without it need a prior to test "
+        "the loop and to predict signals");
+  group(v, "noise", describe_noise, s, kOptional, "noise of the simulated stage");
   v.group_or_text(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
       f.controller, kRequired,
-      "one entry per closed degree of freedom: x y z Rx Ry Rz; or state_space or transfer, "
-      "discrete "
-      "at sample_rate_hz; or a file with either (.yaml, .json, .mat, .npz, .h5, .csv), relative to "
-      "this one; or peer: the stage closes the loop by a controller of its own");
+      "controllers of x, y, z, Rx, Ry, Rz; or state_space or transfer, discrete at sample_rate_hz; "
+      "or a file with one of these two (.yaml, .json, .mat, .npz, .h5, .csv), relative to this "
+      "one; or peer: the stage closes the loop itself");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
-  v.group(
-      "realtime", [&](ConfigVisitor& keys) { describe_real_time(keys, f.real_time); }, kOptional,
-      "settings of the loop thread; ignored in virtual time");
+  group(v, "realtime", describe_real_time, f.real_time, kOptional,
+        "settings of the loop thread; ignored in virtual time");
   describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
   v.group(
       "plugin",
@@ -335,9 +332,8 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       },
       f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
       "a user-written back end, see docs/plugins.md");
-  v.items(
-      "faults", [&](ConfigVisitor& fault) { describe_fault(fault, f.faults); }, {}, kOptional,
-      "injected faults, to test the safety functions");
+  items(v, "faults", describe_fault, f.faults, {}, kOptional,
+        "injected faults, to test the safety functions");
   v.group(
       "can",
       [&](ConfigVisitor& can) {

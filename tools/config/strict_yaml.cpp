@@ -216,6 +216,16 @@ void check_text(const YamlDocument& document) {
 
 }  // namespace
 
+const YamlNode::Entry* YamlNode::entry(std::string_view key) const {
+  const auto found = std::ranges::find(entries, key, &Entry::key);
+  return found == entries.end() ? nullptr : &*found;
+}
+
+const YamlNode* YamlDocument::value(const YamlNode& map, std::string_view key) const {
+  const YamlNode::Entry* entry = map.entry(key);
+  return entry == nullptr ? nullptr : &node(entry->value);
+}
+
 YamlDocument::YamlDocument(std::filesystem::path file, std::string text)
     : file_(std::move(file)), text_(std::move(text)) {}
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace stageid {
@@ -28,6 +29,9 @@ struct YamlNode {
   bool plain = true;  ///< scalar: not in quotes
   std::vector<std::size_t> items;
   std::vector<Entry> entries;
+
+  /// Null if a map lacks the key.
+  const Entry* entry(std::string_view key) const;
 };
 
 /// A YAML file as a tree with positions. Stricter than YAML: one document, UTF-8, text keys, no duplicate keys, no
@@ -43,6 +47,8 @@ class YamlDocument {
   const std::string& text() const noexcept { return text_; }
   const YamlNode& root() const { return nodes_.at(root_); }
   const YamlNode& node(std::size_t index) const { return nodes_.at(index); }
+  /// The value of a key; null if the map lacks it.
+  const YamlNode* value(const YamlNode& map, std::string_view key) const;
   /// @throws FormatError "FILE:LINE:COLUMN: message", always.
   [[noreturn]] void fail(const YamlMark& mark, const std::string& message) const;
 

@@ -44,7 +44,7 @@ void describe_limits(ConfigVisitor& v, std::optional<LimitRequest>& limits) {
   v.text("prior", prior, kRequired,
          "plant data: frf.h5 of a pilot, or model.json, relative to this file");
   v.number("safety", request.safety, {"", 0.0, 1.0, true}, kOptional,
-           "largest predicted use of any limit of the stage file");
+           "largest predicted share of any limit of the stage file");
   v.number("velocity_m_s", request.velocity_m_s, positive("m/s"), kOptional,
            "velocity limit of every sensor; omitted: no limit");
   request.prior = prior;
@@ -67,13 +67,13 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   rule.list = true;
   rule.rule = positive("N");
   v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list: one per axis");
-  v.flexible("peak_n", f.peak_n, rule, kOptional, "or largest sample of each axis");
+  v.flexible("peak_n", f.peak_n, rule, kOptional, "instead: largest sample of each axis");
   rule.rule = positive("");
   describe_neutral(v, "rms", "rms_n", f.rms_n, rule);
   describe_neutral(v, "peak", "peak_n", f.peak_n, rule);
-  v.group(
-      "limits", [&](ConfigVisitor& limits) { describe_limits(limits, f.limits); }, kOptional,
-      "or as large as the limits allow, distributed for the smallest mean relative variance");
+  group(
+      v, "limits", describe_limits, f.limits, kOptional,
+      "instead: as large as the limits allow, distributed for the smallest mean relative variance");
   const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
   v.require(
       int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
@@ -111,13 +111,11 @@ void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
   choose(v, "scheme", f.spec.scheme,
          {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
          "distribution of the axes over the experiments");
-  v.group(
-      "level", [&](ConfigVisitor& level) { describe_level(level, f); }, kRequired,
-      "size of the excitation");
+  group(v, "level", describe_level, f, kRequired, "size of the excitation");
   describe_lines(v, f);
   v.number("period_s", f.period_s, positive("s"), kRequired, "period of the multisine");
   count(v, "transient_periods", f.spec.transient_periods, 0, 1000, kOptional,
-        "number of periods recorded before the measured ones and not used");
+        "unused periods before the measured ones");
   count(v, "periods", f.spec.periods, 1, 100000, kOptional, "measured periods per run");
   count(v, "realizations", f.spec.realizations, 1, 10000, kOptional,
         "number of realizations of the random phases");
@@ -136,13 +134,14 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
           "actuators of the response; omitted: the excited ones");
   v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
   choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional,
-         "covariance of the response");
-  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional, "estimation method");
+         "diagonal: variances; full: also the covariances between channels");
+  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional,
+         "periodic: means over periods; lpm: whole records, transient modelled");
   choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
-         "consistent: periods with a glitch, a bump or a transient are discarded; lpm: those with "
-         "a glitch");
+         "consistent: discard periods with glitches, bumps or transients (lpm: only glitches); "
+         "unmarked: use all periods without marked samples");
   count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
-        "number of lines (odd) over which the noise covariance is averaged");
+        "odd number of neighbouring lines over which the noise covariance is averaged");
   v.require(
       f.covariance_lines % 2 == 1, "smooth_covariance",
       "smooth_covariance: must be odd: the line and the same number of neighbours on both sides");
@@ -151,20 +150,14 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
 void describe(ConfigVisitor& v, ExperimentFile& f) {
   v.choice("format", f.format, {"stageid-experiment"}, kRequired, "file type");
   v.text("stage", f.stage, kRequired, "stage file, relative to this one");
-  v.group(
-      "experiment", [&](ConfigVisitor& e) { describe_experiment(e, f); }, kRequired,
-      "the measurement");
-  v.group(
-      "frf", [&](ConfigVisitor& frf) { describe_frf(frf, f.frf); }, kOptional,
-      "estimation of the frequency response");
-  v.group(
-      "fit", [&](ConfigVisitor& fit) { describe_fit_keys(fit, f.fit); }, kOptional,
-      "fit of the model");
+  group(v, "experiment", describe_experiment, f, kRequired, "the measurement");
+  group(v, "frf", describe_frf, f.frf, kOptional, "estimation of the frequency response");
+  group(v, "fit", describe_fit_keys, f.fit, kOptional, "fit of the model");
   v.group(
       "validation",
       [&](ConfigVisitor& validation) {
         count(validation, "realization", f.validation_realization, 1, 10000, kRequired,
-              "realization held back from the fit, 1-based");
+              "realization held back from the fit, counted from 1");
         validation.require(
             f.validation_realization <= f.spec.realizations, "realization",
             fmt::format("realization: {} is out of range, {} are measured; hold back one of these",
@@ -173,7 +166,7 @@ void describe(ConfigVisitor& v, ExperimentFile& f) {
             f.spec.realizations > 1, "realization",
             "realization: no realization remains for the fit; set realizations to 2 or more");
       },
-      kOptional, "omitted: no realization is held back");
+      kOptional, "validation; omitted: no realization is held back");
 }
 
 /// Relative amplitude at every line, log-log between the points, constant beyond them.
@@ -239,13 +232,8 @@ class ExperimentChecker {
 
  private:
   const YamlNode* find(std::string_view section, std::string_view key) const {
-    const YamlNode* node = child(document_.root(), section);
-    return node == nullptr ? nullptr : child(*node, key);
-  }
-  const YamlNode* child(const YamlNode& node, std::string_view key) const {
-    for (const YamlNode::Entry& entry : node.entries)
-      if (entry.key == key) return &document_.node(entry.value);
-    return nullptr;
+    const YamlNode* node = document_.value(document_.root(), section);
+    return node == nullptr ? nullptr : document_.value(*node, key);
   }
   const YamlDocument& document_;
   const StageConfig& stage_;
@@ -343,13 +331,11 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
                                     const std::string& stage) {
   std::filesystem::path file = (path.parent_path() / stage).lexically_normal();
   if (std::filesystem::exists(file)) return file;
-  for (const YamlNode::Entry& entry : document.root().entries)
-    if (entry.key == "stage")
-      document.fail(
-          document.node(entry.value).mark,
-          fmt::format(
-              "stage: no such file: {}; write the path of a stage file, relative to this one",
-              file.string()));
+  if (const YamlNode* value = document.value(document.root(), "stage"))
+    document.fail(
+        value->mark,
+        fmt::format("stage: no such file: {}; write the path of a stage file, relative to this one",
+                    file.string()));
   return file;
 }
 

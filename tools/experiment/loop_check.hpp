@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/terminal/console.hpp"
 
@@ -25,5 +26,11 @@ LoopCheck check_loop(const ExperimentConfig& config);
 /// To be called before the loop is closed; warns of a doubt. @throws FormatError if the check found a problem.
 void require_stable_loop(const ExperimentConfig& config, const Console& console);
 void require_stable_loop(const StageConfig& stage, const Console& console);
+
+/// Warns if the signals of the stage cannot be predicted, see why_unpredictable().
+void warn_of_prediction(const ExperimentConfig& config, const Console& console);
+
+/// @throws FormatError naming the first limit that would be exceeded, and the number of others.
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
 
 }  // namespace stageid

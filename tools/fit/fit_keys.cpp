@@ -35,8 +35,8 @@ void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
         "degree of the numerator; -1: n + l - 1, strictly proper");
   if (r.shape.numerator_degree < 0) r.shape.numerator_degree = strictly_proper_degree(r);
   v.numbers("frequency_hz", r.frequency_hz, positive("Hz"), {}, kOptional,
-            "starting frequencies of the poles: one per conjugate pair, and that of the real pole "
-            "last if n is odd; omitted: found by a search");
+            "starting frequencies: one per pole pair, then the real pole of an odd n; omitted: "
+            "found by a search");
   v.numbers("damping_ratio", r.damping_ratio, {"", 0.0, 0.9, true}, {}, kOptional,
             "starting damping ratios: one per pair, or one for all; omitted: 0.01");
   const std::string fault = fault_of(r);
@@ -59,7 +59,8 @@ void describe_submodels(ConfigVisitor& v, FitRequest& f) {
 
 void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   std::vector<double> band_hz;
-  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional, "omitted: all lines");
+  v.numbers("band_hz", band_hz, positive("Hz"), {2, 2}, kOptional,
+            "lowest and highest frequency; omitted: all lines");
   if (band_hz.size() == 2) {
     v.require(band_hz[0] < band_hz[1], "band_hz",
               "band_hz: the band is empty; write [LOW, HIGH] with LOW < HIGH");
@@ -105,7 +106,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
        "weighting of the cost; by_frf: noise variance if known, else total variance, else "
        "relative; a single distorted realization is weighted by the scatter of its lines");
   word("hold", f.hold, words_to(HoldModel::exact),
-       "hold model; by_frf: exact unless the FRF is already hold-compensated");
+       "none; phase: half a sample of delay; sinc: also its magnitude; exact: hold, delay and "
+       "sampler, including aliasing; by_frf: exact unless the FRF is already hold-compensated");
 
   /// Reads a word or a rank. @returns the rank; 0: a word
   const auto rank = [&](const char* key, std::string& word_given, std::vector<std::string> words,
@@ -130,7 +132,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   delay_rule.number = true;
   delay_rule.rule = any_number("s");
   v.flexible("delay_s", delay, delay_rule, kOptional,
-             "a number in s, estimate: one delay for the plant, per_channel: one per channel");
+             "delay. A number: known; estimate: one for the plant; per_channel: one per channel; "
+             "by_frf: from the FRF");
   if (!delay.numbers.empty()) f.delay = {DelayModel::fixed, delay.numbers.front()};
   if (delay.word == "estimate") f.delay = {DelayModel::estimate, 0.0};
   if (delay.word == "per_channel") f.delay = {DelayModel::per_channel, 0.0};
@@ -138,34 +141,34 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   using Body = RigidBodyRequest::Kind;
   const std::vector<std::string> bodies = words_to(Body::by_submodels);
   std::string body = to_string(f.rigid_body.kind);
-  f.rigid_body.rank =
-      rank("rigid_body", body, bodies,
-           "the term B_0 / s^2: none, full, or the rank of B_0 (its degrees of freedom); "
-           "suspension: a mode below the lines instead; auto: none, full or suspension, as the "
-           "data require; by_submodels: none if submodels are listed, else auto");
+  f.rigid_body.rank = rank("rigid_body", body, bodies,
+                           "none, full, or the rank of B_0 in B_0 / s^2; suspension: modes below "
+                           "the lines, for a body on soft springs; auto: chosen from the data; "
+                           "by_submodels: none if submodels are listed, else auto");
   f.rigid_body.kind =
       body.empty()
           ? Body::free
           : static_cast<Body>(std::find(bodies.begin(), bodies.end(), body) - bodies.begin());
   v.numbers("suspension_hz", f.rigid_body.suspension_hz, positive("Hz"), {}, kOptional,
-            "with rigid_body: suspension, its known frequencies; omitted: fitted");
+            "known frequencies of rigid_body: suspension; omitted: fitted");
   v.require(f.rigid_body.suspension_hz.empty() || f.rigid_body.kind == Body::suspension,
             "suspension_hz", "suspension_hz: requires rigid_body: suspension");
   std::string full = "full";
   f.residue_rank =
       rank("residue_rank", full, {"full"}, "rank of the residues: full, or 1 for mechanical modes");
   word("direct_term", f.direct_term, {"none", "full"},
-       "a constant: the compliance of modes above the band; by_frf: full if the outputs are "
-       "accelerations, else as the data require");
+       "full: a constant, the compliance of modes above the band; by_frf: full if the outputs are "
+       "accelerations, else chosen from the data");
   word("damping", f.general_damping, {"proportional", "general"},
-       "numerators B_0, or B_0 + B_1 s; by_frf: general if the outputs are accelerations, else "
-       "as the data require");
+       "proportional: numerators B_0; general: B_0 + B_1 s; by_frf: general if the outputs are "
+       "accelerations, else chosen from the data");
   auto method = static_cast<std::size_t>(f.method);
-  v.choice("method", method, words_to(FitMethod::sk), kOptional, "iteration method");
+  v.choice("method", method, words_to(FitMethod::sk), kOptional,
+           "riv: refined instrumental variables; gn: Gauss-Newton; sk: Sanathanan-Koerner");
   f.method = static_cast<FitMethod>(method);
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "iterations per fit");
   v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
-           "budget of the mode search, in seconds of a typical core; counted in work, so the "
+           "budget of the mode search in seconds of a typical core, counted as work so that the "
            "result does not depend on the machine; 0: unlimited");
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -159,19 +158,8 @@ void ArrayLog::read(std::size_t run, std::uint64_t first, std::uint64_t count,
   const bool sensors_finite = copy(sensors_[run], out.sensors);
   out.marked =
       marked_[run].segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count));
-  if (!actuators_finite || !sensors_finite) refuse_not_finite(run, first, out);
-}
-
-void ArrayLog::refuse_not_finite(std::size_t run, std::uint64_t first,
-                                 const LogSamples& samples) const {
-  const Eigen::Index n_u = samples.actuators.cols();
-  for (Eigen::Index n = 0; n < samples.sensors.rows(); ++n)
-    for (Eigen::Index c = 0; c < n_u + samples.sensors.cols(); ++c) {
-      const double value = c < n_u ? samples.actuators(n, c) : samples.sensors(n, c - n_u);
-      if (!std::isfinite(value))
-        throw_not_finite(name_, info_, runs_[run], first + static_cast<std::uint64_t>(n),
-                         static_cast<std::size_t>(c));
-    }
+  if (!actuators_finite || !sensors_finite)
+    throw_not_finite(name_, info_, runs_[run], first, out, 0, out.marked.size());
 }
 
 }  // namespace stageid

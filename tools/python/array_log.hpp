@@ -55,7 +55,6 @@ class ArrayLog final : public LogReader {
   void locate_runs();
   static Rows rows_of(const ExperimentArrays::Reals& array, pybind11::ssize_t realization,
                       pybind11::ssize_t experiment);
-  void refuse_not_finite(std::size_t run, std::uint64_t first, const LogSamples& samples) const;
 
   std::filesystem::path name_;
   LogInfo info_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "tools/exchange/model/covariance_file.hpp"
 #include "tools/fit/fit_flags.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/docstring.hpp"
@@ -15,7 +16,6 @@
 #include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/results.hpp"
-#include "tools/steps/covariance_file.hpp"
 #include "tools/steps/fit_step.hpp"
 
 namespace stageid {

@@ -80,18 +80,6 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
 
 }  // namespace
 
-const char* to_string(ReportMessage::Severity severity) noexcept {
-  switch (severity) {
-    case ReportMessage::Severity::note:
-      return "note";
-    case ReportMessage::Severity::warning:
-      return "warning";
-    case ReportMessage::Severity::error:
-      return "error";
-  }
-  return "unknown";
-}
-
 std::string report_page(const ReportData& data) {
   check_data(data);
   const report::PageContent content = report::page_content(data);

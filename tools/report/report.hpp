@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,15 +25,6 @@ struct TrueMode {
   /// false: no sensor of the sub-plant observes it, so it need not be found
   bool observable = true;
 };
-
-/// Information that the reader needs before trusting the numbers, one line.
-struct ReportMessage {
-  enum class Severity : std::uint8_t { note, warning, error };
-  Severity severity = Severity::note;
-  std::string text;
-};
-
-const char* to_string(ReportMessage::Severity severity) noexcept;  ///< "note", "warning", "error"
 
 /// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
 struct ReportFigure {
@@ -90,14 +80,15 @@ struct ReportData {
   std::vector<double> cost;            ///< one entry per iterate; empty: cost_history of the model
   std::vector<std::string> decisions;  ///< in order
 
-  std::vector<Finding> findings;  ///< of the checks of the data, in any order
+  std::vector<Finding> findings;  ///< of the checks of the data, as `log info --health` orders them
   std::vector<LogRun> runs;       ///< timing and health of the measurement
   double sample_rate_hz = 0.0;    ///< of the runs; to show their speed relative to real time
   double period_s = 0.0;          ///< of the loop, by wall clock; 0: virtual time
   std::vector<ReportStep> steps;
 
-  std::vector<ReportFigure> figures;    ///< further figures for the header
-  std::vector<ReportMessage> messages;  ///< findings; the page shows the gravest first
+  std::vector<ReportFigure> figures;  ///< further figures for the header
+  std::vector<std::string> doubts;    ///< about the result, besides the findings; one line each
+  std::vector<std::string> notes;     ///< about the page itself; one line each
   std::vector<ReportDocument> documents;
   std::string provenance_json = "{}";  ///< of the job; those of frf and model are shown as well
 };

@@ -45,8 +45,7 @@ Eigen::MatrixXcd on_lines_of(const FrfEstimate& own, const FrfEstimate& other) {
 
 void add_response(ReportComparison& comparison, ReportData& own, const FrfEstimate& frf) {
   const auto leave_out = [&](const char* why) {
-    own.messages.push_back({ReportMessage::Severity::note,
-                            fmt::format("{}: response not shown: {}", comparison.title, why)});
+    own.notes.push_back(fmt::format("{}: response not shown: {}", comparison.title, why));
   };
   if (!own.frf) return leave_out("the report contains no response to compare with");
   if (frf.compensated != own.frf->compensated || frf.hold != own.frf->hold ||

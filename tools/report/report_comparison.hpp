@@ -7,7 +7,7 @@
 namespace stageid::report {
 
 /// Compares with another day or another model, on the lines of `own.frf` if there is one. Its response is omitted,
-/// with a message in own.messages, if its lines or its compensation differ, or if it is own.frf itself.
+/// with a line in own.notes, if its lines or its compensation differ, or if it is own.frf itself.
 /// @param model, frf at least one is required
 /// @throws std::invalid_argument naming `title` if its channels are not those of `own`, by name and in order.
 ReportComparison make_comparison(ReportData& own, std::string title,

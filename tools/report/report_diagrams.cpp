@@ -1,6 +1,5 @@
 #include "tools/report/report_diagrams.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace stageid::report {
@@ -44,19 +43,6 @@ Json nonlinearity_json(const NonlinearityTest& test) {
           {"p_value", rows_of(test.p_value)},
           {"distortion", rows_of(test.distortion)},
           {"chance", kNonlinearBelow}};
-}
-
-Json findings_json(const std::vector<Finding>& findings) {
-  std::vector<Finding> sorted = findings;
-  std::ranges::stable_sort(sorted, {}, &Finding::severity);
-  Json out = Json::array();
-  for (const Finding& finding : sorted)
-    out.push_back({{"severity", to_string(finding.severity)},
-                   {"channel", finding.channel},
-                   {"what", finding.what},
-                   {"figure", finding.figure},
-                   {"remedy", finding.remedy}});
-  return out;
 }
 
 }  // namespace stageid::report

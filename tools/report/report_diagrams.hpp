@@ -16,7 +16,4 @@ nlohmann::json stabilization_json(const std::vector<StabilizationPole>& poles);
 /// "chance": share of tests that a linear plant fails by chance}; channel = output + outputs * input.
 nlohmann::json nonlinearity_json(const NonlinearityTest& test);
 
-/// [{severity, channel, what, figure, remedy}], the gravest first.
-nlohmann::json findings_json(const std::vector<Finding>& findings);
-
 }  // namespace stageid::report

@@ -155,8 +155,7 @@ void add_summary(ReportData& data, const std::filesystem::path& file,
   const std::vector<std::string> told =
       data.frf ? health_notes(health_of(data.frf->provenance_json)) : std::vector<std::string>();
   for (const JsonNode& note : summary.elements_of("notes"))
-    if (std::ranges::find(told, note.text()) == told.end())
-      data.messages.push_back({ReportMessage::Severity::warning, note.text()});
+    if (std::ranges::find(told, note.text()) == told.end()) data.doubts.push_back(note.text());
 }
 
 /// A log contains the stage file. That of another version may have unknown keys; the shapes are then shown without

@@ -17,6 +17,8 @@
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
+#include "tools/steps/health_step.hpp"
+#include "tools/steps/model_verdict.hpp"
 
 namespace stageid::report {
 namespace {
@@ -227,19 +229,6 @@ Json modes_json(const ReportData& data) {
   return out;
 }
 
-Json validation_json(const Validation& validation) {
-  return {{"relative_rms_error", validation.relative_rms_error},
-          {"normalized_error", validation.normalized_error},
-          {"chi_square_per_dof", validation.chi_square_per_dof},
-          {"expected_chi_square", validation.expected_chi_square},
-          {"explained", validation.explained},
-          {"whitened_above_95", validation.whitened_above_95},
-          {"whiteness", validation.whiteness},
-          {"whiteness_limit", validation.whiteness_limit},
-          {"channel_error",
-           std::vector<double>(validation.channel_error.begin(), validation.channel_error.end())}};
-}
-
 Json run_json(const LogRun& run, double sample_rate_hz) {
   const double recorded_s =
       sample_rate_hz > 0.0 ? static_cast<double>(run.samples) / sample_rate_hz : 0.0;
@@ -265,13 +254,8 @@ Json provenance(const std::string& text) {
 }
 
 Json texts_json(const ReportData& data) {
-  std::vector<ReportMessage> sorted = data.messages;
-  std::ranges::stable_sort(sorted, std::ranges::greater{}, &ReportMessage::severity);
   Json out;
-  out["messages"] = Json::array();
-  for (const ReportMessage& message : sorted)
-    out["messages"].push_back(
-        {{"severity", stageid::to_string(message.severity)}, {"text", message.text}});
+  out["notes"] = data.notes;
   out["figures"] = Json::array();
   for (const ReportFigure& figure : data.figures)
     out["figures"].push_back({{"label", figure.label}, {"value", figure.value}});
@@ -344,7 +328,7 @@ PageContent page_content(const ReportData& data) {
                               {"inputs", channels(data.model->inputs)}};
     json["geometry"] = geometry_json(data.geometry, data.model->outputs, data.model->inputs);
   }
-  json["findings"] = findings_json(data.findings);
+  json["findings"] = health_json(data.findings);
   if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
   if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
   if (data.comparison) json["comparison"] = comparison_json(data);

@@ -95,11 +95,7 @@ const char* to_string(Verdict::Level level) noexcept {
 Verdict judge(const ReportData& data) {
   Verdict verdict;
   bool error = judge_findings(data, verdict.reasons);
-  for (const ReportMessage& message : data.messages) {
-    if (message.severity == ReportMessage::Severity::note) continue;
-    error = error || message.severity == ReportMessage::Severity::error;
-    verdict.reasons.push_back(message.text);
-  }
+  verdict.reasons.insert(verdict.reasons.end(), data.doubts.begin(), data.doubts.end());
   judge_runs(data, verdict.reasons);
   if (data.model) {
     error = judge_fit(data, verdict.reasons) || error;

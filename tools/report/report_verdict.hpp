@@ -24,7 +24,7 @@ struct Verdict {
 const char* to_string(Verdict::Level level) noexcept;
 
 /// Judges the model by the status of the fit, the held-back data, the health of the runs, the truth if known (3
-/// standard deviations and 1e-4) and the messages.
+/// standard deviations and 1e-4) and the doubts.
 Verdict judge(const ReportData& data);
 
 }  // namespace stageid

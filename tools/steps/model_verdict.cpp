@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimation/problem/fit_options.hpp"
 #include "tools/steps/fit_step.hpp"
@@ -55,6 +56,43 @@ nlohmann::ordered_json verdict_json(const ModelVerdict& verdict) {
   return {{"trustworthy", verdict.trustworthy},
           {"validated", verdict.validated},
           {"reasons", verdict.reasons}};
+}
+
+std::vector<std::string> validation_lines(const Validation& v) {
+  std::vector<std::string> lines = {
+      "no channel exceeds its noise, so a relative error is undefined"};
+  if (std::isfinite(v.relative_rms_error))
+    lines[0] = fmt::format("relative error {:.4e} (channels that respond), {:.4e} (whole response)",
+                           v.relative_rms_error, v.normalized_error);
+  if (v.chi_square_per_dof > 0.0) {
+    const std::string expected = v.expected_chi_square > 0.0
+                                     ? fmt::format("{:.3f}", v.expected_chi_square)
+                                     : "undefined, the variances are too uncertain";
+    lines.push_back(fmt::format(
+        "chi-square per degree of freedom {:.3f}; expected from {} alone: {}", v.chi_square_per_dof,
+        v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
+    lines.push_back(
+        fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
+                    "limit {:.4f}",
+                    100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
+  } else {
+    lines.push_back("the data have no variances, so the error cannot be compared with noise");
+  }
+  return lines;
+}
+
+nlohmann::ordered_json validation_json(const Validation& v) {
+  return {{"relative_rms_error", v.relative_rms_error},
+          {"normalized_error", v.normalized_error},
+          {"chi_square_per_dof", v.chi_square_per_dof},
+          {"expected_chi_square", v.expected_chi_square},
+          {"variance", to_string(v.variance)},
+          {"explained", v.explained},
+          {"reason", v.reason},
+          {"whitened_above_95", v.whitened_above_95},
+          {"whiteness", v.whiteness},
+          {"whiteness_limit", v.whiteness_limit},
+          {"channel_error", std::vector<double>(v.channel_error.begin(), v.channel_error.end())}};
 }
 
 }  // namespace stageid

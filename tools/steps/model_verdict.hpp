@@ -28,4 +28,8 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
 std::string verdict_line(const ModelVerdict& verdict);
 nlohmann::ordered_json verdict_json(const ModelVerdict& verdict);
 
+/// The comparison with held-back data, for people.
+std::vector<std::string> validation_lines(const Validation& validation);
+nlohmann::ordered_json validation_json(const Validation& validation);
+
 }  // namespace stageid

@@ -206,5 +206,32 @@ TEST(ConfigSchema, ListsEveryKeyThatTheReaderKnows) {
   EXPECT_THAT(schema_text(entries), HasSubstr("  rms_n:"));
 }
 
+TEST(ConfigSchema, WritesTheKeysOfEqualGroupsOnce) {
+  const auto axis = [](ConfigVisitor& v) {
+    double gain = 0.0;
+    v.number("gain", gain, positive("N"), kOptional, "of the axis");
+  };
+  const auto other = [](ConfigVisitor& v) {
+    double gain = 1.0;
+    v.number("gain", gain, positive("N"), kOptional, "of the axis");
+  };
+  const std::string text = schema_text(config_schema([&](ConfigVisitor& v) {
+    v.group("x", axis, kOptional, "loop");
+    v.group("y", axis, kOptional, "loop");
+    v.group("z", axis, kOptional, "loop");
+    v.group("Rz", other, kOptional, "loop");
+    std::vector<std::pair<std::string, std::string>> settings;
+    v.named_texts("keys", settings, kOptional, "settings");
+  }));
+  EXPECT_EQ(text,
+            "x:                           # loop (map)\n"
+            "  gain:                      # of the axis (number; > 0 N; default 0)\n"
+            "y:                           # loop (the keys of x)\n"
+            "z:                           # loop (the keys of x)\n"
+            "Rz:                          # loop (map)\n"
+            "  gain:                      # of the axis (number; > 0 N; default 1)\n"
+            "keys:                        # settings (map of name: text; default {})\n");
+}
+
 }  // namespace test_config_reader
 }  // namespace stageid

@@ -46,7 +46,7 @@ TEST(ReportComparison, DrawsAResponseOnlyOnTheLinesOfTheReport) {
   other.response *= 1.01;
   ReportComparison made = make_comparison(own, "Tuesday", {}, other);
   EXPECT_EQ(made.response, other.response);
-  EXPECT_TRUE(own.messages.empty());
+  EXPECT_TRUE(own.notes.empty());
 
   own.frf = select_band(*own.frf, 200.0, 900.0);
   made = make_comparison(own, "Tuesday", {}, other);
@@ -55,19 +55,19 @@ TEST(ReportComparison, DrawsAResponseOnlyOnTheLinesOfTheReport) {
   other.frequency_hz *= 1.001;
   made = make_comparison(own, "Tuesday", {}, other);
   EXPECT_EQ(made.response.size(), 0);
-  ASSERT_EQ(own.messages.size(), 1u);
-  EXPECT_THAT(own.messages[0].text, HasSubstr("its lines differ"));
+  ASSERT_EQ(own.notes.size(), 1u);
+  EXPECT_THAT(own.notes[0], HasSubstr("its lines differ"));
 }
 
 TEST(ReportComparison, LeavesOutWhatIsTheSameOrCompensatedOtherwise) {
   ReportData own = small();
   EXPECT_EQ(make_comparison(own, "a", {}, own.frf).response.size(), 0);
-  EXPECT_THAT(own.messages.back().text, HasSubstr("identical response"));
+  EXPECT_THAT(own.notes.back(), HasSubstr("identical response"));
   FrfEstimate other = *own.frf;
   other.response *= 1.01;
   other.compensated = Compensation::delay;
   EXPECT_EQ(make_comparison(own, "b", {}, other).response.size(), 0);
-  EXPECT_THAT(own.messages.back().text, HasSubstr("hold or delay compensation differs"));
+  EXPECT_THAT(own.notes.back(), HasSubstr("hold or delay compensation differs"));
 }
 
 TEST(ReportComparison, PairsModesAndTellsChangesInDeviationsOfTheDifference) {

@@ -38,19 +38,5 @@ TEST(ReportDiagrams, KeepFourDigitsOfATestHoweverSmallItsChance) {
   EXPECT_EQ(nonlinearity_json(test)["settled"], json::parse("[false]"));
 }
 
-TEST(ReportDiagrams, TellTheGravestFindingFirst) {
-  const json got = findings_json({{Severity::unchecked, Cause::incoherent, "", "a", "", ""},
-                                  {Severity::fault, Cause::incoherent, "z1", "b", "3", "c"},
-                                  {Severity::doubt, Cause::incoherent, "z2", "d", "", ""}});
-  ASSERT_EQ(got.size(), 3u);
-  EXPECT_EQ(got[0], json({{"severity", "fault"},
-                          {"channel", "z1"},
-                          {"what", "b"},
-                          {"figure", "3"},
-                          {"remedy", "c"}}));
-  EXPECT_EQ(got[1]["severity"], "doubt");
-  EXPECT_EQ(got[2]["channel"], "");
-}
-
 }  // namespace test_report_diagrams
 }  // namespace stageid::report

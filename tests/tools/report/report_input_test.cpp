@@ -86,8 +86,8 @@ TEST_F(ReportInputTest, NotesOfTheSummaryThatAreFindingsAreNotToldTwice) {
   std::ofstream(directory_ / "summary.json")
       << nlohmann::json{{"format", "stageid-summary"}, {"notes", notes}};
   const ReportData data = read_back(frf);
-  ASSERT_EQ(data.messages.size(), 1u);
-  EXPECT_EQ(data.messages[0].text, "something else");
+  ASSERT_EQ(data.doubts.size(), 1u);
+  EXPECT_EQ(data.doubts[0], "something else");
 }
 
 TEST_F(ReportInputTest, VerdictsOnLinearityAreThoseOfTheFile) {

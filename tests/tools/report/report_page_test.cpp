@@ -136,19 +136,6 @@ TEST(Report, TakesTheModelsCostHistoryWhereNoneIsGiven) {
   EXPECT_EQ(content(report_page(data))["cost"], json({3.0, 2.0, 1.0}));
 }
 
-TEST(Report, TellsTheGravestMessageFirst) {
-  ReportData data = small();
-  using Severity = ReportMessage::Severity;
-  data.messages = {{Severity::note, "a"},
-                   {Severity::error, "b"},
-                   {Severity::warning, "c"},
-                   {Severity::error, "d"}};
-  const json messages = content(report_page(data))["messages"];
-  std::string order;
-  for (const json& message : messages) order += message["text"].get<std::string>();
-  EXPECT_EQ(order, "bdca");
-}
-
 TEST(Report, NoTextCanLeaveItsPlace) {
   const std::string attack = "</script><script>alert(1)</script><!--\"'&{{js}}";
   const ReportData plain = small();
@@ -159,7 +146,7 @@ TEST(Report, NoTextCanLeaveItsPlace) {
   data.documents = {{attack, attack}};
   data.figures = {{attack, attack}};
   data.steps = {{attack, 1.0, attack}};
-  data.messages = {{ReportMessage::Severity::error, attack}};
+  data.doubts = data.notes = {attack};
   data.runs[0].name = data.runs[0].started_utc = attack;
   data.model->fit.status = attack;
   data.frf->excluded_channels[0] = attack;

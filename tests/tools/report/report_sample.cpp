@@ -212,8 +212,8 @@ void make_hostile(ReportData& data) {
   data.documents.push_back({attack, attack});
   data.provenance_json = attack;
   data.figures.push_back({attack, attack});
-  data.messages.push_back({ReportMessage::Severity::error, attack});
-  data.messages.push_back({ReportMessage::Severity::note, attack});
+  data.doubts.push_back(attack);
+  data.notes.push_back(attack);
   data.steps.push_back({attack, 1.0, attack});
   data.runs[0].name = attack;
   data.runs[0].started_utc = attack;

@@ -119,16 +119,12 @@ TEST(Verdict, AModeOffTheTruthIsDoubtedOnlyBeyondBothLimits) {
   EXPECT_EQ(judge(data).level, Level::good);
 }
 
-TEST(Verdict, AnErrorMessageIsWorseThanAnyDoubt) {
+TEST(Verdict, ADoubtOfTheJobIsAReasonANoteIsNot) {
   ReportData data = sound();
-  data.messages = {{ReportMessage::Severity::note, "just so"}};
+  data.notes = {"just so"};
   EXPECT_EQ(judge(data).level, Level::good);
-  data.messages.push_back({ReportMessage::Severity::warning, "careful"});
+  data.doubts = {"careful"};
   expect_doubt(data, "careful");
-  data.messages.push_back({ReportMessage::Severity::error, "broken"});
-  const Verdict verdict = judge(data);
-  EXPECT_EQ(verdict.level, Level::bad);
-  EXPECT_THAT(verdict.reasons, ElementsAre("careful", "broken"));
 }
 
 TEST(Verdict, AMeasurementWithoutModelIsNotJudged) {

@@ -225,7 +225,7 @@ void add_runs(ReportData& data, const SyntheticSize& size) {
                 {"modes", 0.2, ""},  {"fit", 21.4, "34 iterations"},      {"validate", 0.4, ""}};
 }
 
-/// More than noise in one pair and band only, the highest band not settled; one finding of each weight, the gravest last.
+/// More than noise in one pair and band only, the highest band not settled; one finding of each severity.
 void add_checks(ReportData& data) {
   const Eigen::Index channels = data.frf->response.rows();
   NonlinearityTest test;
@@ -237,12 +237,12 @@ void add_checks(ReportData& data) {
   test.settled_p_value = Eigen::Vector3d(0.4, 0.5, 1e-6);
   test.p_value.col(2).setOnes();
   data.nonlinearity = test;
-  data.findings = {{Severity::unchecked, Cause::incoherent, "", "linearity not checked per axis",
-                    "", "measure two realizations"},
+  data.findings = {{Severity::fault, Cause::incoherent, "az2", "clips", "312 samples at the limit",
+                    "less excitation"},
                    {Severity::doubt, Cause::incoherent, "z1", "hum at 50 Hz",
                     "12 dB above its neighbours", "look at the shield"},
-                   {Severity::fault, Cause::incoherent, "az2", "clips", "312 samples at the limit",
-                    "less excitation"}};
+                   {Severity::unchecked, Cause::incoherent, "", "linearity not checked per axis",
+                    "", "measure two realizations"}};
   if (data.frf->lines() > 160) data.stabilization = stabilization(*data.frf, {.delay_s = delay_s});
 }
 

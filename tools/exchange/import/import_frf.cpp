@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "frf/file/line_datasets.hpp"
 #include "tools/exchange/import/import_rate.hpp"
 
 namespace stageid {
@@ -74,17 +75,12 @@ std::vector<std::string> names_or(const ImportMap& map, const char* key,
   return names;
 }
 
+/// From lines x outputs x inputs.
 template <typename Scalar>
-Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> vec_columns(
-    const std::vector<Scalar>& values, const std::vector<std::size_t>& shape) {
-  const auto N = static_cast<Eigen::Index>(shape[0]), n_y = static_cast<Eigen::Index>(shape[1]),
-             n_u = static_cast<Eigen::Index>(shape[2]);
-  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns(n_y * n_u, N);
-  std::size_t at = 0;
-  for (Eigen::Index k = 0; k < N; ++k)
-    for (Eigen::Index i = 0; i < n_y; ++i)
-      for (Eigen::Index j = 0; j < n_u; ++j) columns(i + n_y * j, k) = values[at++];
-  return columns;
+VecColumns<Scalar> vec_columns(const std::vector<Scalar>& values,
+                               const std::vector<std::size_t>& shape) {
+  return from_c_order(values, static_cast<Eigen::Index>(shape[1]),
+                      static_cast<Eigen::Index>(shape[2]));
 }
 
 Complex complex_of(const ArrayList& arrays, const std::string& real, const std::string& imaginary) {

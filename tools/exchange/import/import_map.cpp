@@ -121,13 +121,9 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
   v.integer("period_samples", map.period_samples, 0, 1 << 27, kOptional, "samples of one period");
   v.integer("transient_periods", map.transient_periods, 0, 1'000'000, kOptional,
             "unused periods at the start of every run");
-  const auto signals = [&v](const char* key, ImportMap::Signals& group, const char* help) {
-    v.group(
-        key, [&group](ConfigVisitor& inner) { describe_signals(inner, group); }, kOptional, help);
-  };
-  signals("excitation", map.excitation, "signals added in the loop");
-  signals("actuators", map.actuators, "inputs of the plant");
-  signals("sensors", map.sensors, "outputs of the plant");
+  group(v, "excitation", describe_signals, map.excitation, kOptional, "signals added in the loop");
+  group(v, "actuators", describe_signals, map.actuators, kOptional, "inputs of the plant");
+  group(v, "sensors", describe_signals, map.sensors, kOptional, "outputs of the plant");
   choose(v, "excitation_period", map.excitation_period, {"repeats", "mean"}, kOptional,
          "mean: the excitation was measured; use the mean of its periods after the transient");
   v.items(

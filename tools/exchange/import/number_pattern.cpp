@@ -85,10 +85,6 @@ bool is_pattern(const std::string& text) {
          text.find(kExperiment) != std::string::npos;
 }
 
-std::optional<RunNumbers> match_pattern(const std::string& pattern, const std::string& text) {
-  return match(expression_of(pattern), text);
-}
-
 std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
                                              const std::vector<std::string>& texts) {
   const Expression expression = expression_of(pattern);

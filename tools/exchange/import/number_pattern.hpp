@@ -17,12 +17,8 @@ struct RunNumbers {
 /// Whether {realization} or {experiment} is in a text.
 bool is_pattern(const std::string& text);
 
-/// The numbers in `text`, with optional leading zeros; empty if the pattern does not match.
-/// @throws std::invalid_argument if a placeholder occurs twice in the pattern
-std::optional<RunNumbers> match_pattern(const std::string& pattern, const std::string& text);
-
-/// The texts that match, sorted by their numbers.
-/// @throws std::invalid_argument if two of them have the same numbers
+/// The texts that match, sorted by their numbers, which may have leading zeros.
+/// @throws std::invalid_argument if two of them have the same numbers, or a placeholder occurs twice in the pattern
 std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
                                              const std::vector<std::string>& texts);
 

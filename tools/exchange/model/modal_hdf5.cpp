@@ -6,27 +6,12 @@
 #include <complex>
 #include <vector>
 
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "estimation/modal/modal_assurance.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 
 namespace stageid {
 namespace {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-void write_matrix(Hdf5File& file, const std::string& dataset, const RowMajor& matrix) {
-  file.write_reals(dataset, {size_of(matrix.rows()), size_of(matrix.cols())}, matrix.data());
-}
-
-void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
-  file.write_reals(dataset, {size_of(values.size())}, values.data());
-}
-
-/// One shape per row: the concatenated columns are the rows of a row-major array.
-void write_shapes(Hdf5File& file, const std::string& dataset, const Eigen::MatrixXcd& shapes,
-                  Eigen::Index channels) {
-  file.write_complex(dataset, {size_of(shapes.cols()), size_of(channels)}, shapes.data());
-}
 
 void write_modes_table(Hdf5File& file, const AdditiveModel& model) {
   std::vector<double> frequency_hz, damping, frequency_std_hz, damping_std;
@@ -40,12 +25,11 @@ void write_modes_table(Hdf5File& file, const AdditiveModel& model) {
     damping_std.push_back(s.damping_ratio_std.value_or(std::nan("")));
     submodel.push_back(static_cast<long long>(index));
   }
-  const std::vector<hsize_t> shape = {submodel.size()};
-  file.write_reals("/modes/natural_frequency_hz", shape, frequency_hz.data());
-  file.write_reals("/modes/damping_ratio", shape, damping.data());
-  file.write_reals("/modes/natural_frequency_std_hz", shape, frequency_std_hz.data());
-  file.write_reals("/modes/damping_ratio_std", shape, damping_std.data());
-  file.write_integers("/modes/submodel", shape, submodel.data());
+  write_vector(file, "/modes/natural_frequency_hz", frequency_hz);
+  write_vector(file, "/modes/damping_ratio", damping);
+  write_vector(file, "/modes/natural_frequency_std_hz", frequency_std_hz);
+  write_vector(file, "/modes/damping_ratio_std", damping_std);
+  write_vector(file, "/modes/submodel", submodel);
 }
 
 void write_mode_shapes(Hdf5File& file, const AdditiveModel& model,
@@ -57,10 +41,13 @@ void write_mode_shapes(Hdf5File& file, const AdditiveModel& model,
     mass.push_back(mode.modal_mass);
     not_rank_one.push_back(mode.not_rank_one);
   }
-  write_shapes(file, "/modes/output_shape", outputs, model.n_outputs());
-  write_shapes(file, "/modes/input_shape", inputs, model.n_inputs());
-  file.write_reals("/modes/modal_mass", {modes.size()}, mass.data());
-  file.write_reals("/modes/not_rank_one", {modes.size()}, not_rank_one.data());
+  // One shape per row: the columns follow each other as the rows of the dataset do.
+  const auto n_y = static_cast<hsize_t>(model.n_outputs());
+  const auto n_u = static_cast<hsize_t>(model.n_inputs());
+  write_array(file, "/modes/output_shape", {modes.size(), n_y}, outputs.data());
+  write_array(file, "/modes/input_shape", {modes.size(), n_u}, inputs.data());
+  write_vector(file, "/modes/modal_mass", mass);
+  write_vector(file, "/modes/not_rank_one", not_rank_one);
   write_matrix(file, "/modes/output_mac", modal_assurance(outputs, outputs));
   write_matrix(file, "/modes/input_mac", modal_assurance(inputs, inputs));
 }
@@ -70,7 +57,7 @@ void write_driving_point(Hdf5File& file, const AdditiveModel& model, const Drivi
   const std::string dataset = "/modes/driving_point_mass";
   std::vector<double> mass;
   for (const ModeShape& mode : modes) mass.push_back(driving_point_mass(mode, point));
-  file.write_reals(dataset, {mass.size()}, mass.data());
+  write_vector(file, dataset, mass);
   file.write_attribute(dataset, "output",
                        model.outputs.names.at(static_cast<std::size_t>(point.output)));
   file.write_attribute(dataset, "input",
@@ -100,8 +87,8 @@ void write_system(Hdf5File& file, const std::string& group, const std::string& p
     if (block.size == 2) poles.push_back(std::conj(block.pole));
     submodels.resize(poles.size(), block.submodel);
   }
-  file.write_complex(group + "/" + pole_name, {poles.size()}, poles.data());
-  file.write_integers(group + "/submodel", {submodels.size()}, submodels.data());
+  write_vector(file, group + "/" + pole_name, poles);
+  write_vector(file, group + "/submodel", submodels);
 }
 
 }  // namespace
@@ -124,11 +111,8 @@ void write_state_spaces(Hdf5File& file, const AdditiveModel& model) {
   const SampledStateSpace sampled = sampled_state_space(model);
   write_system(file, group, "pole", sampled.system);
   file.write_attribute(group, "sample_rate_hz", sampled.sample_rate_hz);
-  file.write_integers(group + "/input_delay_samples", {size_of(sampled.input_delay_samples.size())},
-                      sampled.input_delay_samples.data());
-  file.write_integers(group + "/output_delay_samples",
-                      {size_of(sampled.output_delay_samples.size())},
-                      sampled.output_delay_samples.data());
+  write_vector(file, group + "/input_delay_samples", sampled.input_delay_samples);
+  write_vector(file, group + "/output_delay_samples", sampled.output_delay_samples);
 }
 
 }  // namespace stageid

@@ -16,6 +16,4 @@ void write_modal_form(Hdf5File& file, const AdditiveModel& model,
 /// @throws std::invalid_argument as state_space(). @throws FileError
 void write_state_spaces(Hdf5File& file, const AdditiveModel& model);
 
-inline hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
-
 }  // namespace stageid

@@ -4,10 +4,10 @@
 
 #include <complex>
 
-#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
-#include "tools/exchange/arrays/channel_order.hpp"
+#include "frf/file/line_datasets.hpp"
 #include "tools/exchange/model/modal_hdf5.hpp"
 
 namespace stageid {
@@ -20,7 +20,7 @@ void write_submodels(Hdf5File& file, const AdditiveModel& model) {
     const std::string group = fmt::format("/submodels/{:04}", index);
     file.create_group(group);
     file.write_attribute(group, "integrators", static_cast<long long>(s.integrators));
-    file.write_reals(group + "/denominator", {s.denominator.size()}, s.denominator.data());
+    write_vector(file, group + "/denominator", s.denominator);
     std::vector<double> numerator;
     for (const Eigen::MatrixXd& B : s.numerator)
       for (Eigen::Index i = 0; i < B.rows(); ++i)
@@ -48,10 +48,8 @@ void write_head(Hdf5File& file, const std::filesystem::path& target, const Addit
   file.write_attribute("/inputs", "unit", model.inputs.units);
   file.write_texts("/outputs", model.outputs.names);
   file.write_attribute("/outputs", "unit", model.outputs.units);
-  const Eigen::VectorXd input_delay = model.input_delays_s();
-  const Eigen::VectorXd output_delay = model.output_delays_s();
-  file.write_reals("/input_delay_s", {size_of(input_delay.size())}, input_delay.data());
-  file.write_reals("/output_delay_s", {size_of(output_delay.size())}, output_delay.data());
+  write_vector(file, "/input_delay_s", model.input_delays_s());
+  write_vector(file, "/output_delay_s", model.output_delays_s());
   file.write_texts("/model_json", {model_text(model, target)});
 }
 
@@ -59,13 +57,13 @@ void write_response(Hdf5File& file, const AdditiveModel& model, const ExportedRe
   if (exported.frequency_hz.size() == 0) return;
   const hsize_t N = size_of(exported.frequency_hz.size());
   const std::vector<hsize_t> shape = {N, size_of(model.n_outputs()), size_of(model.n_inputs())};
-  file.write_reals("/frequency_hz", {N}, exported.frequency_hz.data());
+  write_vector(file, "/frequency_hz", exported.frequency_hz);
   const Eigen::MatrixXcd P = response(model, exported.frequency_hz, model.hold);
   file.write_complex("/response", shape,
-                     c_order<std::complex<double>>(P, model.n_outputs()).data());
+                     to_c_order<std::complex<double>>(P, model.n_outputs()).data());
   if (exported.variance.size() > 0)
     file.write_reals("/response_variance", shape,
-                     c_order<double>(exported.variance, model.n_outputs()).data());
+                     to_c_order<double>(exported.variance, model.n_outputs()).data());
 }
 
 }  // namespace
@@ -92,15 +90,8 @@ Eigen::MatrixXd read_response_variance(const std::filesystem::path& path,
   if (!std::equal(lines.begin(), lines.end(), frequency_hz.begin(), frequency_hz.end())) return {};
   const std::vector<hsize_t> shape = file.shape("/response_variance");
   if (shape.size() != 3 || shape[0] != lines.size()) return {};
-  const auto n_y = static_cast<Eigen::Index>(shape[1]);
-  const auto n_u = static_cast<Eigen::Index>(shape[2]);
-  const std::vector<double> data = file.read_reals("/response_variance");
-  Eigen::MatrixXd variance(n_y * n_u, frequency_hz.size());
-  std::size_t at = 0;
-  for (Eigen::Index k = 0; k < variance.cols(); ++k)
-    for (Eigen::Index i = 0; i < n_y; ++i)
-      for (Eigen::Index j = 0; j < n_u; ++j) variance(i + n_y * j, k) = data[at++];
-  return variance;
+  return from_c_order(file.read_reals("/response_variance"), static_cast<Eigen::Index>(shape[1]),
+                      static_cast<Eigen::Index>(shape[2]));
 }
 
 }  // namespace stageid

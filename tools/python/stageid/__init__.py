@@ -46,45 +46,7 @@ from stageid._results import (
     Validation,
 )
 
-__all__ = [
-    "CandidateMode",
-    "Covariance",
-    "FileError",
-    "Finding",
-    "Fit",
-    "FitRecord",
-    "FormatError",
-    "Frf",
-    "Log",
-    "LogArrays",
-    "Mode",
-    "ModePair",
-    "Model",
-    "RequestError",
-    "Run",
-    "SampledStateSpace",
-    "StabilizationPole",
-    "StageError",
-    "StageidError",
-    "StateSpace",
-    "Submodel",
-    "Validation",
-    "__version__",
-    "call",
-    "cmif",
-    "fit",
-    "frf",
-    "modes",
-    "multisine",
-    "pair_modes",
-    "read_frf",
-    "read_log",
-    "read_model",
-    "simulate",
-    "stabilization",
-    "validate",
-    "write_frf",
-]
+__all__ = ["__version__", *(name for name in globals() if not name.startswith("_"))]
 
 # What needs no compiled code is written in Python.
 for _method, _name in ((_conversions.to_xarray, "Frf.to_xarray"), (_conversions.to_control, "Model.to_control")):

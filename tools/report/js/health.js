@@ -29,7 +29,7 @@ function findingTable() {
   const heads = ['severity', 'channel', 'finding', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
   const rows = content.findings.map((finding) => element('tr', null, element('td', null, element('span', { class: 'severity level-' + grave[finding.severity] }, finding.severity)),
     element('td', { class: 'name' }, finding.channel || 'all'), element('td', null, finding.what), element('td', null, finding.figure || '\u2013'), element('td', null, finding.remedy || '\u2013')));
-  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the data checks, most severe first'),
+  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the data checks, the most important first'),
     element('thead', null, element('tr', null, ...heads)), element('tbody', null, ...rows)));
 }
 

@@ -22,8 +22,7 @@ function buildHead() {
   }
   for (const figure of content.figures) figures.push([figure.label, figure.value]);
   head.append(figureList(figures));
-  const notes = content.messages.filter((message) => message.severity === 'note');
-  if (notes.length) head.append(element('ul', { class: 'notes' }, ...notes.map((note) => element('li', null, note.text))));
+  if (content.notes.length) head.append(element('ul', { class: 'notes' }, ...content.notes.map((note) => element('li', null, note))));
 }
 
 function figureList(figures) {

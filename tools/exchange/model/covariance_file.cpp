@@ -1,17 +1,15 @@
-#include "tools/steps/covariance_file.hpp"
+#include "tools/exchange/model/covariance_file.hpp"
 
 #include <fmt/format.h>
 
 #include <complex>
 
-#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/output_file.hpp"
-#include "tools/exchange/arrays/channel_order.hpp"
+#include "frf/file/line_datasets.hpp"
 
 namespace stageid {
 namespace {
-
-hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
 
 std::string unit_of(const ChannelList& channels, Eigen::Index c) {
   const auto at = static_cast<std::size_t>(c);
@@ -69,23 +67,18 @@ void add_numerators(const AdditiveModel& model, ParameterNames& out) {
   }
 }
 
-void write_matrix(Hdf5File& file, const std::string& dataset, const Eigen::MatrixXd& symmetric) {
-  const hsize_t n = size_of(symmetric.rows());
-  file.write_reals(dataset, {n, n}, symmetric.data());
-}
-
 void write_response(Hdf5File& file, const AdditiveModel& model, const FitCovariance& covariance,
                     const Eigen::VectorXd& frequency_hz) {
   const hsize_t N = size_of(frequency_hz.size());
   const std::vector<hsize_t> shape = {N, size_of(model.n_outputs()), size_of(model.n_inputs())};
-  file.write_reals("/frequency_hz", {N}, frequency_hz.data());
+  write_vector(file, "/frequency_hz", frequency_hz);
   const Eigen::MatrixXcd P = response(model, frequency_hz, model.hold);
   file.write_complex("/response", shape,
-                     c_order<std::complex<double>>(P, model.n_outputs()).data());
+                     to_c_order<std::complex<double>>(P, model.n_outputs()).data());
   file.write_reals("/response_variance", shape,
-                   c_order<double>(covariance.response_variance, model.n_outputs()).data());
+                   to_c_order<double>(covariance.response_variance, model.n_outputs()).data());
   file.write_reals("/confidence_radius", shape,
-                   c_order<double>(covariance.response_radius, model.n_outputs()).data());
+                   to_c_order<double>(covariance.response_radius, model.n_outputs()).data());
   file.write_attribute("/confidence_radius", "level", 0.95);
 }
 
@@ -125,7 +118,7 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
   file.create_group("/parameters");
   file.write_texts("/parameters/name", parameters.names);
   file.write_texts("/parameters/unit", parameters.units);
-  file.write_reals("/parameters/value", {parameters.values.size()}, parameters.values.data());
+  write_vector(file, "/parameters/value", parameters.values);
   file.create_group("/covariance");
   write_matrix(file, "/covariance/sandwich", covariance.sandwich);
   write_matrix(file, "/covariance/likelihood", covariance.likelihood);
