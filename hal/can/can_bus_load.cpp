@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 
 namespace stageid {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 
 namespace stageid {
 namespace {

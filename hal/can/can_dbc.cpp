@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 
 namespace stageid {
 namespace {

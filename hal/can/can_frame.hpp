@@ -22,7 +22,7 @@ std::size_t can_fd_length(std::size_t bytes) noexcept;
 /// The first eight bytes of every frame:
 ///
 ///   0  u16  sequence   of the sample, or of the command
-///   2  u8   kind       state, command or flags: see can_messages.hpp
+///   2  u8   kind       state, command or flags: see can_encoding.hpp
 ///   3  u8   run        low byte of the run's key; identifies frames of another run
 ///   4  u16  detail     time in microseconds, more bytes of the key, or a part number
 ///   6  u16  crc        CRC-16 over the identifier and all other bytes of the frame

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/can/can_encoding.hpp"
 #include "hal/can/can_layout.hpp"
-#include "hal/can/can_messages.hpp"
 #include "hal/can/can_transport.hpp"
 
 namespace stageid {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/can/can_encoding.hpp"
 #include "hal/can/can_layout.hpp"
-#include "hal/can/can_messages.hpp"
 #include "hal/can/can_player.hpp"
 #include "hal/can/can_transport.hpp"
 #include "hal/node/stage_node.hpp"

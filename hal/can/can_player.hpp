@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 #include "hal/can/can_transport.hpp"
 #include "hal/node/stage_node.hpp"
 

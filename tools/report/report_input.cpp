@@ -16,7 +16,7 @@
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
-#include "estimation/modal/json_file.hpp"
+#include "estimation/file/json_file.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
 #include "tools/experiment/run_metadata.hpp"

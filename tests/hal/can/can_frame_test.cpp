@@ -6,8 +6,8 @@
 #include <limits>
 #include <string_view>
 
+#include "hal/can/can_encoding.hpp"
 #include "hal/can/can_layout.hpp"
-#include "hal/can/can_messages.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 #include "hal/stage/stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 

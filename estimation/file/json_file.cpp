@@ -1,4 +1,4 @@
-#include "estimation/modal/json_file.hpp"
+#include "estimation/file/json_file.hpp"
 
 #include <cmath>
 #include <cstdio>

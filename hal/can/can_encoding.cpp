@@ -1,4 +1,4 @@
-#include "hal/can/can_messages.hpp"
+#include "hal/can/can_encoding.hpp"
 
 #include <algorithm>
 #include <cstring>

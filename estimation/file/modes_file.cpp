@@ -4,7 +4,7 @@
 #include <fstream>
 
 #include "acquisition/files/output_file.hpp"
-#include "estimation/modal/json_file.hpp"
+#include "estimation/file/json_file.hpp"
 #include "estimation/model/cmif.hpp"
 
 namespace stageid {

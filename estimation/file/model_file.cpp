@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "acquisition/files/output_file.hpp"
-#include "estimation/modal/json_file.hpp"
+#include "estimation/file/json_file.hpp"
 #include "estimation/modal/modal_form.hpp"
 #include "estimation/model/additive_model.hpp"
 
