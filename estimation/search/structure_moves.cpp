@@ -96,7 +96,10 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
   if (open.delay && options.delay != DelayModel::per_channel && model.hold != HoldModel::none &&
       frf.response.rows() > 1) {
     StructureMove skewed{"--delay per_channel", model, options};
-    free_delays(DelayModel::per_channel, skewed);
+    if (options.delay == DelayModel::fixed)
+      free_delays(DelayModel::per_channel, skewed);
+    else
+      skewed.options.delay = DelayModel::per_channel;
     out.push_back(skewed);
     // Numerators B_0 + B_1 s stand in for delays.
     if (open.general_damping && has(model, is_general)) {
