@@ -17,6 +17,7 @@
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
+#include "estimation/search/part_of_data.hpp"
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/search/search_advice.hpp"
@@ -183,7 +184,7 @@ class AutomaticFit {
   /// The whole search on a part of the data; then a fit of its result to all data.
   /// @returns false if the data are too few for a part
   bool begin_on_part(const AdditiveModel& model) {
-    const StructureTrial part = structure_trial(frf_, quick_, model);
+    const PartOfData part = part_of_data(frf_, quick_, model);
     if (part.all) return false;
     ModelStructure structure = structure_;
     structure.given = structure_of(part.model).given;
@@ -300,13 +301,13 @@ class AutomaticFit {
   /// A part of the data, on which moves are tried, and the score of best_ there.
   struct Sample {
     explicit Sample(const AutomaticFit& search)
-        : data(structure_trial(search.frf_, search.quick_, search.best_.model)),
+        : data(part_of_data(search.frf_, search.quick_, search.best_.model)),
           worth(data.frf, search.structure_, data.options.user_weights) {
       const FitResult fit = fit_additive_model(data.frf, data.model, data.options);
       now = worth.criterion(fit);
       cost = fit.model.fit.cost;
     }
-    StructureTrial data;
+    PartOfData data;
     ModeWorth worth;
     double now = 0.0;  ///< criterion
     double cost = 0.0;

@@ -23,11 +23,11 @@ inline constexpr std::size_t kShareAtOnce = 5;
 /// A fit gains at most this many times what the matched filter estimates for a further mode.
 inline constexpr double kReach = 5.0;
 
-// The part of the data on which the search begins and moves are tried (structure_study: the same moves as on all data).
+// The part of the data on which the search begins and moves are tried.
 
-inline constexpr Eigen::Index kTrialLines = 500;        ///< at least
-inline constexpr Eigen::Index kTrialLinesOfAMode = 20;  ///< at least, per mode
-inline constexpr Eigen::Index kTrialChannels = 256;     ///< at most, if an input has no more
+inline constexpr Eigen::Index kPartLines = 500;        ///< at least
+inline constexpr Eigen::Index kPartLinesOfAMode = 20;  ///< at least, per mode
+inline constexpr Eigen::Index kPartChannels = 256;     ///< at most, if an input has no more
 
 // When the search or its last fit ends.
 

@@ -29,26 +29,9 @@ std::vector<StructureMove> simpler_structures(const FitOptions& options, const A
 std::vector<StructureMove> structure_moves(const FrfEstimate& frf, const FitOptions& options,
                                            const AdditiveModel& model, const OpenStructure& open);
 
-/// Some of the lines and inputs of an FRF, evenly spaced, with a model of them and the options of a fit.
-struct StructureTrial {
-  FrfEstimate frf;
-  FitOptions options;
-  AdditiveModel model;
-  bool all = false;  ///< there are few: these are all
-};
-
-/// As many lines and inputs as show the structure: it acts on all, while a mode acts on few lines. All, if there are
-/// few.
-/// @param options with FitOptions::user_weights, which become those of the trial
-StructureTrial structure_trial(const FrfEstimate& frf, const FitOptions& options,
-                               const AdditiveModel& model);
-
 /// One of two overlapping modes instead of both, the broader of which merges only into its nearest neighbour. On a
 /// single resonance, two nearly equal modes with large opposite residues fit as well as one, and neither can be dropped
 /// alone.
 std::vector<StructureMove> merges(const FitOptions& options, const AdditiveModel& model);
-
-/// The poles and delays of a model of a trial, for all inputs; of those that were not in it, the mean delay.
-AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model);
 
 }  // namespace stageid

@@ -94,6 +94,7 @@ struct Explained {
   ArrayXd before;        ///< sum over channels of e_0^2
   ArrayXd after;         ///<   and of e_d^2
   double freedom = 0.0;  ///< independent samples of a period, over the channels
+  double noise = 0.0;    ///< of a sample, sum over channels: 1 each
 };
 
 /// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S.
@@ -115,22 +116,23 @@ Explained explained_of(const MatrixXd& earlier, const MatrixXd& later, Index c, 
   const Index N = later.rows();
   const Index blocks = blocks_of(N);
   const double power = later.col(c).squaredNorm();
-  if (!(power > 0.0)) return {ArrayXd::Zero(N), ArrayXd::Zero(N), 0.0};
+  if (!(power > 0.0)) return {ArrayXd::Zero(N), ArrayXd::Zero(N)};
   const ArrayXd before = difference(later, earlier, c, 0);
   const ArrayXd after = difference(later, earlier, c, shift);
   const double scatter =
       block_power(before, blocks).min(block_power(after, blocks)).sum() / static_cast<double>(N);
   const double weight = 1.0 / (scatter + floor_of(later, c) / static_cast<double>(N));
   return {weight * before.square(), weight * after.square(),
-          std::min(independent_samples(before, dft), independent_samples(after, dft))};
+          std::min(independent_samples(before, dft), independent_samples(after, dft)), 1.0};
 }
 
 Explained sum_of(const std::vector<Explained>& channels, Index rows) {
-  Explained sum{ArrayXd::Zero(rows), ArrayXd::Zero(rows), 0.0};
+  Explained sum{ArrayXd::Zero(rows), ArrayXd::Zero(rows)};
   for (const Explained& one : channels) {
     sum.before += one.before;
     sum.after += one.after;
     sum.freedom += one.freedom;
+    sum.noise += one.noise;
   }
   return sum;
 }
@@ -184,9 +186,11 @@ double advantage(const Explained& of, const Change& change) {
   const double count =
       of.freedom * static_cast<double>(rows) / static_cast<double>(of.before.size());
   if (!(count > 0.0)) return 0.0;
+  // In a few rows, the steps of a coarse converter agree by chance: nothing fits better than the noise.
+  const double noise = of.noise * static_cast<double>(rows);
   const double before = of.before.segment(change.first, rows).sum();
   const double after = of.after.segment(change.first, rows).sum();
-  const double ratio = std::log(before / std::max(1e-300, after));
+  const double ratio = std::log(std::max(noise, before) / std::max(noise, after));
   const double least = std::max(std::log(kLeastGain), kDeviations * std::sqrt(4.0 / count));
   return std::abs(ratio) > least ? ratio : 0.0;
 }

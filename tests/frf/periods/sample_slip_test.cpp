@@ -92,6 +92,20 @@ TEST(SampleSlip, CleanRunsHaveNone) {
   }
 }
 
+// A converter with few steps repeats its values exactly in a few rows, shifted or not.
+TEST(SampleSlip, CoarseStepsAreNoSlip) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Case c(seed);
+    for (LogSamples& run : c.log.records)
+      for (Index i = 0; i < run.sensors.cols(); ++i) {
+        const double step = 0.7 * std::sqrt(run.sensors.col(i).squaredNorm() /
+                                            static_cast<double>(run.sensors.rows()));
+        run.sensors.col(i) = (run.sensors.col(i) / step).array().round() * step;
+      }
+    EXPECT_TRUE(read_health_record({&c.log}, {}).slips.empty()) << seed;
+  }
+}
+
 TEST(SampleSlip, OneLostSampleIsToldWithItsRowAndTheRestIsUsed) {
   int exact = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "estimation/model/additive_model.hpp"
+#include "estimation/problem/fit_options.hpp"
+#include "frf/response/frf_estimate.hpp"
+
+namespace stageid {
+
+/// Some of the lines and inputs of an FRF, evenly spaced, with a model of them and the options of a fit.
+struct PartOfData {
+  FrfEstimate frf;
+  FitOptions options;
+  AdditiveModel model;
+  bool all = false;  ///< there are few: these are all
+};
+
+/// As many lines and inputs as a walk through models needs: at least 500 lines, 20 per mode, up to 256 channels. All, if
+/// there are few. Modes between the lines of the part are found later, on all data.
+/// @param options with FitOptions::user_weights, which become those of the part
+PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
+                        const AdditiveModel& model);
+
+/// The poles and delays of a model of a part, for all inputs; of those that were not in it, the mean delay.
+AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model);
+
+}  // namespace stageid

@@ -1,0 +1,80 @@
+#include "estimation/search/part_of_data.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+namespace stageid {
+namespace part_of_data_test {
+
+FrfEstimate frf_of(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines) {
+  FrfEstimate frf;
+  for (Eigen::Index y = 0; y < outputs; ++y) frf.outputs.names.push_back(fmt::format("y{}", y));
+  for (Eigen::Index u = 0; u < inputs; ++u) frf.inputs.names.push_back(fmt::format("u{}", u));
+  frf.outputs.units.assign(static_cast<std::size_t>(outputs), "m");
+  frf.inputs.units.assign(static_cast<std::size_t>(inputs), "N");
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(lines, 1.0, static_cast<double>(lines));
+  frf.response = Eigen::MatrixXcd::Random(outputs * inputs, lines);
+  return frf;
+}
+
+FitOptions weighed(const FrfEstimate& frf) {
+  FitOptions options;
+  options.user_weights = Eigen::MatrixXd(frf.response.cwiseAbs2());
+  return options;
+}
+
+AdditiveModel one_mode(const FrfEstimate& frf) {
+  AdditiveModel model;
+  model.inputs = frf.inputs;
+  model.outputs = frf.outputs;
+  model.input_delay_s = Eigen::VectorXd::LinSpaced(frf.n_inputs(), 0.0, 1e-3);
+  model.output_delay_s.setZero(frf.n_outputs());
+  model.submodels.push_back(
+      {0, {1.0, 0.1, 100.0}, {Eigen::MatrixXd::Random(frf.n_outputs(), frf.n_inputs())}, {}, {}});
+  return model;
+}
+
+TEST(PartOfData, FewDataAreWhole) {
+  const FrfEstimate frf = frf_of(2, 3, 900);
+  const PartOfData part = part_of_data(frf, weighed(frf), one_mode(frf));
+  EXPECT_TRUE(part.all);
+  EXPECT_EQ(part.frf.response, frf.response);
+}
+
+TEST(PartOfData, ManyLinesAndInputsAreTakenEvenly) {
+  const FrfEstimate frf = frf_of(2, 300, 1100);
+  const AdditiveModel model = one_mode(frf);
+  const PartOfData part = part_of_data(frf, weighed(frf), model);
+  EXPECT_FALSE(part.all);
+  ASSERT_EQ(part.frf.lines(), 550);
+  ASSERT_EQ(part.frf.n_inputs(), 128);
+  for (Eigen::Index u = 0; u < part.frf.n_inputs(); ++u) {
+    EXPECT_EQ(part.frf.inputs.names[static_cast<std::size_t>(u)], fmt::format("u{}", 2 * u));
+    EXPECT_EQ(part.model.input_delay_s[u], model.input_delay_s[2 * u]);
+    EXPECT_EQ(part.model.submodels[0].numerator[0].col(u),
+              model.submodels[0].numerator[0].col(2 * u));
+    for (Eigen::Index y = 0; y < 2; ++y) {
+      EXPECT_EQ(part.frf.response(2 * u + y, 7), frf.response(4 * u + y, 14));
+      EXPECT_EQ((*part.options.user_weights)(2 * u + y, 7), std::norm(frf.response(4 * u + y, 14)));
+    }
+  }
+  EXPECT_EQ(part.frf.frequency_hz[7], frf.frequency_hz[14]);
+
+  const AdditiveModel whole = with_all_inputs(frf, part.model);
+  EXPECT_EQ(whole.inputs.names, frf.inputs.names);
+  EXPECT_EQ(whole.submodels[0].denominator, model.submodels[0].denominator);
+  EXPECT_TRUE(whole.submodels[0].numerator[0].isZero(0.0));
+  ASSERT_EQ(whole.input_delay_s.size(), 300);
+  EXPECT_NEAR(whole.input_delay_s[0], part.model.input_delay_s.mean(), 1e-15);
+}
+
+TEST(PartOfData, ManyModesNeedManyLines) {
+  const FrfEstimate frf = frf_of(1, 1, 4000);
+  AdditiveModel model = one_mode(frf);
+  EXPECT_EQ(part_of_data(frf, weighed(frf), model).frf.lines(), 500);
+  model.submodels.resize(100, model.submodels[0]);
+  EXPECT_EQ(part_of_data(frf, weighed(frf), model).frf.lines(), 2000);
+}
+
+}  // namespace part_of_data_test
+}  // namespace stageid
