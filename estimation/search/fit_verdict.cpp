@@ -163,7 +163,11 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
   }
   if (!evidence.growth_ended.empty()) {
     fit.findings.push_back(evidence.growth_ended);
-    if (evidence.delay_explains_more) fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+    if (evidence.delay_explains_more) {
+      // Without the delay, a fit need not converge; that is not the reason.
+      if (fit.status == FitStatus::iteration_limit) fit.status = FitStatus::gradient_small;
+      fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+    }
   }
   if (evidence.limit) {
     fit.decisions.push_back(evidence.limit_message);

@@ -36,7 +36,7 @@ TEST_P(StructureSearch, FindsTheStructureOfAPlant) {
   const FitResult fit = fit_model(plant.frf);
   EXPECT_TRUE(fit.trustworthy()) << plant.description() << ": " << fit.message;
   EXPECT_NEAR(fit.model.fit.cost / cost_of_truth(plant), 1.0, 0.01) << plant.description();
-  EXPECT_LE(fit.model.submodels.size(), plant.truth.submodels.size()) << plant.description();
+  EXPECT_EQ(fit.model.submodels.size(), plant.truth.submodels.size()) << plant.description();
   EXPECT_EQ(fit.delay, plant.delay);
 }
 
