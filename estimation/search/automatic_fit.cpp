@@ -62,9 +62,10 @@ class AutomaticFit {
   void begin() {
     const AdditiveModel model = start();
     const bool open = selection_.exactly == 0 && !selection_.keep_modes;
-    if (open && begin_on_part(model)) return;
-    adopt(fit_additive_model(frf_, model, quick_));
-    if (open) relocate();
+    if (!open)
+      adopt(fit_additive_model(frf_, model, quick_));
+    else if (!begin_on_part(model))
+      begin_relocated_from(model);
   }
 
   /// The same with the requested number of modes, all placed at once.
@@ -167,8 +168,9 @@ class AutomaticFit {
     return kSettled * std::sqrt(free);
   }
 
-  /// Places all modes at once by pole relocation, if that is better.
-  void relocate() {
+  /// The first fit of an open search; then all modes are placed at once by pole relocation, if that is better.
+  void begin_relocated_from(const AdditiveModel& model) {
+    adopt(fit_additive_model(frf_, model, quick_));
     if (limit_reached()) return;
     FitResult fit = fit_additive_model(
         frf_,
@@ -193,8 +195,7 @@ class AutomaticFit {
     options.user_weights = part.options.user_weights;
     options.user_weight_matrices.resize(0, 0);
     AutomaticFit search(part.frf, structure, selection_, options);
-    search.adopt(fit_additive_model(part.frf, part.model, search.quick_));
-    search.relocate();
+    search.begin_relocated_from(part.model);
     search.search(0);
     if (search.best_.status == FitStatus::singular) return false;
     for (const std::string& decision : search.decisions_)

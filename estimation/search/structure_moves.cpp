@@ -101,7 +101,7 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
     else
       skewed.options.delay = DelayModel::per_channel;
     out.push_back(skewed);
-    // Numerators B_0 + B_1 s stand in for delays.
+    // A general damping that only imitates the delays is not needed beside them.
     if (open.general_damping && has(model, is_general)) {
       skewed.flag += " --damping proportional";
       make_proportional(skewed.model);
