@@ -23,6 +23,7 @@
 #include "frf/plant/step_search.hpp"
 #include "frf/plant/zippered_fit.hpp"
 #include "frf/response/covariance_smoothing.hpp"
+#include "frf/response/leaked_noise.hpp"
 #include "frf/runs/byte_counter.hpp"
 #include "frf/runs/channel_choice.hpp"
 #include "frf/runs/constant_input.hpp"
@@ -364,6 +365,8 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
   FrfEstimate frf = describe();
   average_->finish(frf, workers_);
+  const RealizationScatter scatter = average_->scatter();
+  if (options_.method == FrfMethod::periodic) lower_leaked_noise(scatter, frf);
   if (health != nullptr) note_change(frf, *health);
   if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
   // Outside these lines, the response to some axis would be extrapolated.
@@ -374,8 +377,7 @@ FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
   }
   if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
     frf.nonlinearity = nonlinearity_test(
-        frf,
-        {average_->scatter(), alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
+        frf, {scatter, alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
   frf.provenance_json = provenance_->json();
   if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
   if (channels_.inputs == frf.inputs.names) return frf;

@@ -12,7 +12,6 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kFewestLines = 8;
 constexpr double kCertain = 1e3;  // -ln p of scatter if there is no noise at all
 
 constexpr double kRounding = 1e-24;  // of the linear power: rounding errors
@@ -87,7 +86,7 @@ double least_tail(const LineAlignment& alignment, double low_hz, double high_hz)
       cosine += alignment.cosine(i, l);
       pairs += alignment.pairs(i, l);
     }
-    if (pairs >= kFewestLines)
+    if (pairs >= kFewestLinesOfBand)
       least = std::min(least, tail_of_normal(cosine / std::sqrt(0.5 * pairs)));
   }
   return least;
@@ -150,7 +149,7 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence) {
   if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
     throw std::invalid_argument(why);
-  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLines);
+  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLinesOfBand);
   const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
   const Eigen::Index n_c = frf.response.rows();
   NonlinearityTest test;

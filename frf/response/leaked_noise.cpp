@@ -1,0 +1,73 @@
+#include "frf/response/leaked_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "frf/statistics/distributions.hpp"
+#include "frf/statistics/frequency_bands.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kFewestRatios = 64;  // lines times inputs: their mean is nearly normal, to a tenth
+constexpr double kByChance = 0.01;   // in one of all outputs and bands
+constexpr double kFewestDof = 3.0;   // F has a variance
+
+/// Mean and variance of F(2 a, 2 b), b > 2.
+double mean_of_f(double b) { return b / (b - 1.0); }
+double variance_of_f(double a, double b) {
+  return mean_of_f(b) * mean_of_f(b) * (a + b - 1.0) / (a * (b - 2.0));
+}
+
+/// Multiplies the noise of output i on line k by factor.
+void scale(FrfEstimate& frf, Index i, Index k, double factor) {
+  const Index n_y = frf.n_outputs();
+  const double root = std::sqrt(factor);
+  for (Index c = i; c < frf.noise_variance.rows(); c += n_y) frf.noise_variance(c, k) *= factor;
+  for (Eigen::MatrixXd* part : {&frf.residual_covariance_re, &frf.residual_covariance_im}) {
+    Eigen::Map<Eigen::MatrixXd> C(part->col(k).data(), n_y, n_y);
+    C.row(i) *= root;
+    C.col(i) *= root;
+  }
+  if (frf.covariance.size() == 0) return;
+  const Index n_c = frf.response.rows();
+  Eigen::Map<Eigen::MatrixXcd> covariance(frf.covariance.col(k).data(), n_c, n_c);
+  for (Index c = i; c < n_c; c += n_y) {
+    covariance.row(c) *= root;
+    covariance.col(c) *= root;
+  }
+}
+
+}  // namespace
+
+void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
+  if (scatter.total.size() == 0 || scatter.noise_dof < kFewestDof) return;
+  const Index n_y = frf.n_outputs();
+  const std::vector<Index> limits =
+      octave_bands(frf.frequency_hz, std::max(kFewestLinesOfBand, kFewestRatios / frf.n_inputs()));
+  const double a = frf.total_dof;
+  const double b = scatter.noise_dof;
+  const double tests = static_cast<double>(n_y) * static_cast<double>(limits.size() - 1);
+  for (std::size_t band = 0; band + 1 < limits.size(); ++band)
+    for (Index i = 0; i < n_y; ++i) {
+      double sum = 0.0;
+      double count = 0.0;
+      for (Index k = limits[band]; k < limits[band + 1]; ++k)
+        for (Index c = i; c < scatter.total.rows(); c += n_y) {
+          if (!(scatter.noise(c, k) > 0.0)) continue;
+          sum += scatter.total(c, k) / scatter.noise(c, k);
+          count += 1.0;
+        }
+      if (count == 0.0) continue;
+      const double ratio = sum / count;
+      const double below = (mean_of_f(b) - ratio) / std::sqrt(variance_of_f(a, b) / count);
+      if (tail_of_normal(below) * tests >= kByChance) continue;
+      for (Index k = limits[band]; k < limits[band + 1]; ++k)
+        scale(frf, i, k, ratio / mean_of_f(b));
+    }
+}
+
+}  // namespace stageid
