@@ -11,6 +11,7 @@
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
 #include "frf/response/channel_positions.hpp"
+#include "frf/runs/byte_counter.hpp"
 #include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/statistics/distributions.hpp"
@@ -118,7 +119,7 @@ class StepSearch {
   std::vector<char> excited_by(const UsedRun& run, RealDft& dft) const;
   void find_largest_commands();
   void collect();
-  void collect(const UsedRun& run, RunWorkspace& w, std::vector<CommandHistogram>& own) const;
+  void collect(const UsedRun& run, RunWorkspace& w, std::vector<CommandHistogram>& own);
   Eigen::MatrixXcd residual(RunWorkspace& w) const;
   static Eigen::MatrixXd spectra_of(const Members& members);
   static Members take_those_at(Index point, const Eigen::MatrixXd& spectra, Members& members);
@@ -128,6 +129,7 @@ class StepSearch {
 
   const LogInfo& info_;
   int workers_;
+  ByteCounter bytes_;
   std::vector<const UsedRun*> runs_;
   std::vector<ActuatorStep> known_;
   std::vector<Index> outputs_;  // of the log
@@ -141,6 +143,7 @@ StepSearch::StepSearch(const std::vector<RealizationRuns>& realizations, const F
                        const FrfOptions& options)
     : info_(realizations.front().runs.front().log->info()),
       workers_(worker_count(options.threads)),
+      bytes_(options, realizations),
       outputs_(channel_positions(info_.sensors, frf.outputs.names, "outputs", "sensor")),
       inputs_(channel_positions(info_.actuators, frf.inputs.names, "inputs", "actuator")) {
   for (const RealizationRuns& realization : realizations)
@@ -209,14 +212,14 @@ Eigen::MatrixXcd StepSearch::residual(RunWorkspace& w) const {
 }
 
 void StepSearch::collect(const UsedRun& run, RunWorkspace& w,
-                         std::vector<CommandHistogram>& own) const {
+                         std::vector<CommandHistogram>& own) {
   const std::vector<char> excited = excited_by(run, w.dft);
   std::vector<Eigen::MatrixXd> commands;
   std::vector<Eigen::MatrixXcd> residuals;
   UsedRun some = run;
   some.periods = std::min(run.periods, kMostPeriods);
   for_each_period(
-      some, w, [](double) {},
+      some, w, [this](double bytes) { bytes_.add(bytes); },
       [&](int) {
         commands.push_back(w.samples.actuators);
         residuals.push_back(residual(w));

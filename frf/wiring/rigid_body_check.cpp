@@ -61,7 +61,10 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j,
   }
   const Eigen::MatrixXd normal_inverse = (X.transpose() * X).inverse();
   const Eigen::MatrixXd solution = normal_inverse * X.transpose() * rhs;
-  return {solution(0, 0), solution(0, 1), normal_inverse(0, 0)};
+  // The scatter of the lines contains distortion, which the periods do not show.
+  const double scatter = (X * solution.col(0) - rhs.col(0)).squaredNorm();
+  const double over_variance = scatter / std::max(1.0, static_cast<double>(K - X.cols()));
+  return {solution(0, 0), solution(0, 1), std::max(1.0, over_variance) * normal_inverse(0, 0)};
 }
 
 Gains fit_gains(const std::vector<PlantLine>& lines, bool suspended) {

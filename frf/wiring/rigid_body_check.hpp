@@ -27,6 +27,8 @@ struct RigidBodyCheck {
 /// real apart from the delay: A is the rigid body, D the compliance of the flexible modes. The same fit to the nominal
 /// rigid body gives A0. A term in 1 / omega^2, for another suspension than the configured one, is added if it brings A
 /// closer to A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
+/// The variance of A is that of the scatter of the lines where it exceeds the noise: a nonlinear plant distorts the
+/// lines in all periods alike.
 /// The change that brings A closest to A0 is accepted, and the search is repeated. Positive gains after which the body
 /// still differs by more than kLargestRigidDeviation are no explanation and are discarded. Entries have a tolerance of 10 % of
 /// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it

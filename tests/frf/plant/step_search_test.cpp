@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/run_table.hpp"
@@ -143,6 +144,20 @@ TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
   const FrfEstimate one = estimate_plant_frf({&log}, options);
   options.threads = 4;
   EXPECT_EQ(one.response, estimate_plant_frf({&log}, options).response);
+}
+
+// An interrupt comes as an exception of the progress function.
+TEST(StepSearch, TheSearchTellsItsProgressAndCanBeInterrupted) {
+  const MemoryLog log = test::simulate_sampled_log(linear_plant(), experiment(1), 1e-3);
+  const FrfEstimate frf = estimate_plant_frf({&log});
+  const std::vector<RealizationRuns> realizations = choose_runs({&log}, {}).realizations;
+  FrfOptions options;
+  double last = 0.0;
+  options.progress = [&last](double done, double total) { last = done / total; };
+  find_actuator_steps(realizations, frf, options);
+  EXPECT_EQ(last, 1.0);
+  options.progress = [](double, double) { throw std::runtime_error("interrupted"); };
+  EXPECT_THROW(find_actuator_steps(realizations, frf, options), std::runtime_error);
 }
 
 // The provenance lists step and rounding of each actuator.

@@ -1,0 +1,71 @@
+#include "frf/wiring/rigid_body_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "tests/support/process/random_numbers.hpp"
+
+namespace stageid {
+namespace test_rigid_body_check {
+
+using Index = Eigen::Index;
+
+constexpr Index kChannels = 3;
+constexpr Index kLines = 10;
+
+/// Lines of a free body from 6 to 33 Hz. Each entry of each line deviates by `distortion` times the rms of its row,
+/// of which the periods show nothing; sensor 1 is recorded too large by `factor`.
+std::vector<PlantLine> body(std::uint64_t seed, double distortion, double factor) {
+  test::RandomNumbers random(seed);
+  Eigen::MatrixXd mobility(kChannels, kChannels);
+  for (double& entry : mobility.reshaped()) entry = random.uniform(-1.0, 1.0);
+  mobility.diagonal().array() += 2.0;
+  std::vector<PlantLine> lines;
+  for (Index k = 0; k < kLines; ++k) {
+    PlantLine line;
+    line.omega_rad_s = 2.0 * std::numbers::pi * (6.0 + 3.0 * static_cast<double>(k));
+    const double gain = -1.0 / (line.omega_rad_s * line.omega_rad_s);
+    line.G0 = (gain * mobility).cast<std::complex<double>>();
+    line.G = line.G0;
+    for (Index i = 0; i < kChannels; ++i) {
+      const double rms = line.G0.row(i).norm() / std::sqrt(static_cast<double>(kChannels));
+      for (std::complex<double>& entry : line.G.row(i))
+        entry += distortion * rms * std::complex<double>(random.normal(), random.normal());
+    }
+    line.G.row(1) *= factor;
+    line.variance = Eigen::MatrixXd::Constant(kChannels, kChannels, 1e-12 * gain * gain);
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+std::vector<ChannelChange> changes(std::uint64_t seed, double distortion, double factor) {
+  std::vector<Index> channels(kChannels);
+  std::iota(channels.begin(), channels.end(), Index{0});
+  return check_rigid_body(body(seed, distortion, factor), channels, channels).changes;
+}
+
+// A nonlinear plant distorts the lines, the same in all periods.
+TEST(RigidBodyCheck, DistortionIsNoFactorOfAChannel) {
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed)
+    if (!changes(seed, 0.5, 1.0).empty()) ++told;
+  EXPECT_LE(told, 2);
+}
+
+TEST(RigidBodyCheck, AFactorIsFoundInSpiteOfDistortion) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const std::vector<ChannelChange> found = changes(seed, 0.05, 2.0);
+    ASSERT_EQ(found.size(), 1U) << seed;
+    EXPECT_EQ(found[0].kind, ChannelChange::Kind::gain);
+    EXPECT_TRUE(found[0].of_sensors);
+    EXPECT_EQ(found[0].a, 1);
+    EXPECT_NEAR(found[0].value, 2.0, 0.3);
+  }
+}
+
+}  // namespace test_rigid_body_check
+}  // namespace stageid
