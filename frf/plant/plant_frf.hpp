@@ -16,7 +16,8 @@ namespace stageid {
 ///   G = (mean_m Y_m) (mean_m U_m)^-1.
 /// Variances follow by first-order propagation, vec(dG) = (U^-T kron [I, -G]) vec(dZ): noise from the scatter
 /// over periods, total from the scatter over realizations. Both are those of the mean. With one measured period
-/// noise_variance is empty, with one realization total_variance is.
+/// noise_variance is empty, with one realization total_variance is. Where noise leaks between the periods of a run, their
+/// scatter overstates it, and the realizations' is used: lower_leaked_noise().
 ///
 /// The noise of Y - G U is that of the open loop for any excitation. Its covariance C_E is therefore pooled over
 /// the experiments of a realization: Cov(vec G) = sum_e (q_e q_e^H) kron C_E / P_e, with q_e the e-th row of U^-1

@@ -38,6 +38,7 @@ struct Part {
   Index rows = 0;
   Index column = 0;
   Index columns = 0;
+  friend bool operator==(const Part&, const Part&) = default;
 };
 
 struct Candidate {
@@ -82,8 +83,10 @@ class Comparison {
         for (Index v = 0; v < u; ++v) offer(exchange(column(v), column(u)));
       if (!best) break;
       undo(*best);
-      found.push_back(*best);
+      include(*best, found);
     }
+    std::erase_if(found,
+                  [](const Candidate& change) { return !is_change(change.kind, change.value); });
     // Changed channels explain most of the misfit, a disturbance only that of some lines.
     if (misfit() > kMostLeft * before) found.clear();
     return found;
@@ -121,6 +124,31 @@ class Comparison {
     for (Index u = 0; u < n_u_; ++u)
       if (exceeds_noise(column(u))) return true;
     return false;
+  }
+
+  static bool is_change(RealizationChange::Kind kind, double value) {
+    switch (kind) {
+      case RealizationChange::Kind::gain:
+        return std::abs(value - 1.0) > kLeastGainChange;
+      case RealizationChange::Kind::skew:
+        return std::abs(value) > kLeastSkewChange_s;
+      case RealizationChange::Kind::swap:
+        return true;
+    }
+    return true;
+  }
+
+  /// A part that is changed twice in the same way is changed by both together; they may cancel.
+  static void include(const Candidate& change, std::vector<Candidate>& found) {
+    const auto same = std::find_if(found.begin(), found.end(), [&](const Candidate& other) {
+      return other.kind == change.kind && other.part == change.part;
+    });
+    if (same == found.end() || change.kind == RealizationChange::Kind::swap)
+      found.push_back(change);
+    else if (change.kind == RealizationChange::Kind::skew)
+      same->value += change.value;
+    else
+      same->value *= change.value;
   }
 
   /// Whether the explained part is significant beside the rest, for real numbers.
@@ -178,12 +206,12 @@ class Comparison {
         offer(std::optional<Candidate>(
             {kind, part, {}, value, 1.0 / std::sqrt(2.0 * length), confirmed}));
     };
-    if (std::abs(all.gain() - 1.0) > kLeastGainChange)
+    if (is_change(RealizationChange::Kind::gain, all.gain()))
       offer_if(RealizationChange::Kind::gain, all.gain(), all.length,
                explained(even, odd.gain(), 0.0) + explained(odd, even.gain(), 0.0));
     if (sample_s_ == 0.0) return;
     const double skew_s = best_skew(all.cross);
-    if (std::abs(skew_s) > kLeastSkewChange_s)
+    if (is_change(RealizationChange::Kind::skew, skew_s))
       offer_if(
           RealizationChange::Kind::skew, skew_s, all.bend,
           explained(even, 1.0, best_skew(odd.cross)) + explained(odd, 1.0, best_skew(even.cross)));

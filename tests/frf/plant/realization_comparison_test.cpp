@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -128,6 +129,32 @@ TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
                       0.02 * std::abs(faults[f].value))
               << f;
         }
+}
+
+// The first change of a channel is found while those of the others still bias it.
+TEST(RealizationComparison, AChannelIsToldOnceIfSeveralAreChanged) {
+  const auto late = [](Eigen::MatrixXd& samples, Eigen::Index c, Eigen::Index by) {
+    const Eigen::VectorXd before = samples.col(c);
+    samples.col(c).tail(before.size() - by) = before.head(before.size() - by);
+  };
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    MemoryLog log = recorded({4, seed});
+    change(log, 1, [&](LogSamples& s) {
+      late(s.sensors, 0, 2);
+      late(s.sensors, 1, 1);
+      late(s.actuators, 0, 1);
+    });
+    std::vector<std::string> channels;
+    for (const RealizationChange& one :
+         estimate_plant_frf_and_health({&log}).health.differences.changes) {
+      EXPECT_EQ(std::count(channels.begin(), channels.end(), one.channel), 0)
+          << one.channel << " " << seed;
+      EXPECT_TRUE(one.kind != RealizationChange::Kind::skew || std::abs(one.value) > 1e-4)
+          << one.channel << " " << one.value;
+      channels.push_back(one.channel);
+    }
+    EXPECT_FALSE(channels.empty());
+  }
 }
 
 TEST(RealizationComparison, OfTwoRealizationsEitherMayBeWrong) {
