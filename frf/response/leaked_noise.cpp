@@ -15,6 +15,7 @@ using Eigen::Index;
 constexpr Index kFewestRatios = 64;  // lines times inputs: their mean is nearly normal, to a tenth
 constexpr double kByChance = 0.01;   // in one of all outputs and bands
 constexpr double kFewestDof = 3.0;   // F has a variance
+constexpr double kLeast = 1e-3;      // factor; copies of one realization do not scatter at all
 
 /// Mean and variance of F(2 a, 2 b), b > 2.
 double mean_of_f(double b) { return b / (b - 1.0); }
@@ -66,7 +67,7 @@ void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
       const double below = (mean_of_f(b) - ratio) / std::sqrt(variance_of_f(a, b) / count);
       if (tail_of_normal(below) * tests >= kByChance) continue;
       for (Index k = limits[band]; k < limits[band + 1]; ++k)
-        scale(frf, i, k, ratio / mean_of_f(b));
+        scale(frf, i, k, std::max(kLeast, ratio / mean_of_f(b)));
     }
 }
 

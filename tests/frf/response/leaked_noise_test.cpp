@@ -99,6 +99,12 @@ TEST(LeakedNoise, WithoutLeakageNothingChanges) {
   EXPECT_LE(changed, 8);
 }
 
+TEST(LeakedNoise, CopiesOfARealizationKeepAVariance) {
+  Example example({0.0, 0.0});
+  lower_leaked_noise(example.scatter, example.frf);
+  EXPECT_GT(example.frf.noise_variance.minCoeff(), 0.0);
+}
+
 TEST(LeakedNoise, OneRealizationShowsNothing) {
   Example example({0.2, 0.2});
   const Eigen::MatrixXd before = example.frf.noise_variance;
