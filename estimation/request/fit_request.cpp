@@ -136,7 +136,6 @@ class FitDefaults {
           throw std::invalid_argument(
               fmt::format("modes: got {}; expected 1 to 1000 modes", request_.modes.count));
         selection.exactly = request_.modes.count;
-        selection.most = std::max(selection.most, selection.exactly);
         return;
       case Kind::given:
         for (const ModeCandidate& mode : request_.modes.given) {

@@ -241,7 +241,7 @@ class AutomaticFit {
   }
 
   int affordable_modes() const {
-    return static_cast<int>(std::min<Eigen::Index>(most_modes(frf_, structure_), selection_.most));
+    return static_cast<int>(most_modes(frf_, structure_));
   }
 
   bool wanted_more() const {
@@ -539,7 +539,7 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
                        const ModeSelection& selection, const FitOptions& asked,
                        FitEvidence& evidence) {
   check(frf);
-  if (selection.exactly < 0 || selection.most < 1)
+  if (selection.exactly < 0)
     throw std::invalid_argument("fit: the number of modes must be positive");
   const Eigen::Index most = most_modes(frf, structure);
   if (selection.exactly > most || selection.modes.size() > static_cast<std::size_t>(most))

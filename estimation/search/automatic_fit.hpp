@@ -16,7 +16,6 @@ struct ModeSelection {
   std::vector<ModeCandidate> modes;  ///< start values; empty: from the CMIF
   int exactly = 0;                   ///< > 0: this number; 0: by statistics (BIC)
   bool keep_modes = false;           ///< fit `modes` without adding or removing any
-  int most = 60;
   /// Budget of a search that chooses the number, in seconds of a typical core, see SearchLimit; 0: unlimited.
   double search_seconds = 180.0;
 };

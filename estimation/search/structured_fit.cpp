@@ -91,7 +91,6 @@ class PoleSearch {
     const ModelStructure structure = stand_in(requests);
     ModeSelection selection;
     selection.exactly = pairs;
-    selection.most = std::max(pairs, selection.most);
     found_ = automatic_fit(frf_, structure, selection, quick_);
     std::vector<const Submodel*> out;
     for (const Submodel& s : found_.model.submodels)

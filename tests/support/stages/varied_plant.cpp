@@ -14,7 +14,8 @@ namespace stageid::test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kMass = 20.0;  // kg
+constexpr double kMass = 20.0;              // kg
+constexpr std::size_t kMostDescribed = 19;  // submodels
 
 struct Size {
   int outputs;
@@ -87,7 +88,11 @@ double median(Eigen::VectorXd values) {
 std::string VariedPlant::description() const {
   std::string text = fmt::format("{} x {}, {} lines, noise {:.0f} dB, delay {};", truth.n_outputs(),
                                  truth.n_inputs(), frf.lines(), noise_db,
-                                 delay == DelayModel::estimate ? "common" : "per channel");
+                                 delay == DelayModel::fixed      ? "none"
+                                 : delay == DelayModel::estimate ? "common"
+                                                                 : "per channel");
+  if (truth.submodels.size() > kMostDescribed)
+    return text + fmt::format(" {} modes", truth.submodels.size());
   for (const Submodel& s : truth.submodels) {
     if (s.integrators == 2)
       text += " free body";
