@@ -35,6 +35,12 @@ constexpr double kOwnCertainty = 30.0;  // of a peak anywhere: one of 1e10 witho
 constexpr double kHarmonic = 0.01;      // relative distance from a multiple of the step's frequency
 constexpr int kRefinement = 20;         // steps from one point of the spectrum to the next
 
+/// Points of the spectrum that are examined.
+constexpr Index kFirstPoint = kFewestSteps * kPadding;
+constexpr Index kPoints = kMostSteps * kPadding - kFirstPoint;
+
+constexpr Rounding kRoundings[] = {Rounding::nearest, Rounding::down, Rounding::to_zero};
+
 /// Matched residuals of one actuator, by its command.
 class CommandHistogram {
  public:
@@ -126,6 +132,9 @@ class StepSearch {
   void find(Members members, std::vector<ActuatorStep>& found) const;
   static double explained(const ActuatorStep& candidate, const Members& members);
   static std::vector<ActuatorStep> refined(double position, const Members& members);
+  static ActuatorStep with_own_rounding(ActuatorStep step, const Tested& t);
+  static void add_those_explained_by(const ActuatorStep& step, Members& members,
+                                     std::vector<ActuatorStep>& found);
 
   const LogInfo& info_;
   int workers_;
@@ -211,8 +220,7 @@ Eigen::MatrixXcd StepSearch::residual(RunWorkspace& w) const {
   return E;
 }
 
-void StepSearch::collect(const UsedRun& run, RunWorkspace& w,
-                         std::vector<CommandHistogram>& own) {
+void StepSearch::collect(const UsedRun& run, RunWorkspace& w, std::vector<CommandHistogram>& own) {
   const std::vector<char> excited = excited_by(run, w.dft);
   std::vector<Eigen::MatrixXd> commands;
   std::vector<Eigen::MatrixXcd> residuals;
@@ -279,7 +287,6 @@ double StepSearch::explained(const ActuatorStep& candidate, const Members& membe
 /// The steps near `position` of the spectrum that explain the residuals best: one step for all, and the same rounding
 /// unless an actuator clearly has another one.
 std::vector<ActuatorStep> StepSearch::refined(double position, const Members& members) {
-  constexpr Rounding kRoundings[] = {Rounding::nearest, Rounding::down, Rounding::to_zero};
   ActuatorStep common;
   double most = 0.0;
   for (int shift = -kRefinement; shift <= kRefinement; ++shift)
@@ -293,23 +300,44 @@ std::vector<ActuatorStep> StepSearch::refined(double position, const Members& me
     }
   std::vector<ActuatorStep> steps;
   if (!(most > 0.0)) return steps;
-  for (const Tested* t : members) {
-    steps.push_back(common);
-    steps.back().actuator = t->actuator;
-    double own = explained(common, {t}) + kOwnCertainty;
-    for (const Rounding rounding : kRoundings) {
-      const double now = explained({0, common.step, rounding}, {t});
-      if (now <= own) continue;
-      own = now;
-      steps.back().rounding = rounding;
-    }
-  }
+  for (const Tested* t : members) steps.push_back(with_own_rounding(common, *t));
   return steps;
 }
 
-/// Points of the spectrum that are examined.
-constexpr Index kFirstPoint = kFewestSteps * kPadding;
-constexpr Index kPoints = kMostSteps * kPadding - kFirstPoint;
+/// The step for one actuator, with another rounding if that clearly explains more.
+ActuatorStep StepSearch::with_own_rounding(ActuatorStep step, const Tested& t) {
+  double most = explained(step, {&t}) + kOwnCertainty;
+  step.actuator = t.actuator;
+  for (const Rounding rounding : kRoundings) {
+    const double now = explained({0, step.step, rounding}, {&t});
+    if (now <= most) continue;
+    most = now;
+    step.rounding = rounding;
+  }
+  return step;
+}
+
+/// Adds the members for which the step of others explains as much as that of their own strongest peak: with commands of
+/// a few steps, a spectrum has several peaks.
+void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& members,
+                                        std::vector<ActuatorStep>& found) {
+  const Eigen::MatrixXd spectra = spectra_of(members);
+  Members others;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    const Tested* t = members[m];
+    Index peak = 0;
+    spectra.col(static_cast<Index>(m)).maxCoeff(&peak);
+    const ActuatorStep common = with_own_rounding(step, *t);
+    const double by_common = explained(common, {t});
+    const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
+    const double by_own = own.empty() ? 0.0 : explained(own.front(), {t});
+    if (by_common > kOwnCertainty && by_common + kOwnCertainty > by_own)
+      found.push_back(common);
+    else
+      others.push_back(t);
+  }
+  members = std::move(others);
+}
 
 Eigen::MatrixXd StepSearch::spectra_of(const Members& members) {
   RealDft dft(kPadding * static_cast<int>(kBins));
@@ -363,6 +391,7 @@ void StepSearch::find(Members members, std::vector<ActuatorStep>& found) const {
     const std::vector<ActuatorStep> steps = refined(static_cast<double>(kFirstPoint + peak), with);
     if (steps.empty()) return;
     found.insert(found.end(), steps.begin(), steps.end());
+    add_those_explained_by(steps.front(), members, found);
   }
 }
 
