@@ -35,26 +35,6 @@ bool gives_measurement(Outcome outcome) noexcept {
 
 }  // namespace
 
-const char* to_string(StopReason reason) noexcept {
-  switch (reason) {
-    case StopReason::none:
-      return "none";
-    case StopReason::limit:
-      return "limit";
-    case StopReason::fault:
-      return "fault";
-    case StopReason::misses:
-      return "misses";
-    case StopReason::interrupt:
-      return "interrupt";
-    case StopReason::log:
-      return "log";
-    case StopReason::plant:
-      return "plant";
-  }
-  return "unknown";
-}
-
 MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
                                  const LoopOptions& options)
     : stage_(stage),

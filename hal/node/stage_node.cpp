@@ -46,20 +46,6 @@ PanelTrouble trouble_of(const NodePanel& panel) {
   return {};
 }
 
-const char* to_string(SupervisorCommand command) noexcept {
-  switch (command) {
-    case SupervisorCommand::enable:
-      return "enable";
-    case SupervisorCommand::disable:
-      return "disable";
-    case SupervisorCommand::quick_stop:
-      return "quick stop";
-    case SupervisorCommand::reset_fault:
-      return "reset";
-  }
-  return "unknown";
-}
-
 std::string refusal(SupervisorCommand command, NodeState state) {
   const bool in_fault = state == NodeState::fault;
   const char* remedy = in_fault ? "reset the fault first" : "wait, or end the measurement first";

@@ -130,7 +130,7 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
   out.lines.push_back(fmt::format(
       "{}, {:.6g} to {:.6g} Hz; sample rate {}, hold {}", counted(frf.lines(), "line"), first, last,
       frf.sample_rate_hz > 0.0 ? fmt::format("{} Hz", frf.sample_rate_hz) : std::string("unknown"),
-      frf.hold == Hold::zoh ? "zoh" : "none"));
+      to_string(frf.hold)));
   out.lines.push_back(fmt::format("outputs {}; inputs {}", named(frf.outputs), named(frf.inputs)));
   const bool noise = frf.noise_variance.size() > 0;
   const bool total = frf.total_variance.size() > 0;
@@ -149,7 +149,7 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
               {"lines", frf.lines()},
               {"band_hz", {first, last}},
               {"sample_rate_hz", frf.sample_rate_hz},
-              {"hold", frf.hold == Hold::zoh ? "zoh" : "none"},
+              {"hold", to_string(frf.hold)},
               {"outputs", frf.outputs.names},
               {"output_units", frf.outputs.units},
               {"inputs", frf.inputs.names},
