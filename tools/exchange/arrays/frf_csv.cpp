@@ -75,8 +75,7 @@ constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
 bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   const auto add = [](ChannelList& list, const std::string& name, const std::string& unit) {
     const auto found = std::find(list.names.begin(), list.names.end(), name);
-    if (found != list.names.end())
-      return list.units[static_cast<std::size_t>(found - list.names.begin())] == unit;
+    if (found != list.names.end()) return list.unit(found - list.names.begin()) == unit;
     list.names.push_back(name);
     list.units.push_back(unit);
     return true;

@@ -141,10 +141,9 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
   const Eigen::VectorXd rms = frf.response.cwiseAbs2().rowwise().mean().cwiseSqrt();
   Json channels = Json::array();
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
-    channels.push_back(
-        {{"output", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())]},
-         {"input", frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]},
-         {"rms", rms[c]}});
+    channels.push_back({{"output", frf.outputs.name(c % frf.n_outputs())},
+                        {"input", frf.inputs.name(c / frf.n_outputs())},
+                        {"rms", rms[c]}});
   out.json = {{"kind", "frf"},
               {"lines", frf.lines()},
               {"band_hz", {first, last}},
