@@ -18,13 +18,6 @@ namespace {
 
 constexpr int kBadCycle = 2;  // added to the bucket by a bad cycle; a good one subtracts 1
 
-/// 0 times a finite number is 0, otherwise NaN: one pass without branches.
-bool all_finite(const std::vector<double>& values) noexcept {
-  double sum = 0.0;
-  for (const double value : values) sum += 0.0 * value;
-  return sum == 0.0;
-}
-
 bool ends_at_once(Outcome outcome) noexcept {
   return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
 }

@@ -16,6 +16,12 @@ std::string common_unit(const std::vector<Channel>& channels) {
   return channels.empty() ? "" : " " + channels.front().unit;
 }
 
+bool all_finite(std::span<const double> values) noexcept {
+  double sum = 0.0;  // 0 times a finite number is 0, otherwise NaN
+  for (const double value : values) sum += 0.0 * value;
+  return sum == 0.0;
+}
+
 int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept {
   for (std::size_t i = 0; i < channels.size(); ++i)
     if (channels[i].name == name) return static_cast<int>(i);

@@ -34,6 +34,9 @@ bool is_acceleration(const Channel& channel) noexcept;
 /// The unit of all these channels with a blank before it; empty if they have several.
 std::string common_unit(const std::vector<Channel>& channels);
 
+/// One pass without a branch per value.
+bool all_finite(std::span<const double> values) noexcept;
+
 /// Index of the channel of that name, -1 if there is none.
 int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept;
 
