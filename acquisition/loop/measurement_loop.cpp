@@ -186,7 +186,7 @@ LoopStatus MeasurementLoop::step() noexcept {
   if (wall_clock_) [[unlikely]]
     computed_ns = monotonic_ns();
   inputs_.t_ready_ns = inputs_.t_arrival_ns = inputs_.stamp_ns = 0;
-  const Outcome outcome = stage_.exchange({cycle_, inputs_.t_sample_ns, u_}, inputs_, deadline);
+  const Outcome outcome = stage_.exchange({cycle_, u_}, inputs_, deadline);
   if (wall_clock_) [[unlikely]]
     time_cycle(computed_ns, outcome);
   if (inputs_.node_state != node_state_) [[unlikely]]

@@ -127,7 +127,6 @@ struct Inputs {
 /// Commands to the stage. `u`: size actuators, SI.
 struct Outputs {
   std::uint64_t cycle = 0;
-  std::int64_t t_apply_ns = 0;
   std::span<const double> u;
 };
 
