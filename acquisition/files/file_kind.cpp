@@ -92,8 +92,10 @@ std::string head_of(const std::filesystem::path& file, std::size_t bytes) {
 }  // namespace
 
 bool is_hdf5(const std::filesystem::path& file) {
-  return head_of(file, kHdf5Head.size()) == kHdf5Head;
+  return is_hdf5_head(head_of(file, kHdf5Head.size()));
 }
+
+bool is_hdf5_head(std::string_view head) noexcept { return head.starts_with(kHdf5Head); }
 
 std::string other_kind(const std::filesystem::path& file, const std::string& wanted) {
   const std::string head = head_of(file, 2048);

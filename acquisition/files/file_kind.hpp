@@ -2,11 +2,14 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace stageid {
 
 /// By the first bytes; false also if the file cannot be read.
 bool is_hdf5(const std::filesystem::path& file);
+/// Whether these are the first bytes of an HDF5 file; at least 8.
+bool is_hdf5_head(std::string_view head) noexcept;
 
 /// Describes the kind of a file by its content, and the commands that accept it:
 /// "is a native log, not a model; use it with 'stageid frf', 'validate', 'report' or 'log'".

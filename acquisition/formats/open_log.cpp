@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
@@ -11,16 +12,17 @@
 namespace stageid {
 
 std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool damaged_is_error) {
-  std::array<unsigned char, 8> magic{};
+  std::array<char, kSlogMagic.size()> head{};
   {
     const SlogSource source(file);
     if (source.bytes() == 0) {
       throw FormatError(file, "", "is empty; give a native log (.slog) or an HDF5 log");
     }
-    source.read(0, magic.data(), std::min<std::uint64_t>(magic.size(), source.bytes()));
+    source.read(0, head.data(), std::min<std::uint64_t>(head.size(), source.bytes()));
   }
-  if (magic == kSlogMagic) return std::make_unique<SlogReader>(file, damaged_is_error);
-  if (is_hdf5(file)) return std::make_unique<Hdf5LogReader>(file);
+  if (std::memcmp(head.data(), kSlogMagic.data(), head.size()) == 0)
+    return std::make_unique<SlogReader>(file, damaged_is_error);
+  if (is_hdf5_head({head.data(), head.size()})) return std::make_unique<Hdf5LogReader>(file);
   // A native log whose first block is damaged may have intact blocks.
   if (!damaged_is_error) return std::make_unique<SlogReader>(file, false);
   if (const std::string other = other_kind(file, "a log"); !other.empty())

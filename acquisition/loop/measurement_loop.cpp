@@ -18,13 +18,6 @@ namespace {
 
 constexpr int kBadCycle = 2;  // added to the bucket by a bad cycle; a good one subtracts 1
 
-/// 0 times a finite number is 0, otherwise NaN: one pass without branches.
-bool all_finite(const std::vector<double>& values) noexcept {
-  double sum = 0.0;
-  for (const double value : values) sum += 0.0 * value;
-  return sum == 0.0;
-}
-
 bool ends_at_once(Outcome outcome) noexcept {
   return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
 }
@@ -34,26 +27,6 @@ bool gives_measurement(Outcome outcome) noexcept {
 }
 
 }  // namespace
-
-const char* to_string(StopReason reason) noexcept {
-  switch (reason) {
-    case StopReason::none:
-      return "none";
-    case StopReason::limit:
-      return "limit";
-    case StopReason::fault:
-      return "fault";
-    case StopReason::misses:
-      return "misses";
-    case StopReason::interrupt:
-      return "interrupt";
-    case StopReason::log:
-      return "log";
-    case StopReason::plant:
-      return "plant";
-  }
-  return "unknown";
-}
 
 MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controller, SampleRing& ring,
                                  const LoopOptions& options)
@@ -213,7 +186,7 @@ LoopStatus MeasurementLoop::step() noexcept {
   if (wall_clock_) [[unlikely]]
     computed_ns = monotonic_ns();
   inputs_.t_ready_ns = inputs_.t_arrival_ns = inputs_.stamp_ns = 0;
-  const Outcome outcome = stage_.exchange({cycle_, inputs_.t_sample_ns, u_}, inputs_, deadline);
+  const Outcome outcome = stage_.exchange({cycle_, u_}, inputs_, deadline);
   if (wall_clock_) [[unlikely]]
     time_cycle(computed_ns, outcome);
   if (inputs_.node_state != node_state_) [[unlikely]]

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "acquisition/loop/sample_ring.hpp"
 #include "acquisition/record/log_info.hpp"
 #include "acquisition/slog/slog_format.hpp"
+#include "excitation/words/words.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/sample_clock.hpp"
 #include "hal/stage/stage.hpp"
@@ -51,7 +53,9 @@ enum class LoopStatus : std::uint8_t {
 
 /// Why a run ended early.
 enum class StopReason : std::uint8_t { none, limit, fault, misses, interrupt, log, plant };
-const char* to_string(StopReason reason) noexcept;
+template <>
+inline constexpr std::array kWords<StopReason> = {"none",      "limit", "fault", "misses",
+                                                  "interrupt", "log",   "plant"};
 
 /// One closed-loop run, cycle by cycle:  u[n] = C(y[n]) + g r[n],  exchange(u[n]) -> y[n+1].
 ///

@@ -48,15 +48,6 @@ using RowMajor = Eigen::Matrix<Value, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 constexpr const char* kFormat = "stageid-excitation";
 constexpr long long kVersion = 1;
 
-struct SchemeName {
-  ExcitationScheme scheme;
-  const char* name;
-};
-constexpr SchemeName kSchemes[] = {{ExcitationScheme::single_axis, "single_axis"},
-                                   {ExcitationScheme::orthogonal_dft, "orthogonal_dft"},
-                                   {ExcitationScheme::orthogonal_hadamard, "orthogonal_hadamard"},
-                                   {ExcitationScheme::zippered, "zippered"}};
-
 std::string realization_group(int realization) {
   return fmt::format("/realizations/{:04}", realization);
 }
@@ -72,11 +63,8 @@ void write_spec(Hdf5File& file, const ExperimentPlan& plan) {
   integer("format_version", kVersion);
   file.write_attribute("/", "sample_rate_hz", plan.grid().sample_rate_hz());
   integer("period_samples", plan.grid().samples_per_period());
-  for (const SchemeName& entry : kSchemes) {
-    if (entry.scheme == spec.scheme) file.write_attribute("/", "scheme", std::string(entry.name));
-  }
-  const bool rms = spec.scaling == AmplitudeScaling::rms;
-  file.write_attribute("/", "scaling", std::string(rms ? "rms" : "peak"));
+  file.write_attribute("/", "scheme", std::string(to_string(spec.scheme)));
+  file.write_attribute("/", "scaling", std::string(to_string(spec.scaling)));
   integer("realizations", spec.realizations);
   integer("periods", spec.periods);
   integer("transient_periods", spec.transient_periods);
@@ -156,7 +144,8 @@ class PlanReader {
   void check_agrees(const ExperimentPlan& plan) const;
 
  private:
-  ExcitationScheme scheme() const;
+  template <typename Enum>
+  Enum word(const char* attribute) const;
   std::vector<ExcitationAxis> axes(const FrequencyGrid& grid) const;
   std::uint64_t seed() const;
 
@@ -195,13 +184,12 @@ FrequencyGrid PlanReader::grid() const {
           std::move(lines)};
 }
 
-ExcitationScheme PlanReader::scheme() const {
-  const std::string name = file_.read_text_attribute("/", "scheme");
-  for (const SchemeName& entry : kSchemes) {
-    if (name == entry.name) return entry.scheme;
-  }
-  fail("/", "attribute 'scheme' is '" + name +
-                "'; must be single_axis, orthogonal_dft, orthogonal_hadamard or zippered");
+template <typename Enum>
+Enum PlanReader::word(const char* attribute) const {
+  const std::string word = file_.read_text_attribute("/", attribute);
+  if (const auto value = from_word<Enum>(word)) return *value;
+  fail("/",
+       fmt::format("attribute '{}' is '{}'; must be {}", attribute, word, one_of(kWords<Enum>)));
 }
 
 std::uint64_t PlanReader::seed() const {
@@ -231,13 +219,9 @@ std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
 }
 
 ExperimentSpec PlanReader::spec(const FrequencyGrid& grid) const {
-  const std::string scaling = file_.read_text_attribute("/", "scaling");
-  if (scaling != "rms" && scaling != "peak") {
-    fail("/", "attribute 'scaling' is '" + scaling + "'; must be rms or peak");
-  }
   ExperimentSpec spec;
-  spec.scheme = scheme();
-  spec.scaling = scaling == "rms" ? AmplitudeScaling::rms : AmplitudeScaling::peak;
+  spec.scaling = word<AmplitudeScaling>("scaling");
+  spec.scheme = word<ExcitationScheme>("scheme");
   spec.axes = axes(grid);
   spec.realizations = integer("realizations", 1);
   spec.periods = integer("periods", 1);

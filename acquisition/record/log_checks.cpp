@@ -77,8 +77,7 @@ void throw_not_finite(const std::filesystem::path& file, const LogInfo& info, co
             file, "/runs/" + run.name,
             fmt::format(
                 "row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
-                first + static_cast<std::uint64_t>(row), kind,
-                channels.names[static_cast<std::size_t>(c)]));
+                first + static_cast<std::uint64_t>(row), kind, channels.name(c)));
   };
   for (Eigen::Index row = from; row < from + count; ++row) {
     check(row, samples.actuators, "actuator", info.actuators);

@@ -62,13 +62,17 @@
 #include <optional>
 #include <span>
 
+#include "excitation/words/words.hpp"
+
 namespace stageid {
 
 static_assert(std::endian::native == std::endian::little,
               "native logs are little-endian and are mapped to memory unchanged");
 
 enum class SlogBlockType : std::uint16_t { log = 1, run_begin, excitation, samples, run_end, end };
-const char* to_string(SlogBlockType type) noexcept;
+template <>
+inline constexpr std::array kWords<SlogBlockType> = {
+    "unknown", "log", "run_begin", "excitation", "samples", "run_end", "end"};
 
 inline constexpr std::array<unsigned char, 8> kSlogMagic = {0x89, 'S',  'L',  'O',
                                                             'G',  '\r', '\n', 0x1A};

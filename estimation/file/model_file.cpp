@@ -168,11 +168,7 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
     s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
   if (node.has("damping_ratio_std"))
     s.damping_ratio_std = node.member("damping_ratio_std").number();
-  if (node.has("verdict"))
-    for (const ModeVerdict verdict :
-         {ModeVerdict::determined, ModeVerdict::weak, ModeVerdict::at_bound,
-          ModeVerdict::coincident, ModeVerdict::beside_band})
-      if (node.member("verdict").text() == to_string(verdict)) s.verdict = verdict;
+  if (node.has("verdict")) s.verdict = from_word<ModeVerdict>(node.member("verdict").text());
   if (node.has("poles"))
     for (const JsonNode& pole : node.member("poles").elements())
       s.poles.push_back(pole_from_json(pole));
@@ -184,11 +180,8 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
 }
 
 HoldModel hold_from_text(const JsonNode& node) {
-  const std::string text = node.text();
-  for (const HoldModel hold :
-       {HoldModel::none, HoldModel::phase, HoldModel::sinc, HoldModel::exact})
-    if (text == to_string(hold)) return hold;
-  node.fail("must be none, phase, sinc or exact");
+  if (const auto hold = from_word<HoldModel>(node.text())) return *hold;
+  node.fail("must be " + one_of(kWords<HoldModel>));
 }
 
 Eigen::VectorXd delays_from_json(const JsonNode& root, const std::string& key, std::size_t size) {

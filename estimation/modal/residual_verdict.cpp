@@ -154,20 +154,6 @@ void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
 
 }  // namespace
 
-const char* to_string(ResidualVariance variance) noexcept {
-  switch (variance) {
-    case ResidualVariance::none:
-      return "none";
-    case ResidualVariance::noise:
-      return "noise";
-    case ResidualVariance::total:
-      return "total";
-    case ResidualVariance::scatter:
-      return "scatter";
-  }
-  return "none";
-}
-
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
                                const Eigen::MatrixXd& weights, int threads,
                                const Distortion& known) {

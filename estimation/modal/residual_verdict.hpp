@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 
+#include "excitation/words/words.hpp"
 #include "frf/response/distortion_variance.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -17,7 +19,8 @@ enum class ResidualVariance : std::uint8_t {
   total,  ///< noise and stochastic nonlinear contributions: from realizations, or known from others
   scatter  ///< from neighbouring lines, where one realization was measured: see line_scatter()
 };
-const char* to_string(ResidualVariance variance) noexcept;
+template <>
+inline constexpr std::array kWords<ResidualVariance> = {"none", "noise", "total", "scatter"};
 
 /// Whether the residual of a model is noise and known distortion.
 struct ResidualVerdict {

@@ -32,36 +32,6 @@ double AdditiveModel::mean_delay_s() const {
   return delay_s;
 }
 
-const char* to_string(ModeVerdict verdict) noexcept {
-  switch (verdict) {
-    case ModeVerdict::determined:
-      return "determined";
-    case ModeVerdict::weak:
-      return "weak";
-    case ModeVerdict::at_bound:
-      return "at_bound";
-    case ModeVerdict::coincident:
-      return "coincident";
-    case ModeVerdict::beside_band:
-      return "beside_band";
-  }
-  return "determined";
-}
-
-const char* to_string(HoldModel hold) noexcept {
-  switch (hold) {
-    case HoldModel::none:
-      return "none";
-    case HoldModel::phase:
-      return "phase";
-    case HoldModel::sinc:
-      return "sinc";
-    case HoldModel::exact:
-      return "exact";
-  }
-  return "none";
-}
-
 namespace {
 
 /// Channels c = output + n_y input that share one delay.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -18,6 +20,8 @@ enum class HoldModel : std::uint8_t {
   sinc,   ///< and its magnitude sinc(omega T / 2)
   exact   ///< every basis function through hold, delay and sampler, including aliasing
 };
+template <>
+inline constexpr std::array kWords<HoldModel> = {"none", "phase", "sinc", "exact"};
 
 /// Role of a submodel in a fit; not stored in model files.
 enum class SubmodelRole : std::uint8_t {
@@ -34,7 +38,9 @@ enum class ModeVerdict : std::uint8_t {
   coincident,  ///< another mode is so near that one would fit as well
   beside_band  ///< outside the lines: it represents everything that the plant has there
 };
-const char* to_string(ModeVerdict verdict) noexcept;
+template <>
+inline constexpr std::array kWords<ModeVerdict> = {"determined", "weak", "at_bound", "coincident",
+                                                   "beside_band"};
 
 /// One pole (real) or one conjugate pair of a submodel.
 struct PoleEstimate {
@@ -123,7 +129,5 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
 /// @throws FileError, FormatError
 void write_model(const std::filesystem::path& file, const AdditiveModel& model);
 AdditiveModel read_model(const std::filesystem::path& file);
-
-const char* to_string(HoldModel hold) noexcept;
 
 }  // namespace stageid

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <filesystem>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -14,6 +16,8 @@ enum class CmifKind : std::uint8_t {
   accelerance,  ///< omega^2 G: without the slope of the rigid body
   whitened      ///< every channel over its standard deviation, noise (else total); floor 1
 };
+template <>
+inline constexpr std::array kWords<CmifKind> = {"response", "accelerance", "whitened"};
 
 /// Complex mode indicator function: squared singular values of G(j omega_k), min(n_y, n_u) x N,
 /// largest first. Source: paper, section 4.5; Shih et al. (1988).

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -11,6 +12,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "estimation/problem/shared_matrix.hpp"
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -24,18 +26,24 @@ enum class Weighting : std::uint8_t {
   likelihood,         ///< S^-1 kron C_E^-1: maximum likelihood with correlated noise
   user                ///< FitOptions::user_weights or user_weight_matrices
 };
-const char* to_string(Weighting weighting) noexcept;
+template <>
+inline constexpr std::array kWords<Weighting> = {
+    "unit",           "inverse_magnitude", "relative", "noise_variance",
+    "total_variance", "likelihood",        "user"};
 
 enum class FitMethod : std::uint8_t {
   riv,  ///< refined instrumental variables, as in the paper
   gn,   ///< Gauss-Newton
   sk    ///< Sanathanan-Koerner: biased fixed point, for comparison
 };
-const char* to_string(FitMethod method) noexcept;
+template <>
+inline constexpr std::array kWords<FitMethod> = {"riv", "gn", "sk"};
 
 class SearchLimit;
 
 enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
+template <>
+inline constexpr std::array kWords<DelayModel> = {"fixed", "estimate", "per_channel"};
 
 /// Options of a fit, checked once by fit_additive_model().
 struct FitOptions {
@@ -82,7 +90,11 @@ enum class FitStatus : std::uint8_t {
   search_budget,  ///< the search used its budget, see SearchLimit
   interrupted     ///< by the user, see SearchLimit
 };
-const char* to_string(FitStatus status) noexcept;
+template <>
+inline constexpr std::array kWords<FitStatus> = {
+    "gradient_small", "step_small",  "cost_stalled", "iteration_limit", "singular",
+    "undetermined",   "unexplained", "faulty_data",  "search_budget",   "interrupted"};
+
 /// Whether a fit with this status can be trusted.
 bool is_trustworthy(FitStatus status) noexcept;
 /// The same for the record of a model. A model without a status (from another program) is trusted.

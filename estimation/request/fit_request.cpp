@@ -293,9 +293,7 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
       {"modes", modes},
       {"weighting", to_string(o.weighting)},
       {"hold", to_string(o.hold)},
-      {"delay", o.delay == DelayModel::estimate      ? Json("estimate")
-                : o.delay == DelayModel::per_channel ? Json("per_channel")
-                                                     : Json(o.delay_s)},
+      {"delay", o.delay == DelayModel::fixed ? Json(o.delay_s) : Json(to_string(o.delay))},
       {"rigid_body", rigid_body_text(request)},
       {"residue_rank",
        request.residue_rank == 0 ? "full" : fmt::format("{}", request.residue_rank)},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimation/search/structured_fit.hpp"
+#include "excitation/words/words.hpp"
 #include "frf/response/distortion_variance.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -40,8 +41,9 @@ struct RigidBodyRequest {
   int rank = 0;                         ///< degrees of freedom; 0: full
   std::vector<double> suspension_hz{};  ///< known frequencies; empty: fitted
 };
-
-const char* to_string(RigidBodyRequest::Kind kind) noexcept;
+template <>
+inline constexpr std::array kWords<RigidBodyRequest::Kind> = {"auto", "none", "full", "suspension",
+                                                              "by_submodels"};
 
 struct DelayRequest {
   DelayModel model = DelayModel::fixed;

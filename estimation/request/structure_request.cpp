@@ -95,22 +95,6 @@ std::string rigid_body_text(const FitRequest& request) {
   return text;
 }
 
-const char* to_string(RigidBodyRequest::Kind kind) noexcept {
-  switch (kind) {
-    case RigidBodyRequest::Kind::automatic:
-      return "auto";
-    case RigidBodyRequest::Kind::none:
-      return "none";
-    case RigidBodyRequest::Kind::free:
-      return "full";
-    case RigidBodyRequest::Kind::suspension:
-      return "suspension";
-    case RigidBodyRequest::Kind::by_submodels:
-      break;
-  }
-  return "by_submodels";
-}
-
 void choose_structure(const FitRequest& request, FitSetup& setup) {
   setup.structure.common.direct_term = request.direct_term.value_or(false);
   setup.structure.common.general_damping = request.general_damping.value_or(false);

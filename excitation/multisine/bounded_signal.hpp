@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <complex>
 #include <cstdint>
 #include <limits>
 #include <string>
 
 #include "excitation/multisine/frequency_grid.hpp"
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -16,6 +18,8 @@ enum class SignalKind : std::uint8_t {
   difference,  ///< (x[n] - x[n-1]) fs: slew as a digital limit computes it
   derivative   ///< dx/dt: velocity
 };
+template <>
+inline constexpr std::array kWords<SignalKind> = {"value", "slew", "velocity"};
 
 /// A signal of the closed loop with limits. It is linear in the excitation:
 /// X(l) = sum_p transfer(p, l) R_p(l), times kind_factor().

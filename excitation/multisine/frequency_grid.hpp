@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -12,6 +15,8 @@ enum class LineSelection : std::uint8_t {
   odd,        ///< 1, 3, 5, ...: the empty even lines detect even-order nonlinearity
   odd_random  ///< odd, with one random line omitted per group: detects odd order too
 };
+template <>
+inline constexpr std::array kWords<LineSelection> = {"all", "odd", "odd_random"};
 
 /// Arguments of FrequencyGrid::band(), which checks them.
 struct LineSpec {

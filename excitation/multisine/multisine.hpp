@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 
 #include "excitation/multisine/frequency_grid.hpp"
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -11,6 +13,8 @@ enum class AmplitudeScaling : std::uint8_t {
   rms,  ///< `level` is the root mean square of the samples over one period
   peak  ///< `level` is the largest absolute sample
 };
+template <>
+inline constexpr std::array kWords<AmplitudeScaling> = {"rms", "peak"};
 
 /// Arguments of random_phase_multisine(), which checks them.
 struct MultisineSpec {

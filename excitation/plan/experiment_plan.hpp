@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "excitation/multisine/frequency_grid.hpp"
 #include "excitation/multisine/multisine.hpp"
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -17,6 +19,9 @@ enum class ExcitationScheme : std::uint8_t {
   orthogonal_hadamard,  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
   zippered              ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line
 };
+template <>
+inline constexpr std::array kWords<ExcitationScheme> = {"single_axis", "orthogonal_dft",
+                                                        "orthogonal_hadamard", "zippered"};
 
 /// One excited channel of the stage.
 struct ExcitationAxis {

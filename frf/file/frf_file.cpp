@@ -22,22 +22,6 @@ constexpr const char* kFormat = "stageid-frf";
 constexpr long long kFormatVersion = 1;
 constexpr double kConfidenceLevel = 0.95;
 
-const char* text_of(Hold hold) { return hold == Hold::zoh ? "zoh" : "none"; }
-
-const char* text_of(Compensation kind) {
-  switch (kind) {
-    case Compensation::delay:
-      return "delay";
-    case Compensation::hold:
-      return "hold";
-    case Compensation::none:
-      break;
-  }
-  return "none";
-}
-
-const char* text_of(FrfMethod method) { return method == FrfMethod::lpm ? "lpm" : "periodic"; }
-
 // Writing -----------------------------------------------------------------------------------------
 
 void write_channels(Hdf5File& file, const std::string& dataset, const ChannelList& channels) {
@@ -56,10 +40,10 @@ void write_attributes(Hdf5File& file, const FrfEstimate& frf) {
   file.write_attribute("/", "format", std::string(kFormat));
   file.write_attribute("/", "format_version", kFormatVersion);
   file.write_attribute("/", "sample_rate_hz", frf.sample_rate_hz);
-  file.write_attribute("/", "hold", std::string(text_of(frf.hold)));
-  file.write_attribute("/", "compensated", std::string(text_of(frf.compensated)));
+  file.write_attribute("/", "hold", std::string(to_string(frf.hold)));
+  file.write_attribute("/", "compensated", std::string(to_string(frf.compensated)));
   file.write_attribute("/", "delay_s", frf.delay_s);
-  file.write_attribute("/", "method", std::string(text_of(frf.method)));
+  file.write_attribute("/", "method", std::string(to_string(frf.method)));
   file.write_attribute("/", "covariance_lines", static_cast<long long>(frf.covariance_lines));
   file.write_attribute("/", "realizations", static_cast<long long>(frf.realizations));
   file.write_attribute("/", "periods", static_cast<long long>(frf.periods));
@@ -78,10 +62,10 @@ void write_confidence(Hdf5File& file, const FrfEstimate& frf, const WriteVarianc
   const bool total = frf.total_variance.size() != 0 && frf.total_dof > 0.0;
   if (!total && (frf.noise_variance.size() == 0 || !(frf.noise_dof > 0.0))) return;
   const char* dataset = "/confidence_radius";
-  write(dataset, confidence_radius(frf, kConfidenceLevel,
-                                   total ? VarianceKind::total : VarianceKind::noise));
+  const VarianceKind of = total ? VarianceKind::total : VarianceKind::noise;
+  write(dataset, confidence_radius(frf, kConfidenceLevel, of));
   file.write_attribute(dataset, "level", kConfidenceLevel);
-  file.write_attribute(dataset, "of", std::string(total ? "total" : "noise"));
+  file.write_attribute(dataset, "of", std::string(to_string(of)));
 }
 
 void write_optional(Hdf5File& file, const FrfEstimate& frf) {
@@ -142,10 +126,6 @@ int integer_or_zero(const Hdf5File& file, const std::string& name) {
   return static_cast<int>(value);
 }
 
-std::string text_or_none(const Hdf5File& file, const std::string& name) {
-  return file.has_attribute("/", name) ? file.read_text_attribute("/", name) : std::string("none");
-}
-
 void require_format(const Hdf5File& file) {
   if (!file.has_attribute("/", "format")) {
     throw FormatError(file.path(), "/",
@@ -170,30 +150,15 @@ void require_format(const Hdf5File& file) {
   }
 }
 
-Hold read_hold(const Hdf5File& file) {
-  const std::string text = text_or_none(file, "hold");
-  if (text == "zoh") return Hold::zoh;
-  if (text == "none") return Hold::none;
-  throw FormatError(file.path(), "/", fmt::format("hold is '{}'; expected 'zoh' or 'none'", text));
-}
-
-Compensation read_compensation(const Hdf5File& file) {
-  const std::string text = text_or_none(file, "compensated");
-  for (const Compensation kind : {Compensation::none, Compensation::delay, Compensation::hold}) {
-    if (text == text_of(kind)) return kind;
-  }
-  throw FormatError(file.path(), "/",
-                    fmt::format("compensated is '{}'; expected 'none', 'delay' or 'hold'", text));
-}
-
-FrfMethod read_method(const Hdf5File& file) {
-  if (!file.has_attribute("/", "method")) return FrfMethod::periodic;
-  const std::string text = file.read_text_attribute("/", "method");
-  for (const FrfMethod method : {FrfMethod::periodic, FrfMethod::lpm}) {
-    if (text == text_of(method)) return method;
-  }
-  throw FormatError(file.path(), "/",
-                    fmt::format("method is '{}'; expected 'periodic' or 'lpm'", text));
+/// The first word of the table if the attribute is missing.
+template <typename Enum>
+Enum read_word(const Hdf5File& file, const std::string& attribute) {
+  if (!file.has_attribute("/", attribute)) return Enum{};
+  const std::string word = file.read_text_attribute("/", attribute);
+  if (const auto value = from_word<Enum>(word)) return *value;
+  throw FormatError(
+      file.path(), "/",
+      fmt::format("{} is '{}'; expected {}", attribute, word, one_of(kWords<Enum>, "'")));
 }
 
 ChannelList read_channels(const Hdf5File& file, const std::string& dataset) {
@@ -291,10 +256,10 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   require_format(file);
   FrfEstimate frf;
   frf.sample_rate_hz = real_or(file, "sample_rate_hz", 0.0);
-  frf.hold = read_hold(file);
-  frf.compensated = read_compensation(file);
+  frf.hold = read_word<Hold>(file, "hold");
+  frf.compensated = read_word<Compensation>(file, "compensated");
   frf.delay_s = real_or(file, "delay_s", 0.0);
-  frf.method = read_method(file);
+  frf.method = read_word<FrfMethod>(file, "method");
   frf.covariance_lines = std::max(1, integer_or_zero(file, "covariance_lines"));
   frf.realizations = integer_or_zero(file, "realizations");
   frf.periods = integer_or_zero(file, "periods");

@@ -6,18 +6,6 @@
 
 namespace stageid {
 
-const char* to_string(Rounding rounding) noexcept {
-  switch (rounding) {
-    case Rounding::nearest:
-      return "rounded to the nearest";
-    case Rounding::down:
-      return "rounded down";
-    case Rounding::to_zero:
-      return "rounded towards zero";
-  }
-  return "";
-}
-
 double ActuatorStep::applied(double command) const noexcept {
   const double steps = command / step;
   switch (rounding) {

@@ -1,16 +1,20 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
+#include "excitation/words/words.hpp"
 #include "frf/periods/health_finding.hpp"
 
 namespace stageid {
 
 enum class Rounding : std::uint8_t { nearest, down, to_zero };
-const char* to_string(Rounding rounding) noexcept;
+template <>
+inline constexpr std::array kWords<Rounding> = {"rounded to the nearest", "rounded down",
+                                                "rounded towards zero"};
 
 /// An actuator that applies the commands of the log in steps, because a coarse converter stands between recorder and
 /// amplifier.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -15,7 +18,8 @@ enum class Severity : std::uint8_t {
   doubt,     ///< usable, but examine the cause first
   unchecked  ///< not checked: the log lacks the required data
 };
-const char* to_string(Severity severity) noexcept;
+template <>
+inline constexpr std::array kWords<Severity> = {"fault", "doubt", "not checked"};
 
 /// Kinds of causes, for programs; `what` is their text for users.
 enum class Cause : std::uint8_t {
@@ -46,9 +50,13 @@ enum class Cause : std::uint8_t {
   drift,              ///< the response changes during the measurement
   actuator_step,      ///< an actuator applies its recorded command in coarse steps
 };
-const char* to_string(Cause cause) noexcept;
-/// The cause of that name, or nothing.
-std::optional<Cause> cause_of(std::string_view name) noexcept;
+template <>
+inline constexpr std::array kWords<Cause> = {
+    "dead",      "saturated",    "marked",       "late",        "swapped",      "sign",
+    "scale",     "skew",         "unrecorded",   "controller",  "rigid_body",   "unknown_stage",
+    "injection", "excluded",     "excitation",   "inputs",      "incoherent",   "interpolation",
+    "aperiodic", "unsettled",    "uneven_noise", "limit_cycle", "lost_samples", "excitation_timing",
+    "drift",     "actuator_step"};
 
 /// Runs, frequencies or channels that a finding lists by name; it counts the rest.
 inline constexpr std::size_t kMostNamed = 4;

@@ -32,15 +32,14 @@ std::string FrfProvenance::json() const {
   for (const Eigen::Index i : channels_.outputs) {
     outputs.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
   }
-  const Json options = {
-      {"method", options_.method == FrfMethod::lpm ? "lpm" : "periodic"},
-      {"inputs", channels_.inputs},
-      {"outputs", outputs},
-      {"transient_periods", transient_periods(info_, options_)},
-      {"period_samples", info_.period_samples},
-      {"covariance", options_.covariance == CovarianceKind::full ? "full" : "diagonal"},
-      {"covariance_lines", options_.covariance_lines},
-      {"periods", options_.periods == PeriodChoice::consistent ? "consistent" : "unmarked"}};
+  const Json options = {{"method", to_string(options_.method)},
+                        {"inputs", channels_.inputs},
+                        {"outputs", outputs},
+                        {"transient_periods", transient_periods(info_, options_)},
+                        {"period_samples", info_.period_samples},
+                        {"covariance", to_string(options_.covariance)},
+                        {"covariance_lines", options_.covariance_lines},
+                        {"periods", to_string(options_.periods)}};
   return Json{{"stageid_version", version()},
               {"made_by", "estimate_plant_frf"},
               {"inputs", inputs},

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
+#include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -11,6 +13,8 @@ enum class VarianceKind : std::uint8_t {
   noise,  ///< for a repetition with the same phases
   total   ///< noise and stochastic nonlinear contributions
 };
+template <>
+inline constexpr std::array kWords<VarianceKind> = {"noise", "total"};
 
 /// Upper limit of |dG|^2 over its variance with the probability `level`: F_{2, 2 nu; level} if the variance was
 /// estimated with nu = `dof` complex degrees of freedom. dof = 0: the variance is known, -ln(1 - level).

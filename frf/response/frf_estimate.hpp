@@ -1,26 +1,34 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
+#include "excitation/words/words.hpp"
 #include "frf/response/nonlinearity.hpp"
 
 namespace stageid {
 
 /// Whether the response contains a zero-order hold (and sampler), as measured by a digital loop.
 enum class Hold : std::uint8_t { none, zoh };
+template <>
+inline constexpr std::array kWords<Hold> = {"none", "zoh"};
 
 /// Factor that was divided out of the response: 1; e^{-j omega delay_s}; or the same times the hold's
 /// (1 - e^{-j omega T}) / (j omega T).
 enum class Compensation : std::uint8_t { none, delay, hold };
+template <>
+inline constexpr std::array kWords<Compensation> = {"none", "delay", "hold"};
 
 enum class FrfMethod : std::uint8_t {
   periodic,  ///< means over the periods after the transient ones
   lpm        ///< whole records; the transient is modelled, no period is discarded
 };
+template <>
+inline constexpr std::array kWords<FrfMethod> = {"periodic", "lpm"};
 
 /// A recorded period that was excluded from the means.
 struct DroppedPeriod {

@@ -1,20 +1,27 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
 
 enum class CovarianceKind : std::uint8_t { diagonal, full };
+template <>
+inline constexpr std::array kWords<CovarianceKind> = {"diagonal", "full"};
+
 enum class PeriodChoice : std::uint8_t {
   consistent,  ///< excludes periods with a glitch, a disturbance or a transient; lpm: with a glitch
   unmarked     ///< all without a marked sample
 };
+template <>
+inline constexpr std::array kWords<PeriodChoice> = {"consistent", "unmarked"};
 
 struct FrfOptions {
   std::vector<std::string> inputs{};       ///< actuator names; empty: the excited ones

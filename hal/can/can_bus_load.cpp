@@ -51,10 +51,4 @@ void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sa
   }
 }
 
-double can_transfer_time_s(const CanSpec& spec, double bytes) {
-  const CanBusSpec& bus = spec.buses.front();
-  const double frame_s = can_fd_frame_time_s(64, bus.nominal_bit_rate_hz, bus.data_bit_rate_hz);
-  return bytes / static_cast<double>(kCanChunkBytes) * frame_s / spec.largest_load;
-}
-
 }  // namespace stageid

@@ -35,7 +35,4 @@ std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layou
 /// spec.largest_load.
 void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz);
 
-/// Duration in seconds of a transfer of `bytes` on the first bus at its largest permitted load.
-double can_transfer_time_s(const CanSpec& spec, double bytes);
-
 }  // namespace stageid

@@ -1,17 +1,21 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 
+#include "excitation/words/words.hpp"
 #include "hal/can/can_frame.hpp"
 
 namespace stageid {
 
 /// Bus state of a controller, the worst last.
 enum class CanBusState : std::uint8_t { active, warning, passive, off, down };
-const char* to_string(CanBusState state) noexcept;
+template <>
+inline constexpr std::array kWords<CanBusState> = {"error active", "error warning", "error passive",
+                                                   "bus off", "interface down"};
 
 struct CanBusHealth {
   CanBusState state = CanBusState::active;

@@ -1,6 +1,7 @@
 #include "hal/can/faulty_can.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -14,54 +15,21 @@
 namespace stageid {
 namespace {
 
-constexpr std::array kKinds = {
-    CanFaultKind::lost,    CanFaultKind::repeated,  CanFaultKind::swapped, CanFaultKind::late,
-    CanFaultKind::corrupt, CanFaultKind::shortened, CanFaultKind::foreign};
-
-std::string names_of_kinds() {
-  std::string names;
-  for (const CanFaultKind kind : kKinds)
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", to_string(kind));
-  return names;
-}
-
 bool carries_values(const CanFrame& frame) {
   return (frame.id & 0x780) == kCanSetpointId || (frame.id & 0x780) == kCanSensorId;
 }
 
 }  // namespace
 
-const char* to_string(CanFaultKind kind) noexcept {
-  switch (kind) {
-    case CanFaultKind::lost:
-      return "lost";
-    case CanFaultKind::repeated:
-      return "repeated";
-    case CanFaultKind::swapped:
-      return "swapped";
-    case CanFaultKind::late:
-      return "late";
-    case CanFaultKind::corrupt:
-      return "corrupt";
-    case CanFaultKind::shortened:
-      return "shortened";
-    case CanFaultKind::foreign:
-      return "foreign";
-  }
-  return "unknown";
-}
-
 CanFault parse_can_fault(const std::string& text) {
   static const std::regex form("([a-z]+)@([0-9]{1,15})(x([0-9]{1,15}))?(:([0-9.e-]{1,20}))?");
   std::smatch part;
   const bool formed = std::regex_match(text, part, form);
-  const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](CanFaultKind known) {
-    return formed && part[1].str() == to_string(known);
-  });
-  if (kind == kKinds.end())
+  const auto kind = formed ? from_word<CanFaultKind>(part[1].str()) : std::nullopt;
+  if (!kind)
     throw std::invalid_argument(
         fmt::format("'{}': expected KIND@FRAME[xCOUNT][:SECONDS], where KIND is one of {}", text,
-                    names_of_kinds()));
+                    fmt::join(kWords<CanFaultKind>, ", ")));
   CanFault fault;
   fault.kind = *kind;
   fault.from_frame = std::stoull(part[2]);

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "hal/can/can_transport.hpp"
 
 namespace stageid {
@@ -18,7 +20,9 @@ enum class CanFaultKind : std::uint8_t {
   shortened,  ///< the last bytes are missing
   foreign     ///< its content arrives under another identifier of this protocol
 };
-const char* to_string(CanFaultKind kind) noexcept;
+template <>
+inline constexpr std::array kWords<CanFaultKind> = {"lost",    "repeated",  "swapped", "late",
+                                                    "corrupt", "shortened", "foreign"};
 
 struct CanFault {
   CanFaultKind kind = CanFaultKind::lost;

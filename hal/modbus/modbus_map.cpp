@@ -68,8 +68,6 @@ constexpr Entry kEntries[] = {
      "of one count, a power of two"},
 };
 
-constexpr std::array<const char*, 4> kTypeNames = {"uint32", "uint64", "int32", "float32"};
-
 }  // namespace
 
 std::span<const Entry> entries() noexcept { return kEntries; }
@@ -82,7 +80,7 @@ std::string markdown_table() {
     const std::string name =
         e.count > 1 ? fmt::format("{}[{}]", e.name, e.count) : std::string(e.name);
     fmt::format_to(std::back_inserter(table), "| {} | {} | {} | {} | {} | {} | {} |\n", e.address,
-                   e.registers(), name, kTypeNames[static_cast<std::size_t>(e.type)], e.unit,
+                   e.registers(), name, to_string(e.type), e.unit,
                    e.access == Access::read ? "read" : "read, write", e.meaning);
   }
   return table;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "excitation/words/words.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -103,4 +105,8 @@ std::string markdown_table();
 std::uint32_t channel_hash(const StageInfo& info);
 
 }  // namespace modbus_map
+
+template <>
+inline constexpr std::array kWords<modbus_map::Type> = {"uint32", "uint64", "int32", "float32"};
+
 }  // namespace stageid

@@ -2,32 +2,6 @@
 
 namespace stageid {
 
-const char* to_string(FaultCause cause) noexcept {
-  switch (cause) {
-    case FaultCause::none:
-      return "none";
-    case FaultCause::watchdog:
-      return "the host stopped sending";
-    case FaultCause::limit:
-      return "a limit was exceeded";
-    case FaultCause::not_finite:
-      return "a value was not finite";
-    case FaultCause::interlock:
-      return "the interlock opened";
-    case FaultCause::amplifier:
-      return "the stage reported a fault";
-    case FaultCause::gravity:
-      return "a gravity compensator is out of range";
-    case FaultCause::temperature:
-      return "a temperature is out of range";
-    case FaultCause::bus_off:
-      return "the bus is off";
-    case FaultCause::host_heartbeat:
-      return "the supervisor's heartbeat stopped";
-  }
-  return "unknown";
-}
-
 bool NodeStateMachine::powered() const noexcept {
   switch (state_) {
     case NodeState::switched_on:

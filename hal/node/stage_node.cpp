@@ -46,20 +46,6 @@ PanelTrouble trouble_of(const NodePanel& panel) {
   return {};
 }
 
-const char* to_string(SupervisorCommand command) noexcept {
-  switch (command) {
-    case SupervisorCommand::enable:
-      return "enable";
-    case SupervisorCommand::disable:
-      return "disable";
-    case SupervisorCommand::quick_stop:
-      return "quick stop";
-    case SupervisorCommand::reset_fault:
-      return "reset";
-  }
-  return "unknown";
-}
-
 std::string refusal(SupervisorCommand command, NodeState state) {
   const bool in_fault = state == NodeState::fault;
   const char* remedy = in_fault ? "reset the fault first" : "wait, or end the measurement first";
@@ -238,7 +224,7 @@ Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inpu
   }
   last_sample_ns_ = now_ns;
   std::copy(u.begin(), u.end(), command_.begin());
-  Outcome outcome = stage_.exchange({sample_, now_ns, command_}, inputs, {});
+  Outcome outcome = stage_.exchange({sample_, command_}, inputs, {});
   // The host need not distinguish how the node stops; either way it stops by itself.
   if (outcome == Outcome::braking || outcome == Outcome::opened) outcome = Outcome::limit;
   ++sample_;
@@ -313,7 +299,7 @@ void StageNode::hold(std::int64_t now_ns) {
       std::copy(control_.begin(), control_.end(), command_.begin());
     // The limits need the cycle: a loop that does not settle is opened.
     const std::uint64_t cycle = sample_ + static_cast<std::uint64_t>(held_samples_);
-    const Outcome outcome = stage_.exchange({cycle, now_ns, command_}, inputs, {});
+    const Outcome outcome = stage_.exchange({cycle, command_}, inputs, {});
     controller_.update(y_.data(), control_.data());
     controlled = outcome != Outcome::fault && outcome != Outcome::link_down &&
                  outcome != Outcome::opened && !lost(outcome);

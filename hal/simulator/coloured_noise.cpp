@@ -28,11 +28,6 @@ Eigen::Index states_of(const ColouredNoiseSpec& spec) {
 
 }  // namespace
 
-const char* to_string(NoiseColour colour) noexcept {
-  constexpr std::array kNames = {"white", "flicker", "drift", "resonant"};
-  return kNames[static_cast<std::size_t>(colour)];
-}
-
 ColouredNoise::ColouredNoise(const ColouredNoiseSpec& spec) : spec_(spec) {
   const double rate = spec.sample_rate_hz;
   if (!(rate > 0.0) || !(spec.reference_hz > 0.0) || !(2.0 * spec.reference_hz < rate) ||

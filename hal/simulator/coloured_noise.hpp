@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 
+#include "excitation/words/words.hpp"
 #include "hal/simulator/noise.hpp"
 
 namespace stageid {
@@ -14,7 +16,8 @@ enum class NoiseColour : std::uint8_t {
   drift,    ///< a random walk, 1/f^2 in power
   resonant  ///< of a lightly damped structure beside the stage
 };
-const char* to_string(NoiseColour colour) noexcept;
+template <>
+inline constexpr std::array kWords<NoiseColour> = {"white", "flicker", "drift", "resonant"};
 
 struct ColouredNoiseSpec {
   NoiseColour colour = NoiseColour::white;

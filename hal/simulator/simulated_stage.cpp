@@ -43,13 +43,6 @@ void quantize(Eigen::ArrayXd& values, double quantum) {
   for (double& value : values) value = quantum * std::nearbyint(value / quantum);
 }
 
-// A sum of products with zero is zero if and only if every entry is finite: no branch per entry.
-bool all_finite(std::span<const double> values) {
-  double sum = 0.0;
-  for (const double value : values) sum += 0.0 * value;
-  return sum == 0.0;
-}
-
 }  // namespace
 
 struct SimulatedStage::State {

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "hal/stage/limits.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/stage.hpp"
@@ -84,6 +86,11 @@ struct WaferStageSpec {
   /// Whether the plant is described. Only then can the stage be simulated and its signals predicted.
   bool has_plant() const noexcept { return mass_kg > 0.0; }
 };
+template <>
+inline constexpr std::array kWords<WaferStageSpec::Fault::Kind> = {
+    "none",         "dead_sensor",    "nan_sensor",   "missed_cycle",
+    "interlock",    "stuck_actuator", "stuck_sensor", "sensor_offset",
+    "sensor_drift", "actuator_gain",  "extra_delay"};
 
 /// All modes of the stage: rigid-body ones on their suspension first, then flexible out of plane by
 /// frequency, then in plane.

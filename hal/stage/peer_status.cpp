@@ -57,8 +57,6 @@ constexpr PeerMeaning kMeanings[] = {
      "a different `fingerprint`", "different channels, sample rate or `channel_hash`"},
 };
 
-constexpr std::array<const char*, 4> kReactions = {"use", "mark", "stop", "refuse"};
-
 PeerStatus status_of_outcome(std::uint8_t code) noexcept {
   constexpr PeerStatus kOfCode[] = {good,    late,    incomplete, nothing_new, damaged,
                                     passive, bus_off, link_down,  fault,       limit};
@@ -104,7 +102,7 @@ std::string peer_meanings_table() {
       "| --- | --- | --- | --- | --- |\n";
   for (const PeerMeaning& m : kMeanings)
     fmt::format_to(std::back_inserter(table), "| {} | {} | {} | {} | {} |\n", m.words, m.can,
-                   m.modbus, kReactions[static_cast<std::size_t>(m.reaction)],
+                   m.modbus, to_string(m.reaction),
                    m.reaction == PeerReaction::refuse ? "-" : to_string(m.outcome));
   return table;
 }

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 
+#include "excitation/words/words.hpp"
 #include "hal/stage/stage.hpp"
 #include "hal/stage/supervisor.hpp"
 
@@ -44,6 +46,8 @@ enum class PeerReaction : std::uint8_t {
   stop,   ///< the run ends
   refuse  ///< the run does not begin
 };
+template <>
+inline constexpr std::array kWords<PeerReaction> = {"use", "mark", "stop", "refuse"};
 
 struct PeerMeaning {
   PeerStatus status = PeerStatus::good;

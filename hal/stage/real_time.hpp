@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -12,6 +15,8 @@ enum class RealTimePolicy : std::uint8_t {
   attempt,  ///< use what is available and report what is missing
   require   ///< refuse to run without permissions or without a PREEMPT_RT kernel
 };
+template <>
+inline constexpr std::array kWords<RealTimePolicy> = {"off", "try", "require"};
 
 /// Scheduling of the loop's thread. Ignored in virtual time.
 struct RealTimeOptions {

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -31,13 +34,20 @@ bool is_acceleration(const Channel& channel) noexcept;
 /// The unit of all these channels with a blank before it; empty if they have several.
 std::string common_unit(const std::vector<Channel>& channels);
 
+/// One pass without a branch per value.
+bool all_finite(std::span<const double> values) noexcept;
+
 /// Index of the channel of that name, -1 if there is none.
 int channel_index(const std::vector<Channel>& channels, const std::string& name) noexcept;
 
 enum class Clock : std::uint8_t { virtual_time, wall };
+template <>
+inline constexpr std::array kWords<Clock> = {"virtual", "wall"};
 
 /// What happens to the stage between the runs of an experiment: its forces are cut, or the controller keeps it.
 enum class BetweenRuns : std::uint8_t { release, hold };
+template <>
+inline constexpr std::array kWords<BetweenRuns> = {"release", "hold"};
 
 /// Properties of a back end; an unsuitable experiment is refused before it starts.
 struct StageInfo {
@@ -69,6 +79,11 @@ enum class Outcome : std::uint8_t {
   braking,  ///< the loop is unsound and open: the stage brakes by itself; continue exchanging
   opened    ///< the loop is open and the forces must be cut: call stop()
 };
+template <>
+inline constexpr std::array kWords<Outcome> = {"ok",      "late",        "incomplete", "stale",
+                                               "corrupt", "bus passive", "bus off",    "link down",
+                                               "fault",   "limit",       "braking",    "opened"};
+
 const char* to_string(Outcome outcome) noexcept;
 
 /// States based on CiA 402.
@@ -83,6 +98,11 @@ enum class NodeState : std::uint8_t {
   fault_reaction,
   fault
 };
+template <>
+inline constexpr std::array kWords<NodeState> = {"not ready",   "switch on disabled", "ready",
+                                                 "switched on", "operation enabled",  "measuring",
+                                                 "quick stop",  "fault reaction",     "fault"};
+
 const char* to_string(NodeState state) noexcept;
 
 /// A measurement. `y` is filled in place (size sensors, SI); `valid` bit i = sensor i.
@@ -107,7 +127,6 @@ struct Inputs {
 /// Commands to the stage. `u`: size actuators, SI.
 struct Outputs {
   std::uint64_t cycle = 0;
-  std::int64_t t_apply_ns = 0;
   std::span<const double> u;
 };
 

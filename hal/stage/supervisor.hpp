@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -21,7 +23,17 @@ enum class FaultCause : std::uint8_t {
   bus_off,        ///< the node's controller went off the bus
   host_heartbeat  ///< the supervisor's heartbeat stopped
 };
-const char* to_string(FaultCause cause) noexcept;
+template <>
+inline constexpr std::array kWords<FaultCause> = {"none",
+                                                  "the host stopped sending",
+                                                  "a limit was exceeded",
+                                                  "a value was not finite",
+                                                  "the interlock opened",
+                                                  "the stage reported a fault",
+                                                  "a gravity compensator is out of range",
+                                                  "a temperature is out of range",
+                                                  "the bus is off",
+                                                  "the supervisor's heartbeat stopped"};
 
 /// Environment of the stage: enable chain, gravity compensators, temperatures, interlocks.
 struct PlantSnapshot {
@@ -36,6 +48,9 @@ struct PlantSnapshot {
 };
 
 enum class SupervisorCommand : std::uint8_t { enable, disable, quick_stop, reset_fault };
+template <>
+inline constexpr std::array kWords<SupervisorCommand> = {"enable", "disable", "quick stop",
+                                                         "reset"};
 
 struct SupervisorReply {
   bool accepted = false;

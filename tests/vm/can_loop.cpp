@@ -91,7 +91,7 @@ std::map<Outcome, int> stream(const Setup& setup, double seconds, double pace) {
   for (std::uint64_t n = 0; n < samples; ++n) {
     u[0] = std::sin(0.1 * static_cast<double>(n));
     const Deadline deadline{pace > 0.0 ? inputs.t_sample_ns + std::llround(2e9 / rate_hz) : 0};
-    ++outcomes[stage.exchange({n, 0, u}, inputs, deadline)];
+    ++outcomes[stage.exchange({n, u}, inputs, deadline)];
   }
   stage.stop();
   fmt::print("node: {} gaps, {} repeated, {} rejected, {} samples\n", stage.node().gaps,

@@ -38,17 +38,19 @@ inline void add_threads(CLI::App& command, int& threads) {
       ->capture_default_str();
 }
 
-/// For .mat files that the command writes.
-inline void add_mat_version(CLI::App& command, MatVersion& version) {
+/// An option whose value is a word of the enumeration.
+template <HasWords Enum>
+void add_choice(CLI::App& command, const std::string& name, Enum& value, const std::string& help) {
   command
       .add_option_function<std::string>(
-          "--mat-version",
-          [&version](const std::string& text) {
-            version = text == "5" ? MatVersion::v5 : MatVersion::v73;
-          },
-          "version of a .mat file: 5 or 7.3 (HDF5)")
-      ->check(CLI::IsMember({"5", "7.3"}))
-      ->default_str("5");
+          name, [&value](const std::string& word) { value = *from_word<Enum>(word); }, help)
+      ->check(CLI::IsMember(words_of<Enum>()))
+      ->default_str(to_string(value));
+}
+
+/// For .mat files that the command writes.
+inline void add_mat_version(CLI::App& command, MatVersion& version) {
+  add_choice(command, "--mat-version", version, "version of a .mat file: 5 or 7.3 (HDF5)");
 }
 
 }  // namespace stageid

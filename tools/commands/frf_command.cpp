@@ -89,11 +89,11 @@ class FrfCommand {
   std::vector<int> realizations_;
   std::optional<int> transient_periods_;
   std::optional<double> delay_s_;
-  std::string method_ = "periodic";
-  std::string periods_ = "consistent";
+  FrfMethod method_ = FrfMethod::periodic;
+  PeriodChoice periods_ = PeriodChoice::consistent;
   int covariance_lines_ = 1;
-  std::string covariance_ = "diagonal";
-  std::string compensate_ = "none";
+  CovarianceKind covariance_ = CovarianceKind::diagonal;
+  Compensation compensate_ = Compensation::none;
   int threads_ = 0;
 };
 
@@ -109,17 +109,11 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
   command->add_option(
       "--transient-periods", transient_periods_,
       "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
-  command
-      ->add_option("--method", method_,
-                   "periodic: means over periods | lpm: whole records, transient modelled")
-      ->check(CLI::IsMember({"periodic", "lpm"}))
-      ->capture_default_str();
-  command
-      ->add_option("--periods", periods_,
-                   "consistent: discard periods with glitches, bumps or transients (lpm: only "
-                   "glitches) | unmarked: use all periods without marked samples")
-      ->check(CLI::IsMember({"consistent", "unmarked"}))
-      ->capture_default_str();
+  add_choice(*command, "--method", method_,
+             "periodic: means over periods | lpm: whole records, transient modelled");
+  add_choice(*command, "--periods", periods_,
+             "consistent: discard periods with glitches, bumps or transients (lpm: only "
+             "glitches) | unmarked: use all periods without marked samples");
   command
       ->add_option("--smooth-covariance", covariance_lines_,
                    "odd number of neighbouring lines over which the noise covariance is averaged; "
@@ -127,16 +121,10 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
       ->type_name("LINES")
       ->check(kPositive)
       ->capture_default_str();
-  command
-      ->add_option("--covariance", covariance_,
-                   "diagonal: variances | full: also the covariances between channels")
-      ->check(CLI::IsMember({"diagonal", "full"}))
-      ->capture_default_str();
-  command
-      ->add_option("--compensate", compensate_,
-                   "remove from the response: none | delay | hold: hold and delay")
-      ->check(CLI::IsMember({"none", "delay", "hold"}))
-      ->capture_default_str();
+  add_choice(*command, "--covariance", covariance_,
+             "diagonal: variances | full: also the covariances between channels");
+  add_choice(*command, "--compensate", compensate_,
+             "remove from the response: none | delay | hold: hold and delay");
   command->add_option("--delay", delay_s_,
                       "delay to remove with --compensate, in s, without the half sample of the "
                       "hold; default: as declared in the log");
@@ -166,9 +154,9 @@ void FrfCommand::run() const {
   options.inputs = inputs_;
   options.outputs = outputs_;
   options.transient_periods = transient_periods_;
-  options.method = method_ == "lpm" ? FrfMethod::lpm : FrfMethod::periodic;
-  options.covariance = covariance_ == "full" ? CovarianceKind::full : CovarianceKind::diagonal;
-  options.periods = periods_ == "unmarked" ? PeriodChoice::unmarked : PeriodChoice::consistent;
+  options.method = method_;
+  options.covariance = covariance_;
+  options.periods = periods_;
   options.covariance_lines = covariance_lines_;
   options.threads = threads_;
   for (const int realization : realizations_) {
@@ -177,7 +165,7 @@ void FrfCommand::run() const {
           "--realizations: {} is out of range; realizations are counted from 1", realization));
     options.realizations.push_back(realization - 1);
   }
-  if (delay_s_ && compensate_ == "none")
+  if (delay_s_ && compensate_ == Compensation::none)
     throw std::invalid_argument(
         "--delay: has no effect without --compensate; add --compensate delay or hold, or omit "
         "--delay");
@@ -185,12 +173,11 @@ void FrfCommand::run() const {
   require_frf_ending(output_);
   FrfStep step = estimate(options);
   std::vector<std::string> notes = dropped_lines(step.frf);
-  if (compensate_ != "none") {
+  if (compensate_ != Compensation::none) {
     const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
     if (!delay_s_)
       notes.push_back(fmt::format("--compensate: delay {} s, as declared in the log", delay_s));
-    step.frf = compensate(
-        step.frf, compensate_ == "hold" ? Compensation::hold : Compensation::delay, delay_s);
+    step.frf = compensate(step.frf, compensate_, delay_s);
   }
   write_frf(output_, step.frf);
   const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;

@@ -30,7 +30,7 @@ class ModesCommand {
   std::filesystem::path frf_;
   std::filesystem::path output_;
   std::vector<double> band_hz_;
-  std::string kind_ = "accelerance";
+  CmifKind kind_ = CmifKind::accelerance;
   double prominence_db_ = 3.0;
 };
 
@@ -40,9 +40,7 @@ ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) 
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "modes.json to write");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz")->expected(2);
-  command->add_option("--kind", kind_, "response | accelerance | whitened (by the variances)")
-      ->check(CLI::IsMember({"response", "accelerance", "whitened"}))
-      ->capture_default_str();
+  add_choice(*command, "--kind", kind_, "response | accelerance | whitened (by the variances)");
   command->add_option("--prominence", prominence_db_, "minimum prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();
@@ -61,8 +59,7 @@ void ModesCommand::run() const {
     frf = without_dc_line(std::move(frf));
   }
   PeakOptions options;
-  if (kind_ == "response") options.kind = CmifKind::response;
-  if (kind_ == "whitened") options.kind = CmifKind::whitened;
+  options.kind = kind_;
   options.minimum_prominence_db = prominence_db_;
   const std::vector<ModeCandidate> modes = pick_modes(frf, options);
   if (!output_.empty()) write_modes(output_, modes);

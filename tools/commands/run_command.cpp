@@ -22,11 +22,9 @@ namespace {
 
 Backend backend_of(const std::string& name, Backend configured) {
   if (name.empty()) return configured;
-  for (const Backend backend :
-       {Backend::sim, Backend::can, Backend::modbus, Backend::plugin, Backend::replay})
-    if (name == to_string(backend)) return backend;
-  throw std::invalid_argument(fmt::format(
-      "--backend: unknown back end '{}'; use sim, can, modbus, plugin or replay", name));
+  if (const auto backend = from_word<Backend>(name)) return *backend;
+  throw std::invalid_argument(
+      fmt::format("--backend: unknown back end '{}'; use {}", name, one_of(kWords<Backend>)));
 }
 
 /// stageid run CONFIG -o run.slog

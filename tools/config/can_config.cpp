@@ -68,7 +68,7 @@ std::vector<double> ranges(const std::vector<double>& given, const Eigen::Vector
 void describe_can(ConfigVisitor& v, CanFile& f) {
   CanSpec& spec = f.config.spec;
   f.config.present = true;
-  choose(v, "mode", f.config.mode, {"streaming", "resident"}, kOptional,
+  choose(v, "mode", f.config.mode, kOptional,
          "streaming: sample by sample; resident: the node runs the experiment in its own loop");
   items(v, "buses", describe_bus, f.buses, {1, 16}, kRequired,
         "CAN FD buses; the first one also carries commands and transfers");

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "hal/can/can_layout.hpp"
 #include "hal/stage/limits.hpp"
 #include "hal/stage/stage.hpp"
@@ -13,6 +15,8 @@ namespace stageid {
 
 /// How an experiment is performed over CAN: streamed sample by sample, or by the loop of the node.
 enum class CanMode : std::uint8_t { streaming, resident };
+template <>
+inline constexpr std::array kWords<CanMode> = {"streaming", "resident"};
 
 /// The group `can` of a stage file with defaults filled in.
 struct CanConfig {

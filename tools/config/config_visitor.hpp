@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "excitation/words/words.hpp"
+
 namespace stageid {
 
 enum class Presence : std::uint8_t { optional, required };
@@ -93,12 +95,12 @@ class ConfigVisitor {
   virtual void require(bool holds, const char* key, const std::string& message) = 0;
 };
 
-/// choice() for an enumeration whose values are 0, 1, 2 ... in the order of `names`.
-template <typename Enum>
-void choose(ConfigVisitor& visitor, const char* key, Enum& value,
-            const std::vector<std::string>& names, Presence presence, const char* help) {
+/// choice() among the words of an enumeration.
+template <HasWords Enum>
+void choose(ConfigVisitor& visitor, const char* key, Enum& value, Presence presence,
+            const char* help) {
   auto index = static_cast<std::size_t>(value);
-  visitor.choice(key, index, names, presence, help);
+  visitor.choice(key, index, words_of<Enum>(), presence, help);
   value = static_cast<Enum>(index);
 }
 

@@ -1,6 +1,8 @@
 #include "tools/config/controller_file.hpp"
+#include "excitation/words/words.hpp"
 
 #include <fmt/format.h>
+#include <array>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -28,6 +30,13 @@ constexpr double kMeasuredError = 0.02;  // relative to C y; of a response betwe
 
 enum class Time : std::uint8_t { discrete, continuous };
 
+}  // namespace
+
+template <>
+inline constexpr std::array kWords<Time> = {"discrete", "continuous"};
+
+namespace {
+
 /// Content of the file, key by key.
 struct ControllerFile {
   std::size_t format = 0;
@@ -54,8 +63,7 @@ void describe(ConfigVisitor& v, ControllerFile& f) {
           "outputs of the controller, in its order");
   require_unique(v, "sensors", f.linear.sensors);
   require_unique(v, "actuators", f.linear.actuators);
-  choose(v, "time", f.time, {"discrete", "continuous"}, kOptional,
-         "time domain of matrices and coefficients");
+  choose(v, "time", f.time, kOptional, "time domain of matrices and coefficients");
   v.number("sample_rate_hz", f.sample_rate_hz, positive("Hz"), kOptional,
            "of a discrete controller");
   describe_linear_controller(v, f.linear);

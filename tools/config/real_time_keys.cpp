@@ -3,7 +3,7 @@
 namespace stageid {
 
 void describe_real_time(ConfigVisitor& visitor, RealTimeKeys& keys) {
-  choose(visitor, "policy", keys.options.policy, {"off", "try", "require"}, kOptional,
+  choose(visitor, "policy", keys.options.policy, kOptional,
          "try: warn about missing prerequisites; require: exit code 1 without the permissions or a "
          "PREEMPT_RT kernel");
   count(visitor, "priority", keys.options.priority, 1, 99, kOptional, "SCHED_FIFO priority");

@@ -153,22 +153,6 @@ void complete_spec(StageConfig& config, const StageFile& file) {
 
 }  // namespace
 
-const char* to_string(Backend backend) noexcept {
-  switch (backend) {
-    case Backend::sim:
-      return "sim";
-    case Backend::can:
-      return "can";
-    case Backend::modbus:
-      return "modbus";
-    case Backend::plugin:
-      return "plugin";
-    case Backend::replay:
-      return "replay";
-  }
-  return "unknown";
-}
-
 void describe_stage_keys(ConfigVisitor& visitor) {
   StageFile file;
   describe_stage_file(visitor, file);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "hal/plugin/plugin_stage.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
@@ -19,7 +21,8 @@
 namespace stageid {
 
 enum class Backend : std::uint8_t { sim, can, modbus, plugin, replay };
-const char* to_string(Backend backend) noexcept;
+template <>
+inline constexpr std::array kWords<Backend> = {"sim", "can", "modbus", "plugin", "replay"};
 
 /// Content of a stage file and the WaferStageSpec derived from it.
 struct StageConfig {

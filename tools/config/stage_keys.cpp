@@ -223,11 +223,10 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
 void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   FaultConfig f;
   using Kind = WaferStageSpec::Fault::Kind;
+  std::vector<std::string> kinds = words_of<Kind>();
+  kinds.erase(kinds.begin());  // none
   auto kind = static_cast<std::size_t>(Kind::dead_sensor) - 1;
-  v.choice("kind", kind,
-           {"dead_sensor", "nan_sensor", "missed_cycle", "interlock", "stuck_actuator",
-            "stuck_sensor", "sensor_offset", "sensor_drift", "actuator_gain", "extra_delay"},
-           kRequired, "kind of the fault");
+  v.choice("kind", kind, kinds, kRequired, "kind of the fault");
   f.fault.kind = static_cast<Kind>(kind + 1);
   v.text("channel", f.channel, kOptional,
          "name of the sensor or actuator; if omitted, the last four kinds act on all");
@@ -289,8 +288,7 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   WaferStageSpec& s = f.spec;
   v.choice("format", f.format, {"stageid-stage"}, kRequired, "file type");
   v.text("name", s.info.name, kRequired, "name of the stage");
-  v.choice("backend", f.backend, {"sim", "can", "modbus", "plugin"}, kOptional,
-           "back end of the stage");
+  v.choice("backend", f.backend, words_before(Backend::replay), kOptional, "back end of the stage");
   v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired,
            "sample rate of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
@@ -303,7 +301,7 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
            "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
            "trusted");
-  choose(v, "between_runs", f.between_runs, {"release", "hold"}, kOptional,
+  choose(v, "between_runs", f.between_runs, kOptional,
          "release: forces are cut after every run; hold: the loop stays closed between the runs of "
          "an experiment");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,

@@ -85,8 +85,7 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
 }
 
 void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
-  choose(v, "lines", f.lines.selection, {"all", "odd", "odd_random"}, kOptional,
-         "which lines of the period are excited");
+  choose(v, "lines", f.lines.selection, kOptional, "which lines of the period are excited");
   count(v, "group_size", f.lines.group_size, 2, 1000, kOptional,
         "odd_random: one odd line in this many is not excited");
   v.numbers("band_hz", f.band_hz, positive("Hz"), {2, 2}, kRequired,
@@ -108,9 +107,7 @@ void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
 
 void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
   v.texts("axes", f.axes, {1, 64}, kRequired, "names of the excited actuators");
-  choose(v, "scheme", f.spec.scheme,
-         {"single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered"}, kOptional,
-         "distribution of the axes over the experiments");
+  choose(v, "scheme", f.spec.scheme, kOptional, "distribution of the axes over the experiments");
   group(v, "level", describe_level, f, kRequired, "size of the excitation");
   describe_lines(v, f);
   v.number("period_s", f.period_s, positive("s"), kRequired, "period of the multisine");
@@ -133,11 +130,11 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   v.texts("inputs", f.inputs, {1}, kOptional,
           "actuators of the response; omitted: the excited ones");
   v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
-  choose(v, "covariance", f.covariance, {"diagonal", "full"}, kOptional,
+  choose(v, "covariance", f.covariance, kOptional,
          "diagonal: variances; full: also the covariances between channels");
-  choose(v, "method", f.method, {"periodic", "lpm"}, kOptional,
+  choose(v, "method", f.method, kOptional,
          "periodic: means over periods; lpm: whole records, transient modelled");
-  choose(v, "periods", f.periods, {"consistent", "unmarked"}, kOptional,
+  choose(v, "periods", f.periods, kOptional,
          "consistent: discard periods with glitches, bumps or transients (lpm: only glitches); "
          "unmarked: use all periods without marked samples");
   count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,

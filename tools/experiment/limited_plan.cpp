@@ -20,18 +20,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kDoubtfulMisfit = 0.05;
 
-const char* quantity(SignalKind kind) {
-  switch (kind) {
-    case SignalKind::value:
-      return "value";
-    case SignalKind::difference:
-      return "slew";
-    case SignalKind::derivative:
-      return "velocity";
-  }
-  return "unknown";
-}
-
 std::string limit_text(double limit) {
   return std::isinf(limit) ? "-" : fmt::format("{:.4g}", limit);
 }
@@ -93,7 +81,7 @@ std::vector<std::string> limited_table(const LimitedPlan& limited, double accura
   for (std::size_t s = 0; s < limited.loop.signals.size(); ++s) {
     const BoundedSignal& signal = limited.loop.signals[s];
     const SignalPeak& peak = limited.design.peaks[s];
-    rows.push_back({signal.name, quantity(signal.kind), limited.loop.units[s],
+    rows.push_back({signal.name, to_string(signal.kind), limited.loop.units[s],
                     fmt::format("{:.4g}", peak.steady), fmt::format("{:.4g}", peak.from_rest),
                     fmt::format("{:.2g}", signal.reserve), limit_text(signal.peak_limit),
                     fmt::format("{:.4g}", peak.rms), limit_text(signal.rms_limit),
@@ -129,7 +117,7 @@ Json limited_json(const LimitedPlan& limited, double accuracy) {
     const BoundedSignal& signal = limited.loop.signals[s];
     const SignalPeak& peak = limited.design.peaks[s];
     Json entry = {
-        {"name", signal.name}, {"of", quantity(signal.kind)},      {"unit", limited.loop.units[s]},
+        {"name", signal.name}, {"of", to_string(signal.kind)},     {"unit", limited.loop.units[s]},
         {"peak", peak.steady}, {"peak_from_rest", peak.from_rest}, {"reserve", signal.reserve},
         {"rms", peak.rms},     {"used", limit_use(signal, peak)}};
     if (std::isfinite(signal.peak_limit)) entry["peak_limit"] = signal.peak_limit;

@@ -69,8 +69,9 @@ ModesRequest parse_modes(const std::string& text) {
 void parse_weighting(const std::string& text, FitRequest& request) {
   if (text.empty()) return;
   const std::vector<std::string> offered = words_before(Weighting::user);
-  if (std::find(offered.begin(), offered.end(), text) != offered.end()) {
-    request.weighting = pick<Weighting>("--weighting", text, offered);
+  if (const auto weighting = from_word<Weighting>(text);
+      weighting && *weighting != Weighting::user) {
+    request.weighting = *weighting;
     return;
   }
   if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
@@ -85,8 +86,8 @@ void parse_weighting(const std::string& text, FitRequest& request) {
 }
 
 DelayRequest parse_delay(const std::string& text) {
-  if (text == "estimate") return {DelayModel::estimate, 0.0};
-  if (text == "per_channel") return {DelayModel::per_channel, 0.0};
+  if (const auto model = from_word<DelayModel>(text); model && *model != DelayModel::fixed)
+    return {*model, 0.0};
   const std::optional<double> delay_s = to_number(text);
   if (!delay_s) refuse("--delay", text, "a number in s, estimate or per_channel");
   return {DelayModel::fixed, *delay_s};
@@ -111,10 +112,9 @@ RigidBodyRequest parse_rigid_body(const std::string& text) {
   using Kind = RigidBodyRequest::Kind;
   if (text.empty()) return {};
   if (text.starts_with(kSuspension)) return {Kind::suspension, 0, parse_suspension(text)};
-  const std::vector<std::string> words = words_to(Kind::suspension);
-  if (const auto word = std::find(words.begin(), words.end(), text); word != words.end())
-    return {static_cast<Kind>(word - words.begin())};
-  const std::string nearest = nearest_word(text.substr(0, text.find(':')), words);
+  if (const auto kind = from_word<Kind>(text); kind && *kind != Kind::by_submodels) return {*kind};
+  const std::string nearest =
+      nearest_word(text.substr(0, text.find(':')), words_before(Kind::by_submodels));
   if (!to_number(text) && !nearest.empty())
     refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
   return {Kind::free, parse_rank("--rigid-body", text, kRigidBodies)};
@@ -125,8 +125,7 @@ RigidBodyRequest parse_rigid_body(const std::string& text) {
 void parse_fit_flags(const FitFlags& flags, FitRequest& request) {
   request.modes = parse_modes(flags.modes);
   parse_weighting(flags.weighting, request);
-  if (!flags.hold.empty())
-    request.hold = pick<HoldModel>("--hold", flags.hold, words_to(HoldModel::exact));
+  if (!flags.hold.empty()) request.hold = pick<HoldModel>("--hold", flags.hold);
   if (!flags.delay.empty()) request.delay = parse_delay(flags.delay);
   request.rigid_body = parse_rigid_body(flags.rigid_body);
   request.residue_rank =
@@ -134,11 +133,10 @@ void parse_fit_flags(const FitFlags& flags, FitRequest& request) {
           ? 0
           : parse_rank("--residue-rank", flags.residue_rank, "full or a rank of 1 or more");
   if (!flags.damping.empty())
-    request.general_damping =
-        pick<int>("--damping", flags.damping, {"proportional", "general"}) == 1;
+    request.general_damping = is_second("--damping", flags.damping, {"proportional", "general"});
   if (!flags.direct_term.empty())
-    request.direct_term = pick<int>("--direct-term", flags.direct_term, {"none", "full"}) == 1;
-  request.method = pick<FitMethod>("--method", flags.method, words_to(FitMethod::sk));
+    request.direct_term = is_second("--direct-term", flags.direct_term, {"none", "full"});
+  request.method = pick<FitMethod>("--method", flags.method);
   for (const std::string& text : flags.submodels) request.submodels.push_back(parse_submodel(text));
 }
 

@@ -105,7 +105,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   word("weighting", f.weighting, words_before(Weighting::user),
        "weighting of the cost; by_frf: noise variance if known, else total variance, else "
        "relative; a single distorted realization is weighted by the scatter of its lines");
-  word("hold", f.hold, words_to(HoldModel::exact),
+  word("hold", f.hold, words_of<HoldModel>(),
        "none; phase: half a sample of delay; sinc: also its magnitude; exact: hold, delay and "
        "sampler, including aliasing; by_frf: exact unless the FRF is already hold-compensated");
 
@@ -128,27 +128,23 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
 
   FlexibleValue delay = {"by_frf", {}, false, {}};
   FlexibleRule delay_rule;
-  delay_rule.words = {"estimate", "per_channel", "by_frf"};
+  delay_rule.words = {to_string(DelayModel::estimate), to_string(DelayModel::per_channel),
+                      "by_frf"};
   delay_rule.number = true;
   delay_rule.rule = any_number("s");
   v.flexible("delay_s", delay, delay_rule, kOptional,
              "delay. A number: known; estimate: one for the plant; per_channel: one per channel; "
              "by_frf: from the FRF");
   if (!delay.numbers.empty()) f.delay = {DelayModel::fixed, delay.numbers.front()};
-  if (delay.word == "estimate") f.delay = {DelayModel::estimate, 0.0};
-  if (delay.word == "per_channel") f.delay = {DelayModel::per_channel, 0.0};
+  if (const auto model = from_word<DelayModel>(delay.word)) f.delay = {*model, 0.0};
 
   using Body = RigidBodyRequest::Kind;
-  const std::vector<std::string> bodies = words_to(Body::by_submodels);
   std::string body = to_string(f.rigid_body.kind);
-  f.rigid_body.rank = rank("rigid_body", body, bodies,
+  f.rigid_body.rank = rank("rigid_body", body, words_of<Body>(),
                            "none, full, or the rank of B_0 in B_0 / s^2; suspension: modes below "
                            "the lines, for a body on soft springs; auto: chosen from the data; "
                            "by_submodels: none if submodels are listed, else auto");
-  f.rigid_body.kind =
-      body.empty()
-          ? Body::free
-          : static_cast<Body>(std::find(bodies.begin(), bodies.end(), body) - bodies.begin());
+  f.rigid_body.kind = from_word<Body>(body).value_or(Body::free);
   v.numbers("suspension_hz", f.rigid_body.suspension_hz, positive("Hz"), {}, kOptional,
             "known frequencies of rigid_body: suspension; omitted: fitted");
   v.require(f.rigid_body.suspension_hz.empty() || f.rigid_body.kind == Body::suspension,
@@ -162,10 +158,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   word("damping", f.general_damping, {"proportional", "general"},
        "proportional: numerators B_0; general: B_0 + B_1 s; by_frf: general if the outputs are "
        "accelerations, else chosen from the data");
-  auto method = static_cast<std::size_t>(f.method);
-  v.choice("method", method, words_to(FitMethod::sk), kOptional,
-           "riv: refined instrumental variables; gn: Gauss-Newton; sk: Sanathanan-Koerner");
-  f.method = static_cast<FitMethod>(method);
+  choose(v, "method", f.method, kOptional,
+         "riv: refined instrumental variables; gn: Gauss-Newton; sk: Sanathanan-Koerner");
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "iterations per fit");
   v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
            "budget of the mode search in seconds of a typical core, counted as work so that the "

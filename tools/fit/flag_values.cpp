@@ -30,4 +30,9 @@ void refuse_word(const char* flag, const std::string& word, const std::vector<st
                      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
 }
 
+bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two) {
+  if (word != two[0] && word != two[1]) refuse_word(flag, word, two);
+  return word == two[1];
+}
+
 }  // namespace stageid

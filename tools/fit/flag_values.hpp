@@ -1,10 +1,11 @@
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -14,32 +15,19 @@ std::optional<double> to_number(std::string_view text);
 /// @throws std::invalid_argument "FLAG: 'given'; write RIGHT"
 [[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right);
 
-/// The words of an enumeration up to `last`, in the order of its values, from to_string().
-template <typename Enum>
-std::vector<std::string> words_to(Enum last) {
-  std::vector<std::string> words;
-  for (int i = 0; i <= static_cast<int>(last); ++i)
-    words.emplace_back(to_string(static_cast<Enum>(i)));
-  return words;
-}
-/// The same without `end`.
-template <typename Enum>
-std::vector<std::string> words_before(Enum end) {
-  std::vector<std::string> words = words_to(end);
-  words.pop_back();
-  return words;
-}
-
 /// @throws std::invalid_argument "FLAG: 'word'; write one of ..." with the nearest word
 [[noreturn]] void refuse_word(const char* flag, const std::string& word,
                               const std::vector<std::string>& names);
 
-/// The enumerator at the index of its name in `names`. @throws as refuse_word()
-template <typename Enum>
-Enum pick(const char* flag, const std::string& word, const std::vector<std::string>& names) {
-  const auto found = std::find(names.begin(), names.end(), word);
-  if (found == names.end()) refuse_word(flag, word, names);
-  return static_cast<Enum>(found - names.begin());
+/// The value with that word. @throws as refuse_word()
+template <HasWords Enum>
+Enum pick(const char* flag, const std::string& word) {
+  const std::optional<Enum> value = from_word<Enum>(word);
+  if (!value) refuse_word(flag, word, words_of<Enum>());
+  return *value;
 }
+
+/// Whether the word is the second of the two. @throws as refuse_word()
+bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two);
 
 }  // namespace stageid

@@ -109,17 +109,16 @@ Json linearity_json(const FrfEstimate& frf) {
   Json bands = Json::array();
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
     const Verdict verdict = least(test.p_value, b);
-    bands.push_back(
-        {{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
-         {"settled", test.settled(b)},
-         {"tests", test.p_value.rows()},
-         {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
-         {"output", frf.outputs.names[static_cast<std::size_t>(verdict.at % frf.n_outputs())]},
-         {"input", frf.inputs.names[static_cast<std::size_t>(verdict.at / frf.n_outputs())]},
-         {"p_value", verdict.p_value},
-         {"distortion", test.distortion(verdict.at, b)},
-         {"even", detected_json(test.even, b)},
-         {"odd", detected_json(test.odd, b)}});
+    bands.push_back({{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
+                     {"settled", test.settled(b)},
+                     {"tests", test.p_value.rows()},
+                     {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
+                     {"output", frf.outputs.name(verdict.at % frf.n_outputs())},
+                     {"input", frf.inputs.name(verdict.at / frf.n_outputs())},
+                     {"p_value", verdict.p_value},
+                     {"distortion", test.distortion(verdict.at, b)},
+                     {"even", detected_json(test.even, b)},
+                     {"odd", detected_json(test.odd, b)}});
   }
   return {{"tested", true},
           {"nonlinear", test.nonlinear()},

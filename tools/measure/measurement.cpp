@@ -142,31 +142,18 @@ void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const 
     console.warning("--until: " + why);
 }
 
-const char* name_of(RealTimePolicy policy) noexcept {
-  switch (policy) {
-    case RealTimePolicy::off:
-      return "off";
-    case RealTimePolicy::attempt:
-      return "try";
-    case RealTimePolicy::require:
-      return "require";
-  }
-  return "unknown";
-}
-
 void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInfo& stage,
                 const MeasurementResult& result) {
   const RealTimeOptions& real_time = config.stage.real_time.options;
   events.write(result.runs_before > 0 ? "resume" : "start",
                {{"stage", stage.name},
                 {"backend", stage.backend},
-                {"clock", std::string(stage.clock == Clock::wall ? "wall" : "virtual")},
+                {"clock", std::string(to_string(stage.clock))},
                 {"measurement_id", config.measurement_id},
                 {"runs_before", std::int64_t{result.runs_before}},
                 {"runs_total", std::int64_t{result.runs_total}},
-                {"between_runs",
-                 std::string(config.stage.between_runs == BetweenRuns::hold ? "hold" : "release")},
-                {"realtime", std::string(name_of(real_time.policy))}});
+                {"between_runs", std::string(to_string(config.stage.between_runs))},
+                {"realtime", std::string(to_string(real_time.policy))}});
 }
 
 void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementResult& result) {

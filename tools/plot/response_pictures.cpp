@@ -26,10 +26,6 @@ const FrfEstimate& response_of(const ReportData& data, const char* figure) {
   return *data.frf;
 }
 
-std::string name_of(const ChannelList& channels, Eigen::Index i) {
-  return channels.names[static_cast<std::size_t>(i)];
-}
-
 std::string unit_of(const ChannelList& channels, Eigen::Index i) {
   const auto at = static_cast<std::size_t>(i);
   return at < channels.units.size() && !channels.units[at].empty() ? channels.units[at] : "1";
@@ -119,11 +115,11 @@ std::string around_the_panels(const FrfEstimate& frf, const Grid& grid, const Pi
   const double middle_y_in = 0.5 * (grid.bottom_in + picture.height_in - grid.top_in);
   const std::string unit = common_unit(frf, outputs, inputs);
   for (std::size_t j = 0; j < inputs.size(); ++j)
-    label(quoted(name_of(frf.inputs, inputs[j])), grid.x_in(j) + 0.5 * grid.width_in,
+    label(quoted(frf.inputs.name(inputs[j])), grid.x_in(j) + 0.5 * grid.width_in,
           picture.height_in - grid.top_in + 0.09, "font ',7'");
   for (std::size_t i = 0; i < outputs.size(); ++i)
-    label(quoted(name_of(frf.outputs, outputs[i])), 0.3,
-          grid.y_in(i, picture) + 0.5 * grid.height_in, "rotate by 90 font ',7'");
+    label(quoted(frf.outputs.name(outputs[i])), 0.3, grid.y_in(i, picture) + 0.5 * grid.height_in,
+          "rotate by 90 font ',7'");
   label("'Frequency [Hz]'", middle_x_in, 0.1, "");
   label(quoted(unit.empty() ? "Magnitude" : "Magnitude [" + unit + "]"), 0.1, middle_y_in,
         "rotate by 90");
@@ -231,7 +227,7 @@ Picture entry_picture(const ReportData& data, Eigen::Index output, Eigen::Index 
   Picture picture{kColumn_in, 2.6, "", {{"entry.txt", table_text(table.columns)}}};
   const Curves curves = curves_of(table, "entry.txt", report::uncertainty(frf).kind, 0.9);
   const std::string title =
-      fmt::format("{} ← {}  [{}/{}]", name_of(frf.outputs, output), name_of(frf.inputs, input),
+      fmt::format("{} ← {}  [{}/{}]", frf.outputs.name(output), frf.inputs.name(input),
                   unit_of(frf.outputs, output), unit_of(frf.inputs, input));
   picture.script =
       fmt::format("set multiplot\nunset key\n{}", kFrame) +

@@ -15,11 +15,10 @@ namespace py = pybind11;
 Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_hz, double high_hz,
                           double rms, std::uint64_t seed, const std::string& lines,
                           const py::object& shape, int crest_iterations) {
-  const LineSpec band{
-      .low_hz = low_hz,
-      .high_hz = high_hz,
-      .selection = pick<LineSelection>("lines", lines, {"all", "odd", "odd_random"}),
-      .seed = seed};
+  const LineSpec band{.low_hz = low_hz,
+                      .high_hz = high_hz,
+                      .selection = pick<LineSelection>("lines", lines),
+                      .seed = seed};
   MultisineSpec spec;
   spec.level = rms;
   spec.seed = seed;

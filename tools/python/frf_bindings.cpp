@@ -36,9 +36,6 @@ namespace {
 
 using Complexes = py::array_t<std::complex<double>, py::array::forcecast>;
 
-const std::vector<std::string> kHolds = {"none", "zoh"};
-const std::vector<std::string> kCompensations = {"none", "delay", "hold"};
-
 /// None: not known.
 Eigen::MatrixXd variance_of(const py::object& given, const char* name) {
   if (given.is_none()) return {};
@@ -62,7 +59,7 @@ FrfHandle frf_of_arrays(const py::object& frequency_hz, const Complexes& respons
   frf.noise_dof = noise_dof.value_or(0.0);
   frf.total_dof = total_dof.value_or(0.0);
   frf.sample_rate_hz = sample_rate_hz.value_or(0.0);
-  frf.hold = pick<Hold>("hold", hold, kHolds);
+  frf.hold = pick<Hold>("hold", hold);
   check(frf);
   return FrfHandle(std::move(frf));
 }
@@ -115,9 +112,9 @@ FrfHandle frf(const py::object& given, const Choice<std::string>& inputs,
   options.realizations = chosen("realizations", realizations);
   for (int& realization : options.realizations) --realization;  // users count from 1
   options.transient_periods = transient_periods;
-  options.method = pick<FrfMethod>("method", method, {"periodic", "lpm"});
-  options.covariance = pick<CovarianceKind>("covariance", covariance, {"diagonal", "full"});
-  options.periods = pick<PeriodChoice>("periods", periods, {"consistent", "unmarked"});
+  options.method = pick<FrfMethod>("method", method);
+  options.covariance = pick<CovarianceKind>("covariance", covariance);
+  options.periods = pick<PeriodChoice>("periods", periods);
   options.covariance_lines = covariance_lines;
   options.threads = threads.value_or(0);
   const std::vector<std::shared_ptr<LogReader>> kept = logs_of(given);
@@ -140,11 +137,11 @@ FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_
 }
 
 FrfHandle compensated(const FrfHandle& of, const std::string& what, double delay_s) {
-  return FrfHandle(compensate(of.frf, pick<Compensation>("what", what, kCompensations), delay_s));
+  return FrfHandle(compensate(of.frf, pick<Compensation>("what", what), delay_s));
 }
 
 py::object radius(const FrfHandle& of, double level, const std::string& variance) {
-  const auto kind = pick<VarianceKind>("variance", variance, {"noise", "total"});
+  const auto kind = pick<VarianceKind>("variance", variance);
   return lines_moved<double>(confidence_radius(of.frf, level, kind), of.frf.n_outputs());
 }
 
@@ -197,13 +194,11 @@ void define_properties(Class& c) {
   property("input_units", [](const F& f) { return units_of(f.inputs); });
   property("output_units", [](const F& f) { return units_of(f.outputs); });
   property("sample_rate_hz", [](const F& f) { return unless_zero(f.sample_rate_hz); });
-  property("hold", [](const F& f) { return kHolds[static_cast<std::size_t>(f.hold)]; });
+  property("hold", [](const F& f) { return to_string(f.hold); });
   const auto if_compensated = [](const F& f, auto value) {
     return f.compensated == Compensation::none ? py::none() : py::cast(value);
   };
-  property("compensated", [=](const F& f) {
-    return if_compensated(f, kCompensations[static_cast<std::size_t>(f.compensated)]);
-  });
+  property("compensated", [=](const F& f) { return if_compensated(f, to_string(f.compensated)); });
   property("delay_s", [=](const F& f) { return if_compensated(f, f.delay_s); });
   property("noise_dof", [](const F& f) { return unless_zero(f.noise_dof); });
   property("total_dof", [](const F& f) { return unless_zero(f.total_dof); });

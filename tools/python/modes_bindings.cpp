@@ -17,13 +17,9 @@ namespace {
 namespace py = pybind11;
 using py::literals::operator""_a;
 
-CmifKind kind_of(const std::string& name) {
-  return pick<CmifKind>("kind", name, {"response", "accelerance", "whitened"});
-}
-
 py::list modes(const FrfHandle& of, const std::string& kind, double prominence_db) {
   PeakOptions options;
-  options.kind = kind_of(kind);
+  options.kind = pick<CmifKind>("kind", kind);
   options.minimum_prominence_db = prominence_db;
   py::list list;
   for (const ModeCandidate& candidate : pick_modes(of.frf, options))
@@ -54,7 +50,9 @@ void define_modes(py::module_& module) {
              py::arg("prominence_db") = PeakOptions{}.minimum_prominence_db, docstring("modes"));
   module.def(
       "cmif",
-      [](const FrfHandle& of, const std::string& kind) { return cmif(of.frf, kind_of(kind)); },
+      [](const FrfHandle& of, const std::string& kind) {
+        return cmif(of.frf, pick<CmifKind>("kind", kind));
+      },
       py::arg("frf"), py::kw_only(), py::arg("kind") = "response", docstring("cmif"));
   module.def("stabilization", &poles_over_orders, py::arg("frf"), py::kw_only(),
              py::arg("most_order") = StabilizationOptions{}.most_order, py::arg("delay_s") = 0.0,

@@ -34,7 +34,7 @@ Json channels(const ChannelList& list) {
   return out;
 }
 
-const char* to_string(Compensation compensated) {
+const char* removed_by(Compensation compensated) {
   switch (compensated) {
     case Compensation::none:
       return "none";
@@ -44,18 +44,6 @@ const char* to_string(Compensation compensated) {
       return "delay and hold";
   }
   return "none";
-}
-
-const char* to_string(CmifKind kind) {
-  switch (kind) {
-    case CmifKind::response:
-      return "response";
-    case CmifKind::accelerance:
-      return "accelerance";
-    case CmifKind::whitened:
-      return "whitened";
-  }
-  return "response";
 }
 
 /// An array that is already in the page, as decoded by the page.
@@ -172,7 +160,7 @@ Json frf_json(const FrfEstimate& frf) {
           {"experiments", frf.experiments},
           {"sample_rate_hz", frf.sample_rate_hz},
           {"hold", frf.hold == Hold::zoh ? "zero-order hold" : "none"},
-          {"compensated", to_string(frf.compensated)},
+          {"compensated", removed_by(frf.compensated)},
           {"delay_s", frf.delay_s},
           {"deviation", uncertainty(frf).kind},
           {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
@@ -196,7 +184,7 @@ Json model_json(const AdditiveModel& model) {
   }
   return {{"modes", modes},
           {"others", others},
-          {"hold", stageid::to_string(model.hold)},
+          {"hold", to_string(model.hold)},
           {"delay_s",
            {{"inputs", std::vector<double>(model.input_delay_s.begin(), model.input_delay_s.end())},
             {"outputs",
@@ -299,9 +287,8 @@ PageContent page_content(const ReportData& data) {
   Arrays arrays;
   Json json = texts_json(data);
   const Verdict verdict = judge(data);
-  json["verdict"] = {{"level", stageid::to_string(verdict.level)},
-                     {"text", verdict.text},
-                     {"reasons", verdict.reasons}};
+  json["verdict"] = {
+      {"level", to_string(verdict.level)}, {"text", verdict.text}, {"reasons", verdict.reasons}};
   json["title"] = data.title;
   json["version"] = data.version;
   json["decisions"] = data.decisions;

@@ -78,20 +78,6 @@ void judge_runs(const ReportData& data, Reasons& reasons) {
 
 }  // namespace
 
-const char* to_string(Verdict::Level level) noexcept {
-  switch (level) {
-    case Verdict::Level::none:
-      return "none";
-    case Verdict::Level::good:
-      return "good";
-    case Verdict::Level::doubt:
-      return "doubt";
-    case Verdict::Level::bad:
-      return "bad";
-  }
-  return "none";
-}
-
 Verdict judge(const ReportData& data) {
   Verdict verdict;
   bool error = judge_findings(data, verdict.reasons);

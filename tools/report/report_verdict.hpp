@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "tools/report/report.hpp"
 
 namespace stageid {
@@ -20,8 +22,8 @@ struct Verdict {
   std::string text;
   std::vector<std::string> reasons;
 };
-
-const char* to_string(Verdict::Level level) noexcept;
+template <>
+inline constexpr std::array kWords<Verdict::Level> = {"none", "good", "doubt", "bad"};
 
 /// Judges the model by the status of the fit, the held-back data, the health of the runs, the truth if known (3
 /// standard deviations and 1e-4) and the doubts.

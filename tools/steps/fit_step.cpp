@@ -179,11 +179,10 @@ std::vector<std::string> delay_lines(const AdditiveModel& model) {
   }
   std::vector<std::string> lines;
   for (Eigen::Index u = 0; u < inputs.size(); ++u)
-    lines.push_back(
-        line(fmt::format(" of input {}", model.inputs.names[static_cast<std::size_t>(u)]),
-             inputs[u], model.input_delay_std_s, u));
+    lines.push_back(line(fmt::format(" of input {}", model.inputs.name(u)), inputs[u],
+                         model.input_delay_std_s, u));
   for (Eigen::Index y = 0; y < outputs.size(); ++y) {
-    const std::string& name = model.outputs.names[static_cast<std::size_t>(y)];
+    const std::string& name = model.outputs.name(y);
     if (y + 1 == outputs.size() && outputs[y] == 0.0)
       lines.push_back(fmt::format("delay of output {} 0 us, the reference", name));
     else

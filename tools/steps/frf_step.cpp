@@ -36,10 +36,10 @@ Json options_json(const FrfOptions& options) {
   return {{"inputs", options.inputs},
           {"outputs", options.outputs},
           {"transient_periods", options.transient_periods.value_or(-1)},
-          {"method", options.method == FrfMethod::lpm ? "lpm" : "periodic"},
-          {"covariance", options.covariance == CovarianceKind::full ? "full" : "diagonal"},
+          {"method", to_string(options.method)},
+          {"covariance", to_string(options.covariance)},
           {"covariance_lines", options.covariance_lines},
-          {"periods", options.periods == PeriodChoice::consistent ? "consistent" : "unmarked"},
+          {"periods", to_string(options.periods)},
           {"realizations", options.realizations}};
 }
 

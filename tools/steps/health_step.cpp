@@ -23,14 +23,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr Severity kSeverities[] = {Severity::fault, Severity::doubt, Severity::unchecked};
-
 /// The cause is for programs only; stored findings need severity and texts.
 Finding finding_of(const Json& object) {
   Finding finding;
-  for (const Severity severity : kSeverities)
-    if (text_in(object, "severity") == to_string(severity)) finding.severity = severity;
-  if (const auto cause = cause_of(text_in(object, "cause"))) finding.cause = *cause;
+  finding.severity = from_word<Severity>(text_in(object, "severity")).value_or(finding.severity);
+  finding.cause = from_word<Cause>(text_in(object, "cause")).value_or(finding.cause);
   finding.channel = text_in(object, "channel");
   finding.what = text_in(object, "what");
   finding.figure = text_in(object, "figure");

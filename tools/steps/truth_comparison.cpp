@@ -71,9 +71,9 @@ Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const WaferStageSpec& st
         sampled_response(modes, stage.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k]);
     for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
       for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
-        G(i + frf.n_outputs() * j, k) = whole(
-            channel_index(stage.info.sensors, frf.outputs.names[static_cast<std::size_t>(i)]),
-            channel_index(stage.info.actuators, frf.inputs.names[static_cast<std::size_t>(j)]));
+        G(i + frf.n_outputs() * j, k) =
+            whole(channel_index(stage.info.sensors, frf.outputs.name(i)),
+                  channel_index(stage.info.actuators, frf.inputs.name(j)));
   }
   return G;
 }

@@ -91,7 +91,7 @@ class PlayingStage final : public ResidentStage {
             waveforms_.samples(static_cast<Eigen::Index>(n) % period, static_cast<Eigen::Index>(i));
       trace_.insert(trace_.end(), u.begin(), u.end());
       trace_.insert(trace_.end(), y.begin(), y.end());
-      static_cast<void>(plant_.exchange({n, 0, u}, inputs, {}));
+      static_cast<void>(plant_.exchange({n, u}, inputs, {}));
     }
     plant_.stop();
   }

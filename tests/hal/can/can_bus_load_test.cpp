@@ -86,11 +86,5 @@ TEST(CanBusLoad, EveryBusCarriesItsOwnOnly) {
   EXPECT_DOUBLE_EQ(loads[1].load, 1e3 * loads[1].cycle_s) << "heartbeats are on the first bus";
 }
 
-TEST(CanBusLoad, TransferTime) {
-  const StageInfo info = test::silent_wafer_stage_spec().info;
-  // 10^6 chunks of 56 bytes in frames of 64: 169.6 us each, at 80 %.
-  EXPECT_NEAR(can_transfer_time_s(wafer_spec(info, 5e6), 56e6), 169.6 / 0.8, 1e-9);
-}
-
 }  // namespace test_can_bus_load
 }  // namespace stageid

@@ -88,7 +88,7 @@ Samples measure(CanStage& stage, int count) {
   inputs.y = y;
   stage.start(7, inputs);
   for (int n = 0; n < count; ++n) {
-    const Outputs outputs{static_cast<std::uint64_t>(n), inputs.t_sample_ns, u};
+    const Outputs outputs{static_cast<std::uint64_t>(n), u};
     inputs.stamp_ns = inputs.t_arrival_ns = 0;
     samples.outcomes.push_back(
         stage.exchange(outputs, inputs, {inputs.t_sample_ns + 2 * std::llround(kPeriod_ns)}));
@@ -127,7 +127,7 @@ TEST(CanClock, TheNodesTimeGoesOnOverItsSixteenBits) {
   host->start(7, inputs);
   std::int64_t last = 0;
   for (std::uint64_t n = 0; n < 20; ++n) {
-    ASSERT_EQ(host->exchange({n, 0, u}, inputs, {inputs.t_sample_ns + 100'000'000}), Outcome::ok);
+    ASSERT_EQ(host->exchange({n, u}, inputs, {inputs.t_sample_ns + 100'000'000}), Outcome::ok);
     if (n > 0) {
       EXPECT_NEAR(static_cast<double>(inputs.stamp_ns - last), 40e6, 2e3) << n;
     }

@@ -44,7 +44,7 @@ TEST(CanFlood, AFrozenNodeIsNoticedInTime) {
   flooded = true;
   const std::int64_t before_ns = rig.pair().now_ns();
   const std::vector<double> u(2);
-  EXPECT_EQ(stage.exchange({0, 0, u}, inputs, {}), Outcome::stale);
+  EXPECT_EQ(stage.exchange({0, u}, inputs, {}), Outcome::stale);
   EXPECT_LE(rig.pair().now_ns() - before_ns, 4 * 5'100'000) << "four times reply_timeout_s";
   stage.stop();  // must return too
 }

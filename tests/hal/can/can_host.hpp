@@ -19,7 +19,7 @@ class CanHost {
   Outcome exchange() {
     const double u = command(cycle_);
     const std::vector<double> both{u, -0.5 * u};
-    const Outcome outcome = stage_->exchange({cycle_++, 0, both}, inputs_, {});
+    const Outcome outcome = stage_->exchange({cycle_++, both}, inputs_, {});
     // Ignored: a run on the wall clock may be late on a busy machine.
     return outcome == Outcome::late ? Outcome::ok : outcome;
   }

@@ -112,7 +112,7 @@ std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed
     // The waveform is transferred as float32.
     u[1] += static_cast<double>(static_cast<float>(w.samples(static_cast<int>(n % kPeriod), 1)));
     rows.insert(rows.end(), {u[0], u[1], y[0]});
-    EXPECT_EQ(stage.exchange({n, 0, u}, inputs, {}), Outcome::ok);
+    EXPECT_EQ(stage.exchange({n, u}, inputs, {}), Outcome::ok);
   }
   return rows;
 }

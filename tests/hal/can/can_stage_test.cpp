@@ -38,7 +38,7 @@ TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
       ASSERT_NEAR(again.y()[0], y[0], 0.5001 * 1.25e-3 / kCanCountsOfRange) << n;
       const std::vector<double> u{Host::command(n), -0.5 * Host::command(n)};
       ASSERT_EQ(again.exchange(), Outcome::ok);
-      ASSERT_EQ(bare.exchange({n, 0, u}, inputs, {}), Outcome::ok);
+      ASSERT_EQ(bare.exchange({n, u}, inputs, {}), Outcome::ok);
     }
     again.stage().stop();
     EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
@@ -280,9 +280,9 @@ TEST(CanStage, WhatIsNoNumberReachesNoFrame) {
   inputs.y = y;
   stage->start(1, inputs);
   const std::vector<double> u{std::numeric_limits<double>::quiet_NaN(), 0.0};
-  EXPECT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(stage->exchange({0, u}, inputs, {}), Outcome::fault);
   EXPECT_EQ(rig.node().sample(), 0U);
-  EXPECT_EQ(stage->exchange({0, 0, {}}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(stage->exchange({0, {}}, inputs, {}), Outcome::fault);
 }
 
 TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
@@ -293,7 +293,7 @@ TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
   inputs.y = y;
   stage->start(1, inputs);
   const std::vector<double> large{100.0, 0.0};
-  EXPECT_EQ(stage->exchange({0, 0, large}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(stage->exchange({0, large}, inputs, {}), Outcome::fault);
   EXPECT_EQ(stage->counts().saturated, 1U);
   EXPECT_EQ(rig.node().sample(), 0U) << "no other value instead";
   EXPECT_THAT(stage->trouble(), testing::HasSubstr("exceeds actuator_range_n"));

@@ -227,7 +227,7 @@ TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
   host.start(1, inputs);
   line.now = &restarted;
   const std::vector<double> u(2, 1.0);
-  EXPECT_EQ(host.exchange({0, 0, u}, inputs, {}), Outcome::fault);
+  EXPECT_EQ(host.exchange({0, u}, inputs, {}), Outcome::fault);
   EXPECT_THAT(host.trouble(), HasSubstr("the node was restarted"));
 }
 
@@ -256,7 +256,7 @@ TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
       }
       second.stop();
     }
-    ASSERT_EQ(first.exchange({n, 0, u}, inputs, {}), Outcome::ok) << n << first.trouble();
+    ASSERT_EQ(first.exchange({n, u}, inputs, {}), Outcome::ok) << n << first.trouble();
   }
   first.stop();
   EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);

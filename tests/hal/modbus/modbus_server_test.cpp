@@ -141,7 +141,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   owner.start(1, inputs);
   std::uint64_t cycle = 0;
   const std::vector<double> u(2, 0.5);
-  const auto exchange = [&] { return owner.exchange({cycle++, 0, u}, inputs, {}); };
+  const auto exchange = [&] { return owner.exchange({cycle++, u}, inputs, {}); };
   ASSERT_EQ(exchange(), Outcome::ok);
 
   Clients clients;

@@ -28,7 +28,7 @@ class Host {
   void start(std::uint64_t seed = 1) { stage.start(seed, inputs); }
   Outcome exchange(double u0, double u1 = 0.0) {
     const std::array<double, 2> u = {u0, u1};
-    return stage.exchange({cycle++, 0, u}, inputs, {});
+    return stage.exchange({cycle++, u}, inputs, {});
   }
 
   ModbusStage stage;
@@ -119,7 +119,7 @@ TEST(ModbusStage, TheArrivalOfAReplyIsStampedOnTheWallClock) {
   const std::array<double, 2> u = {0.0, 0.0};
   for (std::uint64_t n = 0; n < 2; ++n) {
     const std::int64_t sent_ns = inputs.t_sample_ns;
-    static_cast<void>(stage.exchange({n, sent_ns, u}, inputs, {}));
+    static_cast<void>(stage.exchange({n, u}, inputs, {}));
     EXPECT_EQ(inputs.stamp_ns, inputs.t_arrival_ns);
     EXPECT_FALSE(inputs.stamp_of_stage);
     EXPECT_GE(inputs.t_arrival_ns - sent_ns, n == 1 ? 10'000'000 : 0) << "half a period late";

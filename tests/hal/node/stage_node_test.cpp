@@ -302,7 +302,7 @@ TEST(StageNode, GivesTheSamplesOfTheStageItself) {
     for (std::uint64_t n = 0; n < 50; ++n) {
       const std::vector<double> u{std::sin(0.1 * static_cast<double>(n)), 0.2};
       ASSERT_EQ(node.advance(0, u, of_node), Outcome::ok);
-      ASSERT_EQ(bare.exchange({n, 0, u}, of_bare, {}), Outcome::ok);
+      ASSERT_EQ(bare.exchange({n, u}, of_bare, {}), Outcome::ok);
       ASSERT_EQ(y_node, y_bare) << n;
     }
     node.end_run();

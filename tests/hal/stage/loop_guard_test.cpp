@@ -33,7 +33,7 @@ class GuardedLoop {
   Outcome step(double push_n = 0.0) {
     controller_.update(y_.data(), u_.data());
     for (double& u : u_) u += push_n;
-    return stage->exchange({inputs_.cycle, 0, u_}, inputs_, {});
+    return stage->exchange({inputs_.cycle, u_}, inputs_, {});
   }
   /// Runs until the outcome is not ok, for at most this number of samples.
   Outcome steps(int samples, double push_n = 0.0) {

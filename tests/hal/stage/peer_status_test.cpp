@@ -151,13 +151,13 @@ TEST_P(CanPeer, HasTheReactionOfTheTable) {
   stage.start(1, inputs);
   const std::vector<double> u(2, 0.1);
   const auto exchange = [&](std::uint64_t cycle) {
-    const Outcome outcome = stage.exchange({cycle, 0, u}, inputs, {});
+    const Outcome outcome = stage.exchange({cycle, u}, inputs, {});
     rig.pair().pass_time(1'000'000);
     return outcome == Outcome::late ? Outcome::ok : outcome;  // of a busy machine
   };
   for (std::uint64_t cycle = 0; cycle < 2; ++cycle) ASSERT_EQ(exchange(cycle), Outcome::ok);
   say = true;
-  const Outcome outcome = stage.exchange({2, 0, u}, inputs, {});
+  const Outcome outcome = stage.exchange({2, u}, inputs, {});
   say = false;
   EXPECT_EQ(outcome, wanted.outcome) << stage.trouble();
   if (wanted.reaction == PeerReaction::mark) {
@@ -293,15 +293,15 @@ TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
   }
   stage->start(1, inputs);
   const std::vector<double> u(2, 0.1);
-  ASSERT_EQ(stage->exchange({0, 0, u}, inputs, {}), Outcome::ok);
+  ASSERT_EQ(stage->exchange({0, u}, inputs, {}), Outcome::ok);
   lying.say = row.say;
-  EXPECT_EQ(stage->exchange({1, 0, u}, inputs, {}), wanted.outcome) << stage->trouble();
+  EXPECT_EQ(stage->exchange({1, u}, inputs, {}), wanted.outcome) << stage->trouble();
   const std::string trouble = stage->trouble();
   EXPECT_THAT(trouble, testing::Not(testing::IsEmpty()));
   if (wanted.outcome != Outcome::limit) return;
   // The excitation is ramped down; the node may be good again meanwhile.
   lying.say = nullptr;
-  EXPECT_EQ(stage->exchange({2, 0, u}, inputs, {}), Outcome::ok);
+  EXPECT_EQ(stage->exchange({2, u}, inputs, {}), Outcome::ok);
   EXPECT_EQ(stage->trouble(), trouble);
 }
 

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace stageid {
 namespace test_stage {
@@ -24,6 +28,19 @@ TEST(NodeState, HasANameOfItsOwn) {
   EXPECT_EQ(names.size(), 9U);
   EXPECT_EQ(names.count("unknown state"), 0U);
   EXPECT_STREQ(to_string(static_cast<NodeState>(200)), "unknown state");
+}
+
+TEST(Stage, ValuesAreFiniteIfAllAre) {
+  const double infinite = std::numeric_limits<double>::infinity();
+  std::vector<double> values = {1e308, -1e308, 0.0, -0.0, 5e-324};
+  EXPECT_TRUE(all_finite({}));
+  EXPECT_TRUE(all_finite(values));
+  for (const double bad : {infinite, -infinite, std::nan("")})
+    for (double& value : values) {
+      const double good = std::exchange(value, bad);
+      EXPECT_FALSE(all_finite(values)) << bad;
+      value = good;
+    }
 }
 
 }  // namespace test_stage

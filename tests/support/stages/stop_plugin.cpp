@@ -62,8 +62,8 @@ int exchange(void* stage, uint64_t cycle, const double* u, int64_t deadline_ns,
              stageid_sample* next) {
   Inputs inputs;
   inputs.y = {next->y, of(stage).sensors};
-  const int code = code_of(
-      of(stage).stage->exchange({cycle, 0, {u, of(stage).actuators}}, inputs, {deadline_ns}));
+  const int code =
+      code_of(of(stage).stage->exchange({cycle, {u, of(stage).actuators}}, inputs, {deadline_ns}));
   give(inputs, *next);
   return code;
 }

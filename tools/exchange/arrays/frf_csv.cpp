@@ -48,27 +48,23 @@ std::string head_of(const FrfEstimate& frf) {
   return text;
 }
 
-const char* const kHolds[] = {"none", "zoh"};
-const char* const kCompensations[] = {"none", "delay", "hold"};
-
 /// Properties that are not in the columns, so that the table can be read without a map.
 std::string description_of(const FrfEstimate& frf) {
-  const nlohmann::ordered_json json = {
-      {"format", "stageid-frf"},
-      {"outputs", frf.outputs.names},
-      {"output_units", frf.outputs.units},
-      {"inputs", frf.inputs.names},
-      {"input_units", frf.inputs.units},
-      {"sample_rate_hz", frf.sample_rate_hz},
-      {"hold", kHolds[static_cast<int>(frf.hold)]},
-      {"compensated", kCompensations[static_cast<int>(frf.compensated)]},
-      {"delay_s", frf.delay_s},
-      {"realizations", frf.realizations},
-      {"periods", frf.periods},
-      {"experiments", frf.experiments},
-      {"noise_dof", frf.noise_dof},
-      {"total_dof", frf.total_dof},
-      {"correlated_lines", frf.correlated_lines}};
+  const nlohmann::ordered_json json = {{"format", "stageid-frf"},
+                                       {"outputs", frf.outputs.names},
+                                       {"output_units", frf.outputs.units},
+                                       {"inputs", frf.inputs.names},
+                                       {"input_units", frf.inputs.units},
+                                       {"sample_rate_hz", frf.sample_rate_hz},
+                                       {"hold", to_string(frf.hold)},
+                                       {"compensated", to_string(frf.compensated)},
+                                       {"delay_s", frf.delay_s},
+                                       {"realizations", frf.realizations},
+                                       {"periods", frf.periods},
+                                       {"experiments", frf.experiments},
+                                       {"noise_dof", frf.noise_dof},
+                                       {"total_dof", frf.total_dof},
+                                       {"correlated_lines", frf.correlated_lines}};
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
@@ -79,8 +75,7 @@ constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
 bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   const auto add = [](ChannelList& list, const std::string& name, const std::string& unit) {
     const auto found = std::find(list.names.begin(), list.names.end(), name);
-    if (found != list.names.end())
-      return list.units[static_cast<std::size_t>(found - list.names.begin())] == unit;
+    if (found != list.names.end()) return list.unit(found - list.names.begin()) == unit;
     list.names.push_back(name);
     list.units.push_back(unit);
     return true;
@@ -120,10 +115,9 @@ void read_description(const nlohmann::json& json, FrfEstimate& frf) {
   take(json, "noise_dof", frf.noise_dof);
   take(json, "total_dof", frf.total_dof);
   take(json, "correlated_lines", frf.correlated_lines);
-  const std::string hold = json.value("hold", "none"), taken = json.value("compensated", "none");
-  frf.hold = hold == "zoh" ? Hold::zoh : Hold::none;
-  for (int k = 0; k < 3; ++k)
-    if (taken == kCompensations[k]) frf.compensated = static_cast<Compensation>(k);
+  frf.hold = from_word<Hold>(json.value("hold", "")).value_or(Hold::none);
+  frf.compensated =
+      from_word<Compensation>(json.value("compensated", "")).value_or(Compensation::none);
 }
 
 /// The comment that describes the table; empty if there is none.

@@ -219,7 +219,7 @@ FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map) {
   frf.outputs.units = units_of(map, "output_unit", map.output_unit, frf.outputs.size());
   frf.inputs.units = units_of(map, "input_unit", map.input_unit, frf.inputs.size());
   frf.sample_rate_hz = map.sample_rate_hz;
-  frf.hold = map.hold == ImportMap::FrfHold::zoh ? Hold::zoh : Hold::none;
+  frf.hold = map.hold;
   try {
     check(frf);
   } catch (const std::invalid_argument& error) {

@@ -97,8 +97,7 @@ void describe_frf(ConfigVisitor& v, ImportMap& map) {
   describe_scalar(v, "first_hz", map.first_hz,
                   "first frequency of an equidistant axis, or the variable that contains it");
   describe_scalar(v, "step_hz", map.step_hz, "frequency step, or the variable that contains it");
-  choose(v, "frequency_unit", map.frequency_unit, {"Hz", "rad/s"}, kOptional,
-         "unit of the frequencies");
+  choose(v, "frequency_unit", map.frequency_unit, kOptional, "unit of the frequencies");
   v.text("response", map.response, kOptional, "array of the response, complex or its real part");
   v.text("response_imaginary", map.response_imaginary, kOptional, "array of its imaginary part");
   v.texts("axes", map.axes, {3, 3}, kOptional,
@@ -109,7 +108,7 @@ void describe_frf(ConfigVisitor& v, ImportMap& map) {
   v.texts("outputs", map.outputs, {1}, kOptional, "names");
   v.text("input_unit", map.input_unit, kOptional, "one, or one per input separated by blanks");
   v.text("output_unit", map.output_unit, kOptional, "one, or one per output separated by blanks");
-  choose(v, "hold", map.hold, {"none", "zoh"}, kOptional,
+  choose(v, "hold", map.hold, kOptional,
          "zoh: measured through a zero-order hold, as in a digital loop");
   v.items(
       "channels",
@@ -124,7 +123,7 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
   group(v, "excitation", describe_signals, map.excitation, kOptional, "signals added in the loop");
   group(v, "actuators", describe_signals, map.actuators, kOptional, "inputs of the plant");
   group(v, "sensors", describe_signals, map.sensors, kOptional, "outputs of the plant");
-  choose(v, "excitation_period", map.excitation_period, {"repeats", "mean"}, kOptional,
+  choose(v, "excitation_period", map.excitation_period, kOptional,
          "mean: the excitation was measured; use the mean of its periods after the transient");
   v.items(
       "runs",
@@ -186,13 +185,13 @@ ImportMap read_import_map(const std::filesystem::path& file) {
   map.file = file;
   const YamlDocument document = YamlDocument::read(file);
   read_config(document, [&map](ConfigVisitor& v) {
-    choose(v, "kind", map.kind, {"frf", "log"}, Presence::required, "content of the file");
+    choose(v, "kind", map.kind, Presence::required, "content of the file");
     v.text("files", map.files, kOptional,
            "pattern of the files of a log, such as run_{realization}_{experiment}.mat, relative to "
            "this map");
     v.number("sample_rate_hz", map.sample_rate_hz, {"Hz", 0.0}, kOptional,
              "0: unknown; a log uses that of the file");
-    choose(v, "file_sample_rate", map.file_sample_rate, {"checked", "ignored"}, kOptional,
+    choose(v, "file_sample_rate", map.file_sample_rate, kOptional,
            "ignored: the file's own sample rate or time axis is known to be wrong");
     describe_frf(v, map);
     describe_log(v, map);

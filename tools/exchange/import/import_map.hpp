@@ -1,10 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "excitation/words/words.hpp"
+#include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
 
@@ -14,7 +18,6 @@ namespace stageid {
 struct ImportMap {
   enum class Kind : std::uint8_t { frf, log };
   enum class FrequencyUnit : std::uint8_t { hz, rad_s };
-  enum class FrfHold : std::uint8_t { none, zoh };
   enum class FileSampleRate : std::uint8_t { checked, ignored };
   enum class ExcitationPeriod : std::uint8_t { repeats, mean };
 
@@ -54,7 +57,7 @@ struct ImportMap {
   std::string frequency;
   Scalar first_hz, step_hz;  ///< instead of `frequency`
   FrequencyUnit frequency_unit = FrequencyUnit::hz;
-  FrfHold hold = FrfHold::none;
+  Hold hold = Hold::none;
   std::string response, response_imaginary, noise_variance, total_variance;
   std::vector<std::string> axes;
   std::vector<std::string> inputs, outputs;
@@ -66,6 +69,14 @@ struct ImportMap {
   ExcitationPeriod excitation_period = ExcitationPeriod::repeats;
   std::vector<Run> runs;
 };
+template <>
+inline constexpr std::array kWords<ImportMap::Kind> = {"frf", "log"};
+template <>
+inline constexpr std::array kWords<ImportMap::FrequencyUnit> = {"Hz", "rad/s"};
+template <>
+inline constexpr std::array kWords<ImportMap::FileSampleRate> = {"checked", "ignored"};
+template <>
+inline constexpr std::array kWords<ImportMap::ExcitationPeriod> = {"repeats", "mean"};
 
 /// The units of `count` channels from the text of a map: one for all, or one per channel, separated by blanks; empty:
 /// 1.

@@ -130,7 +130,7 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
   out.lines.push_back(fmt::format(
       "{}, {:.6g} to {:.6g} Hz; sample rate {}, hold {}", counted(frf.lines(), "line"), first, last,
       frf.sample_rate_hz > 0.0 ? fmt::format("{} Hz", frf.sample_rate_hz) : std::string("unknown"),
-      frf.hold == Hold::zoh ? "zoh" : "none"));
+      to_string(frf.hold)));
   out.lines.push_back(fmt::format("outputs {}; inputs {}", named(frf.outputs), named(frf.inputs)));
   const bool noise = frf.noise_variance.size() > 0;
   const bool total = frf.total_variance.size() > 0;
@@ -141,15 +141,14 @@ ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>&
   const Eigen::VectorXd rms = frf.response.cwiseAbs2().rowwise().mean().cwiseSqrt();
   Json channels = Json::array();
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
-    channels.push_back(
-        {{"output", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())]},
-         {"input", frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]},
-         {"rms", rms[c]}});
+    channels.push_back({{"output", frf.outputs.name(c % frf.n_outputs())},
+                        {"input", frf.inputs.name(c / frf.n_outputs())},
+                        {"rms", rms[c]}});
   out.json = {{"kind", "frf"},
               {"lines", frf.lines()},
               {"band_hz", {first, last}},
               {"sample_rate_hz", frf.sample_rate_hz},
-              {"hold", frf.hold == Hold::zoh ? "zoh" : "none"},
+              {"hold", to_string(frf.hold)},
               {"outputs", frf.outputs.names},
               {"output_units", frf.outputs.units},
               {"inputs", frf.inputs.names},

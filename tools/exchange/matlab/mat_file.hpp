@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 
+#include "excitation/words/words.hpp"
 #include "tools/exchange/arrays/named_array.hpp"
 
 namespace stageid {
@@ -12,6 +14,8 @@ enum class MatVersion : std::uint8_t {
   v5,  ///< readable by every program; at most 2 GiB per variable
   v73  ///< based on HDF5
 };
+template <>
+inline constexpr std::array kWords<MatVersion> = {"5", "7.3"};
 
 /// Writes a MATLAB file atomically; equal content gives equal bytes (v5). Lists of arrays are written immediately and
 /// need not be kept.

@@ -42,10 +42,8 @@ std::string model_csv(const AdditiveModel& model) {
     for (std::size_t power = 0; power < s.numerator.size(); ++power)
       for (Eigen::Index i = 0; i < model.n_outputs(); ++i)
         for (Eigen::Index j = 0; j < model.n_inputs(); ++j)
-          text += fmt::format("{},{},{},{},{}\n", head, power,
-                              csv_field(model.outputs.names[static_cast<std::size_t>(i)]),
-                              csv_field(model.inputs.names[static_cast<std::size_t>(j)]),
-                              s.numerator[power](i, j));
+          text += fmt::format("{},{},{},{},{}\n", head, power, csv_field(model.outputs.name(i)),
+                              csv_field(model.inputs.name(j)), s.numerator[power](i, j));
   }
   return text;
 }

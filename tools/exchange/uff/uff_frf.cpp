@@ -104,8 +104,6 @@ UffFunction frequency_function(const FrfEstimate& frf) {
   return f;
 }
 
-const char* const kCompensations[] = {"none", "delay", "hold"};
-
 // Reading -----------------------------------------------------------------------------------------
 
 std::string name_of(const UffFunction& f, const UffPoint& point, std::size_t id_line,
@@ -214,9 +212,8 @@ void read_settings(const std::string& description, FrfEstimate& frf) {
   std::string title, hold, compensated, rate, delay;
   words >> title >> hold >> compensated >> rate >> delay;
   if (title != kSettings) return;
-  frf.hold = hold == "zoh" ? Hold::zoh : Hold::none;
-  for (int k = 0; k < 3; ++k)
-    if (compensated == kCompensations[k]) frf.compensated = static_cast<Compensation>(k);
+  frf.hold = from_word<Hold>(hold).value_or(Hold::none);
+  frf.compensated = from_word<Compensation>(compensated).value_or(Compensation::none);
   frf.sample_rate_hz = parse_number(rate).value_or(0.0);
   frf.delay_s = parse_number(delay).value_or(0.0);
 }
@@ -296,9 +293,8 @@ int uff_direction(const std::string& name) {
 UffContent uff_of_frf(const FrfEstimate& frf) {
   UffContent content;
   content.model_name = "stageid frequency response";
-  content.description = fmt::format(
-      "{} {} {} {} {}", kSettings, frf.hold == Hold::zoh ? "zoh" : "none",
-      kCompensations[static_cast<int>(frf.compensated)], frf.sample_rate_hz, frf.delay_s);
+  content.description = fmt::format("{} {} {} {} {}", kSettings, to_string(frf.hold),
+                                    to_string(frf.compensated), frf.sample_rate_hz, frf.delay_s);
   content.program = fmt::format("stageid {}", version());
   content.units = UffUnits{};
   for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
