@@ -186,7 +186,7 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
     }
   }
   LineScatter lines = line_scatter(frf, threads);
-  if (lines.variance.size() == 0 || lines_are_coarse(frf, lines, threads)) return verdict;
+  if (!lines.shows_distortion() || lines_are_coarse(frf, lines, threads)) return verdict;
   ResidualVerdict scatter = judge_with(ResidualVariance::scatter, lines.variance, lines.dof);
   if (!scatter.explained) return verdict;
   scatter.scatter = std::move(lines.variance);

@@ -45,8 +45,8 @@ using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Ei
 /// its mean t exceeds 1 beyond chance. Parts are all data, every output, every input, and runs of neighbouring lines.
 /// Channels of a line count as fully correlated: a part has as many independent numbers as lines.
 /// The noise variance is compared first. If it does not explain the residual, the total variance is compared, or for
-/// one realization the scatter of the lines: they contain the distortion of a nonlinear plant. The figures refer to
-/// the variance that explains the residual, else to the noise.
+/// one realization the scatter of the lines, if most of them scatter by more than their noise: they contain the
+/// distortion of a nonlinear plant. The figures refer to the variance that explains the residual, else to the noise.
 /// Source: the tail of F(2, 2 nu) is (1 + x/nu)^-nu; minus its logarithm is exponential for any continuous
 /// distribution.
 /// @param known distortion of one realization, from the fit of the model; used if there is no total variance

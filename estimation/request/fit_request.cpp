@@ -22,9 +22,6 @@
 namespace stageid {
 namespace {
 
-// The median of a linear plant is 1 within a few percent, more if modes are narrow relative to the line spacing.
-constexpr double kDistorted = 2.0;
-
 /// Note on channels whose weight is zero on all lines; empty if there are none.
 std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& options) {
   const Eigen::MatrixXd& W = options.user_weights;
@@ -176,7 +173,7 @@ class FitDefaults {
     FrfEstimate& frf = setup_.frf;
     if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
     LineScatter scatter = line_scatter(frf, request_.threads);
-    if (!(scatter.over_noise > kDistorted)) return false;
+    if (!scatter.shows_distortion()) return false;
     if (lines_are_coarse(frf, scatter, request_.threads)) {
       setup_.warnings.push_back(
           "weighting by period-to-period variance. The line-to-line scatter is larger, but the "

@@ -14,6 +14,10 @@ struct LineScatter {
   double dof = 0.0;  ///< complex degrees of freedom of each
   /// Median of variance / noise_variance over channels and lines, 1 for a linear plant; 0: the noise is unknown.
   double over_noise = 0.0;
+
+  /// Whether most lines scatter by clearly more than their noise: the median of a linear plant is 1 within a few percent,
+  /// more if modes are narrow. The scatter of some lines may be that of resonances narrower than their spacing.
+  bool shows_distortion() const noexcept { return over_noise > 2.0; }
 };
 
 /// The scatter around a local rational function of twelve neighbouring lines, see fit_locally().

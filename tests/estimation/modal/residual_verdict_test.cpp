@@ -113,6 +113,18 @@ TEST(ResidualVerdict, DistortionOfOneRealizationIsTheScatterOfItsLines) {
   EXPECT_FALSE(judge_by(330.0).explained);
 }
 
+// Resonances narrower than the line spacing scatter the lines of one part of the band, as distortion would.
+TEST(ResidualVerdict, ResonancesThatAModelMissesAreNoDistortion) {
+  FrfEstimate frf = noise(19, 600, 50);
+  frf.response.array() += 300.0;
+  for (Eigen::Index k = 40; k < 90; k += 3) frf.response.col(k) *= 3.0;
+  const ResidualVerdict verdict = judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
+    return Eigen::MatrixXcd::Constant(frf.response.rows(), count, 300.0).eval();
+  });
+  EXPECT_FALSE(verdict.explained);
+  EXPECT_EQ(verdict.variance, ResidualVariance::noise);
+}
+
 TEST(ResidualVerdict, WithoutVariancesOrWeightsNothingIsJudged) {
   FrfEstimate frf = noise(17, 100, 0);
   frf.response *= 100.0;
