@@ -81,6 +81,22 @@ TEST(StepSearch, FindsStepAndRoundingOfEachActuator) {
   }
 }
 
+// With commands of a few steps, the spectrum of one actuator has several peaks.
+TEST(StepSearch, EqualConvertersAreFoundEqual) {
+  const double rms = command_rms();
+  int found = 0;
+  for (const double step : {0.6, 0.9, 1.2})
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      const MemoryLog log = test::simulate_sampled_log(stepped_plant(step * rms, step * rms),
+                                                       experiment(seed), 1e-4 * rms);
+      for (const ActuatorStep& one : steps_in(log)) {
+        EXPECT_NEAR(one.step / rms, step, 0.01 * step) << "seed " << seed;
+        ++found;
+      }
+    }
+  EXPECT_GT(found, 30);
+}
+
 // The idle actuator of an experiment moves by less than a step: its command is recorded, its force is zero.
 TEST(StepSearch, TheResponseIsThatOfThePlant) {
   const double rms = command_rms();
