@@ -240,9 +240,7 @@ class AutomaticFit {
     return search_start(frf_, structure_, options_, best_.model, modes);
   }
 
-  int affordable_modes() const {
-    return static_cast<int>(most_modes(frf_, structure_));
-  }
+  int affordable_modes() const { return static_cast<int>(most_modes(frf_, structure_)); }
 
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
