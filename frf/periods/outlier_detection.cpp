@@ -17,7 +17,6 @@ namespace {
 using Eigen::Index;
 using Periods = std::vector<Index>;
 
-constexpr Index kFewestLines = 8;
 constexpr double kRounding = 1e-26;  // of the largest line's power: scatter without noise
 constexpr Index kFewestPositions = 4;
 
@@ -286,7 +285,7 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
 std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods) {
   const std::size_t P = periods.spectra.size();
   if (P < 3) return {};
-  const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLines);
+  const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLinesOfBand);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
     for (const Candidate& candidate : candidates(periods, c, bands))

@@ -321,6 +321,7 @@ ActuatorStep StepSearch::with_own_rounding(ActuatorStep step, const Tested& t) {
 /// a few steps, a spectrum has several peaks.
 void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& members,
                                         std::vector<ActuatorStep>& found) {
+  if (members.empty()) return;
   const Eigen::MatrixXd spectra = spectra_of(members);
   Members others;
   for (std::size_t m = 0; m < members.size(); ++m) {

@@ -9,7 +9,6 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kLines = 8;  // per band, and degrees of freedom of the expectation
 constexpr int kPasses = 5;  // of the weights: alpha changes by less than a percent afterwards
 
 /// Mean over the inputs of |G|^2, n_y x N.
@@ -38,11 +37,11 @@ double relative_distortion(const Eigen::ArrayXd& total, const Eigen::ArrayXd& no
 }  // namespace
 
 DistortionVariance distortion_variance(const FrfEstimate& frf) {
-  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kLines);
+  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLinesOfBand);
   DistortionVariance out;
   out.variance.resize(frf.response.rows(), frf.lines());
   const Eigen::MatrixXd row = row_power(frf);
-  const double prior_dof = static_cast<double>(kLines);
+  const auto prior_dof = static_cast<double>(kFewestLinesOfBand);  // of the expectation
   out.dof = frf.total_dof + prior_dof;
   const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
   out.distortion.band_hz.resize(bands, 2);

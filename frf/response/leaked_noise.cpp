@@ -42,6 +42,25 @@ void scale(FrfEstimate& frf, Index i, Index k, double factor) {
   }
 }
 
+/// total / noise of one output on some lines.
+struct MeanRatio {
+  double mean = 0.0;
+  double count = 0.0;  ///< lines and inputs with noise
+};
+
+MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outputs, Index first,
+                     Index end) {
+  MeanRatio ratio;
+  for (Index k = first; k < end; ++k)
+    for (Index c = output; c < scatter.total.rows(); c += outputs) {
+      if (!(scatter.noise(c, k) > 0.0)) continue;
+      ratio.mean += scatter.total(c, k) / scatter.noise(c, k);
+      ratio.count += 1.0;
+    }
+  if (ratio.count > 0.0) ratio.mean /= ratio.count;
+  return ratio;
+}
+
 }  // namespace
 
 void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
@@ -49,25 +68,17 @@ void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
   const Index n_y = frf.n_outputs();
   const std::vector<Index> limits =
       octave_bands(frf.frequency_hz, std::max(kFewestLinesOfBand, kFewestRatios / frf.n_inputs()));
-  const double a = frf.total_dof;
-  const double b = scatter.noise_dof;
+  const double expected = mean_of_f(scatter.noise_dof);
+  const double variance = variance_of_f(frf.total_dof, scatter.noise_dof);
   const double tests = static_cast<double>(n_y) * static_cast<double>(limits.size() - 1);
   for (std::size_t band = 0; band + 1 < limits.size(); ++band)
     for (Index i = 0; i < n_y; ++i) {
-      double sum = 0.0;
-      double count = 0.0;
-      for (Index k = limits[band]; k < limits[band + 1]; ++k)
-        for (Index c = i; c < scatter.total.rows(); c += n_y) {
-          if (!(scatter.noise(c, k) > 0.0)) continue;
-          sum += scatter.total(c, k) / scatter.noise(c, k);
-          count += 1.0;
-        }
-      if (count == 0.0) continue;
-      const double ratio = sum / count;
-      const double below = (mean_of_f(b) - ratio) / std::sqrt(variance_of_f(a, b) / count);
+      const MeanRatio ratio = mean_ratio(scatter, i, n_y, limits[band], limits[band + 1]);
+      if (ratio.count == 0.0) continue;
+      const double below = (expected - ratio.mean) / std::sqrt(variance / ratio.count);
       if (tail_of_normal(below) * tests >= kByChance) continue;
-      for (Index k = limits[band]; k < limits[band + 1]; ++k)
-        scale(frf, i, k, std::max(kLeast, ratio / mean_of_f(b)));
+      const double factor = std::max(kLeast, ratio.mean / expected);
+      for (Index k = limits[band]; k < limits[band + 1]; ++k) scale(frf, i, k, factor);
     }
 }
 

@@ -17,7 +17,8 @@ struct LineScatter {
 
   /// Whether most lines scatter by clearly more than their noise: the median of a linear plant is 1 within a few percent,
   /// more if modes are narrow. The scatter of some lines may be that of resonances narrower than their spacing.
-  bool shows_distortion() const noexcept { return over_noise > 2.0; }
+  bool shows_distortion() const noexcept { return over_noise > kDistorted; }
+  static constexpr double kDistorted = 2.0;
 };
 
 /// The scatter around a local rational function of twelve neighbouring lines, see fit_locally().

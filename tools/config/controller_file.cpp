@@ -1,11 +1,10 @@
 #include "tools/config/controller_file.hpp"
-#include "excitation/words/words.hpp"
 
 #include <fmt/format.h>
-#include <array>
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <memory>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
+#include "excitation/words/words.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/config_reader.hpp"
 #include "tools/config/controller_keys.hpp"

@@ -52,6 +52,12 @@ void change(MemoryLog& log, int realization, const std::function<void(LogSamples
     if (log.log_runs[run].realization == realization) by(log.records[run]);
 }
 
+/// Records channel c `by` samples late.
+void late(Eigen::MatrixXd& samples, Eigen::Index c, Eigen::Index by = 1) {
+  const Eigen::VectorXd before = samples.col(c);
+  samples.col(c).tail(before.size() - by) = before.head(before.size() - by);
+}
+
 std::vector<Finding> told(const MemoryLog& log) {
   return test::told(check_health(estimate_plant_frf_and_health({&log}).health, std::nullopt));
 }
@@ -96,17 +102,13 @@ TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
     const char* channel;
     double value;  // factor or us; 0: none
   };
-  const auto late = [](Eigen::MatrixXd& samples, Eigen::Index c) {
-    const Eigen::VectorXd before = samples.col(c);
-    samples.col(c).tail(before.size() - 1) = before.head(before.size() - 1);
-  };
   const std::vector<Fault> faults = {
       {[](LogSamples& s) { s.sensors.col(1) *= 1.05; }, Cause::scale, "z2", 1.05},
       {[](LogSamples& s) { s.sensors.col(1) *= 2.36; }, Cause::scale, "z2", 2.36},
       {[](LogSamples& s) { s.sensors.col(2) *= -1.0; }, Cause::sign, "z3", -1.0},
       {[](LogSamples& s) { s.actuators.col(0) *= 1.2; }, Cause::scale, "a1", 1.2},
-      {[&](LogSamples& s) { late(s.sensors, 0); }, Cause::skew, "z1", 500.0},
-      {[&](LogSamples& s) { late(s.actuators, 1); }, Cause::skew, "a2", 500.0},
+      {[](LogSamples& s) { late(s.sensors, 0); }, Cause::skew, "z1", 500.0},
+      {[](LogSamples& s) { late(s.actuators, 1); }, Cause::skew, "a2", 500.0},
       {[](LogSamples& s) { s.sensors.col(0).swap(s.sensors.col(2)); }, Cause::swapped, "z1 z3", 0},
       {[](LogSamples& s) { s.actuators.col(0).swap(s.actuators.col(1)); }, Cause::swapped, "a1 a2",
        0}};
@@ -133,13 +135,9 @@ TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
 
 // The first change of a channel is found while those of the others still bias it.
 TEST(RealizationComparison, AChannelIsToldOnceIfSeveralAreChanged) {
-  const auto late = [](Eigen::MatrixXd& samples, Eigen::Index c, Eigen::Index by) {
-    const Eigen::VectorXd before = samples.col(c);
-    samples.col(c).tail(before.size() - by) = before.head(before.size() - by);
-  };
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     MemoryLog log = recorded({4, seed});
-    change(log, 1, [&](LogSamples& s) {
+    change(log, 1, [](LogSamples& s) {
       late(s.sensors, 0, 2);
       late(s.sensors, 1, 1);
       late(s.actuators, 0, 1);
