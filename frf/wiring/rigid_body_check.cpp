@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -40,12 +41,14 @@ struct Gains {
   Eigen::MatrixXd weight;
 };
 
+/// The terms of a fit over the lines, in this order.
+enum Terms : Index { constant = 1, compliance = 3, suspension = 4 };
+
 /// The constant terms of entry (i, j) of A and of A0, and their variance.
-/// @param suspended with a term for a suspension that differs from the configured one
-Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j, bool suspended) {
+Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j, Terms terms) {
   const auto K = static_cast<Index>(lines.size());
   const double highest = std::pow(lines.back().omega_rad_s, 2);
-  Eigen::MatrixXd X(K, suspended ? 4 : 3);
+  Eigen::MatrixXd X(K, Index{terms});
   Eigen::MatrixXd rhs(K, 2);
   for (Index k = 0; k < K; ++k) {
     const PlantLine& line = lines[static_cast<std::size_t>(k)];
@@ -55,8 +58,8 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j,
     const double variance =
         0.5 * line.variance(i, j) + kRigidModelError * kRigidModelError * row_square;
     const double w = 1.0 / (omega2 * std::sqrt(std::max(1e-300, variance)));
-    X.row(k).head<3>() << w, w * x, w * x * x;
-    if (suspended) X(k, 3) = w / x;
+    const Eigen::Vector4d regressors(w, w * x, w * x * x, w / x);
+    X.row(k) = regressors.head(terms);
     rhs.row(k) << -w * omega2 * line.G(i, j).real(), -w * omega2 * line.G0(i, j).real();
   }
   const Eigen::MatrixXd normal_inverse = (X.transpose() * X).inverse();
@@ -67,14 +70,14 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j,
   return {solution(0, 0), solution(0, 1), std::max(1.0, over_variance) * normal_inverse(0, 0)};
 }
 
-Gains fit_gains(const std::vector<PlantLine>& lines, bool suspended) {
+Gains fit_gains(const std::vector<PlantLine>& lines, Terms terms) {
   const Index n_y = lines.front().G.rows();
   const Index n_u = lines.front().G.cols();
   Gains gains{Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u)};
   Eigen::MatrixXd variance(n_y, n_u);
   for (Index i = 0; i < n_y; ++i)
     for (Index j = 0; j < n_u; ++j) {
-      const Eigen::Vector3d entry = fit_entry(lines, i, j, suspended);
+      const Eigen::Vector3d entry = fit_entry(lines, i, j, terms);
       gains.A(i, j) = entry[0];
       gains.A0(i, j) = entry[1];
       variance(i, j) = entry[2];
@@ -84,66 +87,92 @@ Gains fit_gains(const std::vector<PlantLine>& lines, bool suspended) {
   return gains;
 }
 
-struct BodyCandidate {
-  ChannelChange change;
-  double explained = 0.0;
-};
-
-double cost(const Eigen::MatrixXd& A, const Gains& gains) {
-  return (gains.weight.array() * (A - gains.A0).array().square()).sum();
+double cost(const Gains& gains) {
+  return (gains.weight.array() * (gains.A - gains.A0).array().square()).sum();
 }
 
-/// A with the change undone; indices are those in A.
-Eigen::MatrixXd undone(const ChannelChange& change, const Eigen::MatrixXd& A) {
-  Eigen::MatrixXd B = change.of_sensors ? A : Eigen::MatrixXd(A.transpose());
+/// The gains with the change undone; indices are those in A.
+Gains undone(const ChannelChange& change, Gains gains) {
+  Eigen::MatrixXd B = change.of_sensors ? gains.A : Eigen::MatrixXd(gains.A.transpose());
   if (change.kind == ChannelChange::Kind::swap)
     B.row(change.a).swap(B.row(change.b));
   else if (change.a < 0)
     B /= change.value;
   else
     B.row(change.a) /= change.value;
-  return change.of_sensors ? B : Eigen::MatrixXd(B.transpose());
+  gains.A = change.of_sensors ? B : Eigen::MatrixXd(B.transpose());
+  return gains;
 }
 
-void try_gain(ChannelChange change, const Gains& gains, const Eigen::MatrixXd& A,
-              std::vector<BodyCandidate>& candidates) {
-  // c A = A0 by least squares over the row, the column, or all entries.
-  Eigen::MatrixXd part = Eigen::MatrixXd::Zero(A.rows(), A.cols());
+double explained(const ChannelChange& change, const Gains& gains) {
+  return cost(gains) - cost(undone(change, gains));
+}
+
+/// The gains of all lines, and those of the lower and the upper half of them: a channel's change shows in both, a
+/// suspension that the motion stiffens fades above itself.
+struct Body {
+  Gains all;
+  std::array<Gains, 2> halves;
+};
+
+Body fit_body(const std::vector<PlantLine>& lines) {
+  const auto middle = lines.begin() + static_cast<std::ptrdiff_t>(lines.size() / 2);
+  Body body{
+      fit_gains(lines, compliance),
+      {fit_gains({lines.begin(), middle}, constant), fit_gains({middle, lines.end()}, constant)}};
+  if (Gains suspended = fit_gains(lines, suspension); cost(suspended) < cost(body.all))
+    body.all = std::move(suspended);
+  return body;
+}
+
+void undo(const ChannelChange& change, Body& body) {
+  body.all = undone(change, body.all);
+  for (Gains& half : body.halves) half = undone(change, half);
+}
+
+/// The gain of the change by least squares over the row, the column, or all entries; none where it is too small.
+std::optional<ChannelChange> gain_change(ChannelChange change, const Gains& gains) {
+  Eigen::MatrixXd part = Eigen::MatrixXd::Zero(gains.A.rows(), gains.A.cols());
   if (change.a < 0)
-    part = A;
+    part = gains.A;
   else if (change.of_sensors)
-    part.row(change.a) = A.row(change.a);
+    part.row(change.a) = gains.A.row(change.a);
   else
-    part.col(change.a) = A.col(change.a);
+    part.col(change.a) = gains.A.col(change.a);
   const double square = (gains.weight.array() * part.array().square()).sum();
   const double c = (gains.weight.array() * part.array() * gains.A0.array()).sum() / square;
   change.value = 1.0 / c;
-  if (!std::isfinite(change.value) || c == 0.0) return;
-  if (c > 0.0 && std::abs(std::log(c)) < kLeastLogGain) return;
-  candidates.push_back({change, cost(A, gains) - cost(undone(change, A), gains)});
+  if (!std::isfinite(change.value) || c == 0.0) return std::nullopt;
+  if (c > 0.0 && std::abs(std::log(c)) < kLeastLogGain) return std::nullopt;
+  return change;
 }
 
-std::optional<BodyCandidate> best_change(const Gains& gains, const Eigen::MatrixXd& A) {
+std::optional<ChannelChange> best_change(const Body& body) {
   using Kind = ChannelChange::Kind;
-  std::vector<BodyCandidate> candidates;
-  const double before = cost(A, gains);
-  try_gain({Kind::gain, true}, gains, A, candidates);
+  std::vector<ChannelChange> candidates;
+  const auto try_gain = [&](const ChannelChange& change) {
+    if (const auto gain = gain_change(change, body.all)) candidates.push_back(*gain);
+  };
+  try_gain({Kind::gain, true});
   for (const bool of_sensors : {true, false}) {
-    const Index n = of_sensors ? A.rows() : A.cols();
+    const Index n = of_sensors ? body.all.A.rows() : body.all.A.cols();
     for (Index a = 0; a < n; ++a) {
-      try_gain({Kind::gain, of_sensors, a}, gains, A, candidates);
-      for (Index b = 0; b < a; ++b) {
-        const ChannelChange swap{Kind::swap, of_sensors, b, a};
-        candidates.push_back({swap, before - cost(undone(swap, A), gains)});
-      }
+      try_gain({Kind::gain, of_sensors, a});
+      for (Index b = 0; b < a; ++b) candidates.push_back({Kind::swap, of_sensors, b, a});
     }
   }
-  const BodyCandidate* most = nullptr;
-  for (const BodyCandidate& candidate : candidates)
-    if (candidate.explained > std::max(kLeastExplained, kLeastBodyShare * before) &&
-        (most == nullptr || candidate.explained > most->explained))
-      most = &candidate;
-  return most != nullptr ? std::optional<BodyCandidate>(*most) : std::nullopt;
+  double most = std::max(kLeastExplained, kLeastBodyShare * cost(body.all));
+  std::optional<ChannelChange> best;
+  for (const ChannelChange& candidate : candidates) {
+    const double gain = explained(candidate, body.all);
+    if (gain <= most || std::ranges::any_of(body.halves, [&](const Gains& half) {
+          return explained(candidate, half) <= 0.0;
+        }))
+      continue;
+    most = gain;
+    best = candidate;
+  }
+  return best;
 }
 
 /// Converts indices in A to those in the log.
@@ -170,31 +199,30 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
   }
   check.band_hz[0] = lines.front().omega_rad_s / (2.0 * std::numbers::pi);
   check.band_hz[1] = lines.back().omega_rad_s / (2.0 * std::numbers::pi);
-  Gains gains = fit_gains(lines, false);
-  if (Gains suspended = fit_gains(lines, true); cost(suspended.A, gains) < cost(gains.A, gains))
-    gains = std::move(suspended);
-  for (Index j = 0; j < gains.A.cols(); ++j) {
-    if (gains.A.col(j).norm() > kDead * gains.A0.col(j).norm()) continue;
+  Body body = fit_body(lines);
+  for (Index j = 0; j < body.all.A.cols(); ++j) {
+    if (body.all.A.col(j).norm() > kDead * body.all.A0.col(j).norm()) continue;
     check.dead_actuators.push_back(inputs[static_cast<std::size_t>(j)]);
-    gains.weight.col(j).setZero();
+    for (Gains* gains : {&body.all, &body.halves[0], &body.halves[1]})
+      gains->weight.col(j).setZero();
   }
+  const Gains recorded = body.all;
   std::vector<ChannelChange> changes;
-  Eigen::MatrixXd A = gains.A;
-  for (Index i = 0; i < A.rows() + A.cols(); ++i) {
-    const std::optional<BodyCandidate> chosen = best_change(gains, A);
+  for (Index i = 0; i < recorded.A.rows() + recorded.A.cols(); ++i) {
+    const std::optional<ChannelChange> chosen = best_change(body);
     if (!chosen) break;
-    A = undone(chosen->change, A);
-    changes.push_back(chosen->change);
+    undo(*chosen, body);
+    changes.push_back(*chosen);
   }
   const auto deviation = [&] {
-    return kTolerance * std::sqrt(cost(A, gains) / static_cast<double>(A.size()));
+    return kTolerance * std::sqrt(cost(body.all) / static_cast<double>(recorded.A.size()));
   };
   if (deviation() > kLargestRigidDeviation) {  // factors do not explain it; the body itself differs
     std::erase_if(changes, [](const ChannelChange& change) {
       return change.kind == ChannelChange::Kind::gain && change.value > 0.0;
     });
-    A = gains.A;
-    for (const ChannelChange& change : changes) A = undone(change, A);
+    body.all = recorded;
+    for (const ChannelChange& change : changes) undo(change, body);
   }
   check.deviation = deviation();
   for (const ChannelChange& change : changes)

@@ -67,5 +67,26 @@ TEST(RigidBodyCheck, AFactorIsFoundInSpiteOfDistortion) {
   }
 }
 
+// A cubic spring below the heave: it resonates at 4 to 5 Hz, just below the lines, and moves all sensors alike.
+TEST(RigidBodyCheck, ASuspensionThatTheMotionStiffensIsNoFactor) {
+  std::vector<Index> channels(kChannels);
+  std::iota(channels.begin(), channels.end(), Index{0});
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    test::RandomNumbers random(seed);
+    std::vector<PlantLine> lines = body(seed, 0.0, 1.0);
+    const Eigen::Vector3d sensors(1.0, random.uniform(0.8, 1.2), random.uniform(0.8, 1.2));
+    const double resonance_rad_s = 2.0 * std::numbers::pi * random.uniform(4.0, 5.5);
+    for (PlantLine& line : lines) {
+      const double omega2 = line.omega_rad_s * line.omega_rad_s;
+      const Eigen::MatrixXd heave = -3.0 / omega2 * sensors * Eigen::RowVector3d::Ones();
+      line.G0 += heave;
+      line.G += omega2 / (omega2 - resonance_rad_s * resonance_rad_s) * heave;
+    }
+    if (!check_rigid_body(lines, channels, channels).changes.empty()) ++told;
+  }
+  EXPECT_EQ(told, 0);
+}
+
 }  // namespace test_rigid_body_check
 }  // namespace stageid
