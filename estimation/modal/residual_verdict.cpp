@@ -127,29 +127,53 @@ class Parts {
 
 constexpr Eigen::Index kTile = 64;  // lines
 
+/// The variance of lines from `first` on, whose residual is E.
+using VarianceOfTile =
+    std::function<Eigen::MatrixXd(Eigen::Index first, const Eigen::MatrixXcd& E)>;
+
 /// Judges by one variance. @returns what is not explained
 void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
-              const Eigen::MatrixXd& weights, const Eigen::MatrixXd& variance,
+              const Eigen::MatrixXd& weights, const VarianceOfTile& variance_of, const char* causes,
               ResidualVerdict& verdict) {
   Parts parts(frf, verdict.dof);
   const Eigen::VectorXd all;
-  for (Eigen::Index first = 0; first < frf.lines(); first += kTile) {
-    const Eigen::Index count = std::min(kTile, frf.lines() - first);
+  for (Eigen::Index first = 0, count = 0; first < frf.lines(); first += count) {
+    count = frf.lines() - first;
+    if (count >= 2 * kTile) count = kTile;  // the last tile has enough lines for a scatter
     const Eigen::MatrixXcd E = frf.response.middleCols(first, count) - model(first, count);
+    const Eigen::MatrixXd variance = variance_of(first, E);
     for (Eigen::Index i = 0; i < count; ++i) {
       if (weights.size() > 0)
-        parts.add_line(first + i, E.col(i), variance.col(first + i), weights.col(first + i));
+        parts.add_line(first + i, E.col(i), variance.col(i), weights.col(first + i));
       else
-        parts.add_line(first + i, E.col(i), variance.col(first + i), all);
+        parts.add_line(first + i, E.col(i), variance.col(i), all);
     }
   }
   verdict.chi_square = parts.all().mean_r();
   verdict.expected = parts.expected();
   const Part* unexplained = parts.unexplained();
   verdict.explained = unexplained == nullptr;
-  const char* causes = verdict.variance == ResidualVariance::noise ? "noise explains"
-                                                                   : "noise and distortion explain";
   verdict.reason = verdict.explained ? "" : parts.reason(*unexplained, causes);
+}
+
+/// Data without variances: what their lines scatter is that of the residual. What a model misses is smooth.
+ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse& model,
+                                const Eigen::MatrixXd& weights, int threads) {
+  ResidualVerdict verdict;
+  if (!has_line_scatter(frf.lines())) return verdict;
+  verdict.variance = ResidualVariance::scatter;
+  verdict.dof = kScatterDof;
+  verdict.scatter.resize(frf.response.rows(), frf.lines());
+  judge_by(
+      frf, model, weights,
+      [&](Eigen::Index first, const Eigen::MatrixXcd& E) -> Eigen::MatrixXd {
+        FrfEstimate rest;
+        rest.frequency_hz = frf.frequency_hz.segment(first, E.cols());
+        rest.response = E;
+        return verdict.scatter.middleCols(first, E.cols()) = line_scatter(rest, threads).variance;
+      },
+      "neighbouring lines differ by", verdict);
+  return verdict;
 }
 
 }  // namespace
@@ -164,7 +188,13 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
     ResidualVerdict verdict;
     verdict.variance = kind;
     verdict.dof = dof;
-    judge_by(frf, model, weights, variance, verdict);
+    judge_by(
+        frf, model, weights,
+        [&](Eigen::Index first, const Eigen::MatrixXcd& E) {
+          return Eigen::MatrixXd(variance.middleCols(first, E.cols()));
+        },
+        kind == ResidualVariance::noise ? "noise explains" : "noise and distortion explain",
+        verdict);
     return verdict;
   };
   const bool has_noise = frf.noise_variance.size() > 0;
@@ -176,7 +206,7 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
     ResidualVerdict total = judge_with(ResidualVariance::total, frf.total_variance, frf.total_dof);
     return total.explained || !has_noise ? total : verdict;
   }
-  if (!has_noise) return verdict;
+  if (!has_noise) return judge_by_itself(frf, model, weights, threads);
   if (known.level.cols() > 0 && known.level.rows() == frf.response.rows()) {
     Eigen::MatrixXd variance = variance_with(known, frf);
     ResidualVerdict distorted = judge_with(ResidualVariance::total, variance, frf.noise_dof);

@@ -14,10 +14,12 @@ namespace stageid {
 
 /// The variance of the data with which a residual is compared.
 enum class ResidualVariance : std::uint8_t {
-  none,   ///< the data have no variances
+  none,   ///< the data have no variances, and too few lines
   noise,  ///< from periods
   total,  ///< noise and stochastic nonlinear contributions: from realizations, or known from others
-  scatter  ///< from neighbouring lines, where one realization was measured: see line_scatter()
+  /// From neighbouring lines, see line_scatter(): of the response, where one realization was measured; of the
+  /// residual, where the data have no variances.
+  scatter
 };
 template <>
 inline constexpr std::array kWords<ResidualVariance> = {"none", "noise", "total", "scatter"};
@@ -30,7 +32,7 @@ struct ResidualVerdict {
   double chi_square = 0.0;  ///< mean of r = |E|^2 / variance over entries and lines; 0: unknown
   /// Mean of r if the error is noise: nu / (nu - 1), or 1 for an exact variance; 0: infinite.
   double expected = 0.0;
-  bool explained = true;  ///< true also if the data have no variances
+  bool explained = true;  ///< true also if nothing can be compared
   std::string reason;     ///< the reason if not explained, one sentence
 };
 
@@ -47,6 +49,8 @@ using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Ei
 /// The noise variance is compared first. If it does not explain the residual, the total variance is compared, or for
 /// one realization the scatter of the lines, if most of them scatter by more than their noise: they contain the
 /// distortion of a nonlinear plant. The figures refer to the variance that explains the residual, else to the noise.
+/// Data without any variance are judged by the residual itself: noise scatters from line to line, and what a model
+/// misses is smooth.
 /// Source: the tail of F(2, 2 nu) is (1 + x/nu)^-nu; minus its logarithm is exponential for any continuous
 /// distribution.
 /// @param known distortion of one realization, from the fit of the model; used if there is no total variance

@@ -15,8 +15,7 @@ namespace {
 
 constexpr Eigen::Index kOrder = 2;
 constexpr int kMostPoles = 2;  // two close modes
-constexpr Eigen::Index kDof = 9;
-constexpr Eigen::Index kWindow = kOrder + 1 + kDof;
+constexpr Eigen::Index kWindow = kOrder + 1 + kScatterDof;
 
 // Medians. For errors independent of the line distance, the first ratio is 1; for a response beyond the quadratic
 // model it is 2^6.
@@ -73,15 +72,17 @@ double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 }  // namespace
 
+bool has_line_scatter(Eigen::Index lines) noexcept { return lines >= kWindow; }
+
 LineScatter line_scatter(const FrfEstimate& frf, int threads) {
   LineScatter scatter;
-  if (frf.lines() < kWindow) return scatter;
+  if (!has_line_scatter(frf.lines())) return scatter;
   scatter.variance.resize(frf.response.rows(), frf.lines());
   for_each_line(worker_count(threads), frf.lines(), [&](Eigen::Index k) {
     const LocalFit fit = fit_around(frf, k);
     scatter.variance.col(k) = fit.residual.rowwise().squaredNorm() / fit.dof;
   });
-  scatter.dof = static_cast<double>(kDof);
+  scatter.dof = static_cast<double>(kScatterDof);
   scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
   return scatter;
 }

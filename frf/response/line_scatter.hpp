@@ -6,6 +6,9 @@
 
 namespace stageid {
 
+/// Complex degrees of freedom of a scatter.
+inline constexpr Eigen::Index kScatterDof = 9;
+
 /// Deviation of the lines of a response from a smooth function of frequency.
 struct LineScatter {
   /// (n_y n_u) x N, unit of |response|^2: variance of the response, including noise and stochastic nonlinear
@@ -31,6 +34,9 @@ struct LineScatter {
 /// @param threads 0: all cores; does not affect the result
 /// @returns empty matrices if there are too few lines
 LineScatter line_scatter(const FrfEstimate& frf, int threads = 0);
+
+/// Whether there are enough lines for line_scatter().
+bool has_line_scatter(Eigen::Index lines) noexcept;
 
 /// Whether the lines are too coarse for line_scatter(), so that the response itself looks like scatter. There are
 /// three criteria:

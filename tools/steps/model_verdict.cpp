@@ -48,7 +48,7 @@ std::string verdict_line(const ModelVerdict& verdict) {
   return fmt::format(
       "verdict: trustworthy{}{}",
       verdict.validated ? "; noise and known distortion explain the error on held-back data"
-                        : "; not validated: no held-back data with variances",
+                        : "; not validated: no held-back data",
       verdict.reasons.empty() ? "" : fmt::format(". Check: {}", fmt::join(verdict.reasons, "; ")));
 }
 
@@ -70,13 +70,16 @@ std::vector<std::string> validation_lines(const Validation& v) {
                                      : "undefined, the variances are too uncertain";
     lines.push_back(fmt::format(
         "chi-square per degree of freedom {:.3f}; expected from {} alone: {}", v.chi_square_per_dof,
-        v.variance == ResidualVariance::noise ? "noise" : "noise and distortion", expected));
+        v.variance == ResidualVariance::noise     ? "noise"
+        : v.variance == ResidualVariance::scatter ? "what neighbouring lines scatter"
+                                                  : "noise and distortion",
+        expected));
     lines.push_back(
         fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
                     "limit {:.4f}",
                     100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
   } else {
-    lines.push_back("the data have no variances, so the error cannot be compared with noise");
+    lines.push_back("too few lines without variances, so the error cannot be compared with noise");
   }
   return lines;
 }

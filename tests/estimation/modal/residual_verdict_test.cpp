@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <numbers>
 
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/process/random_numbers.hpp"
@@ -125,13 +127,58 @@ TEST(ResidualVerdict, ResonancesThatAModelMissesAreNoDistortion) {
   EXPECT_EQ(verdict.variance, ResidualVariance::noise);
 }
 
-TEST(ResidualVerdict, WithoutVariancesOrWeightsNothingIsJudged) {
+ResidualVerdict judge_constant(const FrfEstimate& frf, double level) {
+  return judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
+    return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
+  });
+}
+
+// Noise scatters from line to line; what a model misses is smooth.
+TEST(ResidualVerdict, DataWithoutVariancesAreJudgedByTheirOwnScatter) {
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    FrfEstimate frf = noise(20 + seed, 150, 0);  // of variance 1
+    frf.noise_variance.resize(0, 0);
+    frf.response.array() += 300.0;
+    const ResidualVerdict right = judge_constant(frf, 300.0);
+    EXPECT_EQ(right.variance, ResidualVariance::scatter);
+    if (!right.explained) ++told;
+    const ResidualVerdict wrong = judge_constant(frf, 298.0);
+    EXPECT_FALSE(wrong.explained);
+    EXPECT_THAT(wrong.reason, HasSubstr("times what neighbouring lines differ by"));
+  }
+  EXPECT_EQ(told, 0);
+}
+
+// A window over the record correlates the noise of neighbouring lines: Hann, and an exponential one that ends at 1 %.
+TEST(ResidualVerdict, AWindowMakesNoiseNoError) {
+  constexpr Eigen::Index kReach = 8;
+  const auto is_explained = [](const std::function<std::complex<double>(double)>& spectrum) {
+    FrfEstimate frf = noise(18, 2000, 0);
+    frf.noise_variance.resize(0, 0);
+    const Eigen::MatrixXcd white = frf.response;
+    frf.response.setZero();
+    for (Eigen::Index m = -kReach; m <= kReach; ++m)
+      frf.response.middleCols(kReach, frf.lines() - 2 * kReach) +=
+          spectrum(static_cast<double>(m)) * white.middleCols(kReach + m, frf.lines() - 2 * kReach);
+    return judge(select_band(frf, 20.0, 1980.0)).explained;
+  };
+  EXPECT_TRUE(is_explained([](double m) {
+    return m == 0.0 ? 0.5 : std::abs(m) == 1.0 ? -0.25 : 0.0;
+  }));
+  EXPECT_TRUE(is_explained([](double m) {
+    return 1.0 / std::complex<double>(std::log(100.0), 2.0 * std::numbers::pi * m);
+  }));
+}
+
+TEST(ResidualVerdict, WithoutWeightsOrLinesNothingIsJudged) {
   FrfEstimate frf = noise(17, 100, 0);
   frf.response *= 100.0;
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(frf.response.rows(), 100);
   EXPECT_TRUE(judge(frf, weights).explained);
   weights(0, 5) = 1.0;
   EXPECT_FALSE(judge(frf, weights).explained);
+  frf = noise(17, 11, 0);
   frf.noise_variance.resize(0, 0);
   const ResidualVerdict verdict = judge(frf);
   EXPECT_TRUE(verdict.explained);
