@@ -16,6 +16,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
+constexpr double kPathShare = 0.5;
 constexpr int kShares = 8;
 constexpr Eigen::Index kTimesOver = 3;
 constexpr double kShift = 1e-13;  // makes Gram matrices of unit columns factorizable
@@ -43,6 +44,23 @@ Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
     triangles.resize(triangles.size() - pairs);
   }
   return std::move(triangles.front());
+}
+
+/// The share of the path of log H up to each line, summed over all channels, kPathShare of it; the rest is that of the
+/// lines.
+Eigen::VectorXd path_of(const Eigen::MatrixXcd& H) {
+  const Eigen::Index last = H.cols() - 1;
+  Eigen::VectorXd path = Eigen::VectorXd::Zero(H.cols());
+  for (Eigen::Index k = 1; k <= last; ++k) {
+    double step = 0.0;
+    for (Eigen::Index c = 0; c < H.rows(); ++c) {
+      const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
+      if (std::isfinite(turn)) step += turn;
+    }
+    path[k] = path[k - 1] + step;
+  }
+  return kPathShare / std::max(path[last], 1e-300) * path +
+         (1.0 - kPathShare) * Eigen::VectorXd::LinSpaced(H.cols(), 0.0, 1.0);
 }
 
 /// The lower right corner of R, n+1 x n+1, in  sqrt(w) [phi, own | -H phi, -H] = Q R: the equations of the channel
@@ -114,6 +132,7 @@ SigmaEquations::SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen
     : x_(std::move(x)),
       unit_circle_(unit_circle),
       H_(G * factor.cwiseInverse().asDiagonal()),
+      path_(path_of(H_)),
       power_(factor.cwiseAbs2()),
       weights_(weights),
       own_(std::move(own)),
@@ -126,12 +145,23 @@ Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) co
   return by_factors(phi);
 }
 
+/// Lines at equal steps of the path: all of them where they are few for the poles.
+std::vector<Eigen::Index> SigmaEquations::representative(Eigen::Index count) const {
+  std::vector<Eigen::Index> lines;
+  double next = 0.0;
+  for (Eigen::Index k = 0; k < x_.size(); ++k) {
+    if (path_[k] < next && x_.size() > count) continue;
+    lines.push_back(k);
+    next = std::max(next + 1.0 / static_cast<double>(count), path_[k]);
+  }
+  return lines;
+}
+
 /// One triangle per share of the channels; the number of shares is fixed. Data that need this path are nearly exact,
 /// so a few times as many lines as unknowns suffice.
 Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   const Eigen::Index unknowns = 2 * phi.cols() + own_.cols() + 1;
-  const Eigen::Index stride = std::max<Eigen::Index>(1, 2 * x_.size() / (kTimesOver * unknowns));
-  const auto lines = Eigen::seq(0, x_.size() - 1, stride);
+  const std::vector<Eigen::Index> lines = representative(kTimesOver * unknowns / 2);
   const auto thinned = [&](const SplitMatrix& all) {
     return SplitMatrix{all.re(lines, Eigen::all), all.im(lines, Eigen::all)};
   };
@@ -139,10 +169,9 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   const SplitMatrix thin_own = thinned(own_);
   const Eigen::VectorXd thin_power = power_(lines);
   const auto triangle_of = [&](Eigen::Index c) {
-    const Eigen::RowVectorXd weight = weights_(c, lines);
-    const Eigen::RowVectorXcd response = H_(c, lines);
-    return factor_of_channel(weight.transpose().cwiseProduct(thin_power), response.transpose(),
-                             thin_phi, thin_own);
+    const Eigen::VectorXd weight = weights_.row(c)(lines).transpose();
+    const Eigen::VectorXcd response = H_.row(c)(lines).transpose();
+    return factor_of_channel(weight.cwiseProduct(thin_power), response, thin_phi, thin_own);
   };
   std::vector<Eigen::MatrixXd> shares(
       static_cast<std::size_t>(std::min<Eigen::Index>(kShares, H_.rows())));
@@ -151,7 +180,8 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
     R = triangle_of(share);
     for (Eigen::Index c = share + kShares; c < H_.rows(); c += kShares) append(R, triangle_of(c));
   });
-  return combined(std::move(shares), threads_) * std::sqrt(static_cast<double>(stride));
+  return combined(std::move(shares), threads_) *
+         std::sqrt(static_cast<double>(x_.size()) / static_cast<double>(lines.size()));
 }
 
 /// From products of fractions. @returns nothing if too few digits remain

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <complex>
 #include <optional>
+#include <vector>
 
 #include "estimation/model/pole_set.hpp"
 
@@ -26,15 +27,19 @@ class SigmaEquations {
   Eigen::MatrixXd triangle(const PoleSet& poles, bool accurate) const;
 
   const Eigen::VectorXcd& x() const noexcept { return x_; }
-  const Eigen::MatrixXcd& H() const noexcept { return H_; }
+  /// N, rising from 0 to 1: half of it with the change of log H, half with the lines. Where it rises steeply, the data
+  /// need many poles and tell much about them.
+  const Eigen::VectorXd& path() const noexcept { return path_; }
 
  private:
+  std::vector<Eigen::Index> representative(Eigen::Index count) const;
   Eigen::MatrixXd by_factors(const SplitMatrix& phi) const;
   std::optional<Eigen::MatrixXd> by_sums(const PoleSet& poles, const SplitMatrix& phi) const;
 
   Eigen::VectorXcd x_;
   bool unit_circle_;
   Eigen::MatrixXcd H_;
+  Eigen::VectorXd path_;
   Eigen::VectorXd power_;  // |factor|^2
   const Eigen::MatrixXd& weights_;
   SplitMatrix own_;

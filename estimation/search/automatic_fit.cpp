@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/growth_watch.hpp"
@@ -76,14 +77,11 @@ class AutomaticFit {
         relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
     say("start: {} by pole relocation", counted(modes.size(), "mode"));
     model = start_of(modes);
-    if (many()) {
-      FitOptions still = quick_;
-      still.max_iterations = 0;
-      FitResult placed = fit_additive_model(frf_, model, still);
-      if (worth_.at_rounding(placed)) return adopt(std::move(placed));
-      return hold_hidden(placed.model);
-    }
-    adopt(fit_additive_model(frf_, model, quick_));
+    if (!many()) return adopt(fit_additive_model(frf_, model, quick_));
+    FitOptions still = quick_;
+    still.max_iterations = 0;
+    adopt(fit_additive_model(frf_, model, still));
+    if (!at_rounding()) settle_many();
   }
 
   /// @param surplus modes to grow beyond the requested number
@@ -114,6 +112,17 @@ class AutomaticFit {
   double cost() const { return best_.model.fit.cost; }
   bool at_rounding() const { return worth_.at_rounding(best_); }
   bool limit_reached() const { return options_.limit->reached(); }
+
+  bool explains_data() const {
+    return judge_residual(
+               frf_,
+               [&](Eigen::Index first, Eigen::Index count) {
+                 return response(best_.model, frf_.frequency_hz.segment(first, count),
+                                 best_.model.hold);
+               },
+               quick_.user_weights, threads_)
+        .explained;
+  }
 
   /// Releases the weights of the search; the last fit computes its own.
   void release_weights() { quick_.user_weights = {}; }
@@ -209,15 +218,19 @@ class AutomaticFit {
     return true;
   }
 
-  /// Fits `model` with all poles free, then holds those of modes hidden by noise at the result.
-  void hold_hidden(const AdditiveModel& model) {
+  /// Fits with all poles free as long as that halves the cost, then holds those of modes hidden by noise.
+  void settle_many() {
     FitOptions while_free = quick_;
     while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
-    FitResult fit = fit_additive_model(frf_, model, while_free);
-    const int hidden = hold_hidden_modes(fit, frf_.response.rows(), frf_.lines(), fit.model);
-    say("{} of them exceed the noise; the poles of the other {} are held after {} iterations",
-        count_modes(fit.model) - hidden, hidden, fit.cost.size() - 1);
-    adopt(std::move(fit));
+    double before = 0.0;
+    do {
+      before = cost();
+      adopt(fit_additive_model(frf_, best_.model, while_free));
+    } while (cost() < 0.5 * before && !at_rounding() && !limit_reached());
+    if (at_rounding() || best_.status == FitStatus::singular) return;
+    const int hidden = hold_hidden_modes(frf_, quick_.user_weights, threads_, best_);
+    say("{} of them exceed the noise; the poles of the other {} are held",
+        count_modes(best_.model) - hidden, hidden);
   }
 
   AdditiveModel start() {
@@ -564,7 +577,16 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
   if (placed) {
     AutomaticFit relocated = begun;
     relocated.begin_relocated();
-    if (go(std::move(relocated), 0) || too_many_to_grow) return finish();
+    if (go(std::move(relocated), 0)) return finish();
+    if (too_many_to_grow) {
+      // Misplaced modes are exchanged for those at the peaks of the residual.
+      for (double before = 0.0; best->cost() != before && !best->explains_data();) {
+        before = best->cost();
+        if (go(*best, 1 + selection.exactly / static_cast<int>(kShareAtOnce))) break;
+        if (best->cost() > 0.5 * before) break;
+      }
+      return finish();
+    }
   }
   for (const int surplus : surpluses(selection, most))
     if (go(begun, surplus)) break;

@@ -7,22 +7,40 @@
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
+#include "frf/response/line_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {
 
-int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
-                      AdditiveModel& model) {
-  // variance of a real number
-  const double noise = fit.model.fit.cost / static_cast<double>(channels);
+namespace {
+
+/// Variance of a real number of the residual in units of its weight: of all the residual where there are too few lines
+/// for a scatter, which does not contain what the model misses.
+double noise_of(const FrfEstimate& frf, const Eigen::MatrixXd& weights, const FitResult& fit,
+                int threads) {
+  const double all = fit.model.fit.cost / static_cast<double>(frf.response.rows());
+  FrfEstimate rest;
+  rest.frequency_hz = frf.frequency_hz;
+  rest.response = frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
+  const LineScatter scatter = line_scatter(rest, threads);
+  if (scatter.variance.size() == 0) return all;
+  return std::min(all, 0.5 * weights.cwiseProduct(scatter.variance).mean());
+}
+
+}  // namespace
+
+int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, int threads,
+                      FitResult& fit) {
+  const double noise = noise_of(frf, weights, fit, threads);
+  const Eigen::Index channels = frf.response.rows();
   int hidden = 0;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    Submodel& s = model.submodels[i];
+  for (std::size_t i = 0; i < fit.model.submodels.size(); ++i) {
+    Submodel& s = fit.model.submodels[i];
     if (!is_searched_mode(s)) continue;
     const auto numbers =
         static_cast<double>(s.numerator.size() * static_cast<std::size_t>(channels));
     const double by_noise = tail_of_chi_square(fit.removal_cost[i] / noise, numbers);
-    if (by_noise * static_cast<double>(lines) < 1.0) continue;
+    if (by_noise * static_cast<double>(frf.lines()) < 1.0) continue;
     s.frequency_held = s.damping_held = true;
     ++hidden;
   }

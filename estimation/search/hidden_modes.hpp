@@ -10,11 +10,11 @@ namespace stageid {
 /// Among very many requested modes, some are hidden by noise: their poles move to the largest noise peaks and do not
 /// converge. Holds the poles of the hidden modes of `fit` at their current values.
 ///
-/// The noise is estimated from the residual. A mode is hidden if noise alone would reach its removal cost on more than
-/// one of the lines. @param channels outputs times inputs @param lines of the fit
+/// The noise is what the residual scatters from line to line. A mode is hidden if noise alone would reach its removal
+/// cost on more than one of the lines. @param weights of the fit, n_c x N
 /// @returns the number of hidden modes
-int hold_hidden_modes(const FitResult& fit, Eigen::Index channels, Eigen::Index lines,
-                      AdditiveModel& model);
+int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, int threads,
+                      FitResult& fit);
 
 /// Shrinks the numerators of hidden modes towards zero, since they are mostly noise that their poles have selected. Of
 /// the d numbers b of a mode with covariance C, the share s = (d - 2) / (2 b' C^-1 b) is removed, limited to nearly

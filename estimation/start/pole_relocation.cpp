@@ -16,8 +16,7 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int kIterations = 20;
-constexpr double kSettled = 1e-3;   // movement of every pole in its own half-power widths
-constexpr double kPathShare = 0.5;  // of the start: by the path of log H, the rest by lines
+constexpr double kSettled = 1e-3;  // movement of every pole in its own half-power widths
 constexpr double kStartDamping = 0.01;
 constexpr double kLeastDamping = 1e-5;
 constexpr double kLinesWide = 3.0;  // minimum half-power width of a pole, but see narrowest()
@@ -51,38 +50,21 @@ class Relocation {
   std::vector<ModeCandidate> run(std::size_t modes) {
     spread(modes);
     for (int i = 0; i < kIterations; ++i)
-      if (!(relocate() > kSettled)) break;
+      if (const double moved = relocate(); !(moved > (accurate_ ? 0.0 : kSettled))) break;
     return modes_of_poles();
   }
 
  private:
-  /// Places the poles where the response changes: between any two there is an equal share of the path of log H, summed
-  /// over all channels, and of the lines, weighted by kPathShare.
+  /// Places the poles where the response changes: between any two there is an equal share of the path.
   void spread(std::size_t modes) {
-    const Eigen::MatrixXcd& H = equations_->H();
+    const Eigen::VectorXd& path = equations_->path();
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
-    const Eigen::Index last = omega.size() - 1;
-    Eigen::VectorXd path = Eigen::VectorXd::Zero(omega.size());
-    for (Eigen::Index k = 1; k <= last; ++k) {
-      double step = 0.0;
-      for (Eigen::Index c = 0; c < H.rows(); ++c) {
-        const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
-        if (std::isfinite(turn)) step += turn;
-      }
-      path[k] = path[k - 1] + step;
-    }
-    const double length = std::max(path[last], 1e-300);
     Eigen::Index k = 0;
     for (std::size_t i = 0; i < modes; ++i) {
       const double wanted = (static_cast<double>(i) + 0.5) / static_cast<double>(modes);
-      const auto passed = [&](Eigen::Index line) {
-        return kPathShare * path[line] / length +
-               (1.0 - kPathShare) * static_cast<double>(line) / static_cast<double>(last);
-      };
-      while (k + 1 < last && passed(k + 1) < wanted) ++k;
-      const double before = passed(k);
+      while (k + 2 < omega.size() && path[k + 1] < wanted) ++k;
       const double part =
-          std::clamp((wanted - before) / std::max(passed(k + 1) - before, 1e-300), 0.0, 1.0);
+          std::clamp((wanted - path[k]) / std::max(path[k + 1] - path[k], 1e-300), 0.0, 1.0);
       const double w = omega[k] + part * (omega[k + 1] - omega[k]);
       poles_.pairs.push_back(to_x(Complex(-kStartDamping, 1.0) * w));
     }
@@ -131,8 +113,9 @@ class Relocation {
   }
 
   /// The minimum damping ratio at a frequency, limited to that of the start. A sharper pole would be determined by the
-  /// noise of one line. Modes may be sharper; the fit that follows finds their damping.
+  /// noise of one line, unless there is none. Modes may be sharper; the fit that follows finds their damping.
   double narrowest(double omega_rad_s) const {
+    if (accurate_) return kLeastDamping;
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
     const Eigen::Index last = omega.size() - 1;
     const double* above = std::lower_bound(omega.data(), omega.data() + last, omega_rad_s);

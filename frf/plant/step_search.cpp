@@ -317,8 +317,8 @@ ActuatorStep StepSearch::with_own_rounding(ActuatorStep step, const Tested& t) {
   return step;
 }
 
-/// Adds the members for which the step of others explains as much as that of their own strongest peak: with commands of
-/// a few steps, a spectrum has several peaks.
+/// Adds the members for which no step of their own explains clearly more than that of others: with commands of a few
+/// steps, a spectrum has several peaks, and the errors of the other converters hide the own one.
 void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& members,
                                         std::vector<ActuatorStep>& found) {
   if (members.empty()) return;
@@ -332,7 +332,7 @@ void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& membe
     const double by_common = explained(common, {t});
     const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
     const double by_own = own.empty() ? 0.0 : explained(own.front(), {t});
-    if (by_common > kOwnCertainty && by_common + kOwnCertainty > by_own)
+    if (by_common > kOwnPower && by_common + kOwnCertainty > by_own)
       found.push_back(common);
     else
       others.push_back(t);

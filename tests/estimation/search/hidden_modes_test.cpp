@@ -54,10 +54,10 @@ TEST(HiddenModes, OnlyWhatIsNotThereIsHeld) {
   int held = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Placed placed(seed, {500.0, 1000.0, 1070.0, 1140.0, 1300.0});
-    AdditiveModel model = placed.model;
-    const int hidden = hold_hidden_modes(placed.fit_numerators(), 6, placed.frf.lines(), model);
-    for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-      const Submodel& s = model.submodels[i];
+    FitResult fit = placed.fit_numerators();
+    const int hidden = hold_hidden_modes(placed.frf, placed.options.user_weights, 1, fit);
+    for (std::size_t i = 0; i < fit.model.submodels.size(); ++i) {
+      const Submodel& s = fit.model.submodels[i];
       EXPECT_EQ(s.frequency_held, s.damping_held);
       EXPECT_TRUE(i >= 4 || !s.frequency_held) << i;
     }

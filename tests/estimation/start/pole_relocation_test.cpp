@@ -76,20 +76,34 @@ TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModes) {
   for (const ModeCandidate& mode : modes) EXPECT_GT(mode.damping_ratio, 0.0);
 }
 
-// Its width is a tenth of the line spacing: one line determines its frequency, none its damping.
-TEST(PoleRelocationShares, AModeNarrowerThanTheLinesIsPlacedWider) {
-  DenseProblem problem = test::noisy_stage(HoldModel::none, 0.0);
+/// A mode at 900 Hz whose width is a tenth of the line spacing: one line determines its frequency, none its damping.
+DenseProblem with_narrow_mode(double noise) {
+  DenseProblem problem = test::noisy_stage(HoldModel::none, noise);
+  const Eigen::MatrixXcd added =
+      problem.G - test::reference_response(problem.model, problem.frequency_hz, problem.hold);
   const std::vector<double> a = test::mode_coefficients(900.0, 2.5e-4);
   problem.model.submodels[2].denominator = {1.0, a[0], a[1]};
   problem.model.submodels.resize(3);
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold) + added;
   problem.W = problem.G.cwiseAbs2().cwiseInverse();
+  return problem;
+}
+
+TEST(PoleRelocationShares, AModeNarrowerThanTheLinesIsPlacedWider) {
+  const DenseProblem problem = with_narrow_mode(1e-2);
   const std::vector<ModeCandidate> modes = relocate(problem, 2);
   ASSERT_EQ(modes.size(), 2U);
   const double spacing_hz = problem.frequency_hz[1] - problem.frequency_hz[0];
   EXPECT_NEAR(modes[1].frequency_hz, 900.0, spacing_hz);
   EXPECT_NEAR(2.0 * modes[1].damping_ratio * modes[1].frequency_hz, 3.0 * spacing_hz,
               1e-6 * spacing_hz);
+}
+
+TEST(PoleRelocationShares, WithoutNoiseAModeNarrowerThanTheLinesIsFoundExactly) {
+  const std::vector<ModeCandidate> modes = relocate(with_narrow_mode(0.0), 2);
+  ASSERT_EQ(modes.size(), 2U);
+  EXPECT_NEAR(modes[1].frequency_hz, 900.0, 1e-9 * 900.0);
+  EXPECT_NEAR(modes[1].damping_ratio, 2.5e-4, 1e-6 * 2.5e-4);
 }
 
 TEST(PoleRelocationShares, NothingAskedForNothingFound) {
