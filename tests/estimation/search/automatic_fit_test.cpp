@@ -156,22 +156,31 @@ TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
 }
 
 // There is no largest number: a search that ended at 60 modes was called trustworthy.
-TEST(AutomaticFit, FindsManyModes) {
-  constexpr int kModes = 70;
+/// The exact response of one channel with these modes, without variances.
+FrfEstimate response_of(const std::vector<double>& frequency_hz, double damping_ratio,
+                        const Eigen::VectorXd& lines_hz) {
   FrfEstimate frf;
-  frf.frequency_hz = Eigen::VectorXd::LinSpaced(4000, 5.0, 1500.0);
+  frf.frequency_hz = lines_hz;
   frf.inputs = {{"u"}, {"N"}};
   frf.outputs = {{"y"}, {"m"}};
   AdditiveModel truth;
   truth.inputs = frf.inputs;
   truth.outputs = frf.outputs;
   truth.input_delay_s = truth.output_delay_s = Eigen::VectorXd::Zero(1);
-  for (int r = 1; r <= kModes; ++r) {
-    const std::vector<double> a = test::mode_coefficients(20.0 * r, 0.003);
+  for (const double hz : frequency_hz) {
+    const std::vector<double> a = test::mode_coefficients(hz, damping_ratio);
     truth.submodels.push_back(
         {0, {1.0, a[0], a[1]}, {Eigen::MatrixXd::Constant(1, 1, a[1])}, {}, {}});
   }
   frf.response = test::reference_response(truth, frf.frequency_hz, HoldModel::none);
+  return frf;
+}
+
+TEST(AutomaticFit, FindsManyModes) {
+  std::vector<double> frequency_hz(70);
+  for (std::size_t r = 0; r < frequency_hz.size(); ++r)
+    frequency_hz[r] = 20.0 * static_cast<double>(r + 1);
+  FrfEstimate frf = response_of(frequency_hz, 0.003, Eigen::VectorXd::LinSpaced(4000, 5.0, 1500.0));
   test::RandomNumbers random(1);
   frf.noise_variance = 1e-6 * frf.response.cwiseAbs2();
   frf.noise_dof = 1000.0;
@@ -179,8 +188,23 @@ TEST(AutomaticFit, FindsManyModes) {
     frf.response(0, k) += std::sqrt(frf.noise_variance(0, k)) * random.circular();
   const FitResult fit = fit_model(frf, {});
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
-  EXPECT_EQ(fit.model.submodels.size(), static_cast<std::size_t>(kModes));
+  EXPECT_EQ(fit.model.submodels.size(), frequency_hz.size());
   EXPECT_LT(fit.model.fit.cost, 0.5);
+}
+
+// Clusters of five in two decades, on equally spaced lines: those of the lowest clusters are few, and wider than modes.
+TEST(AutomaticFit, AGivenNumberOfManyModesIsFoundExactly) {
+  std::vector<double> frequency_hz;
+  for (int cluster = 0; cluster < 9; ++cluster)
+    for (int i = 0; i < 5; ++i)
+      frequency_hz.push_back(std::pow(10.0, 0.22 * cluster + 0.03 * i + 0.01 * (i * cluster % 3)));
+  FitRequest request;
+  request.modes = {ModesRequest::Kind::count, static_cast<int>(frequency_hz.size()), {}};
+  const FrfEstimate frf =
+      response_of(frequency_hz, 0.005, Eigen::VectorXd::LinSpaced(3000, 0.7, 150.0));
+  const FitResult fit = fit_model(frf, request);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
 }
 
 TEST_F(SmallStage, NoiseFreeDataGetTheirModesAndNoMore) {
