@@ -579,11 +579,13 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
     relocated.begin_relocated();
     if (go(std::move(relocated), 0)) return finish();
     if (too_many_to_grow) {
-      // Misplaced modes are exchanged for those at the peaks of the residual.
-      for (double before = 0.0; best->cost() != before && !best->explains_data();) {
+      // Misplaced modes are exchanged for those at the peaks of the residual, as long as that halves the cost.
+      const int surplus = std::min(static_cast<int>(most) - selection.exactly,
+                                   1 + selection.exactly / static_cast<int>(kShareAtOnce));
+      double before = std::numeric_limits<double>::infinity();
+      while (best->cost() < 0.5 * before && !best->explains_data()) {
         before = best->cost();
-        if (go(*best, 1 + selection.exactly / static_cast<int>(kShareAtOnce))) break;
-        if (best->cost() > 0.5 * before) break;
+        if (go(*best, surplus)) break;
       }
       return finish();
     }
