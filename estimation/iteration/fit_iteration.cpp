@@ -21,7 +21,6 @@ constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
 constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step
 constexpr int kTries = 40;
-constexpr Eigen::Index kChannelsOfSearch = 512;  // enough to determine one delay
 // Numerators are re-solved after every step.
 constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 
@@ -289,21 +288,6 @@ class Iteration {
   Trial best_;
 };
 
-/// The problem, or a subset of evenly spaced channels as outputs of one input. The subset has its own copies of data
-/// and weights, to save memory.
-FitProblem some_channels(const FitProblem& problem) {
-  FitProblem out = problem;
-  const Eigen::Index step = (problem.channels() + kChannelsOfSearch - 1) / kChannelsOfSearch;
-  if (step <= 1) return out;
-  const Eigen::Index count = (problem.channels() + step - 1) / step;
-  const auto chosen = Eigen::seqN(0, count, step);
-  out.n_outputs = count;
-  out.n_inputs = 1;
-  out.G = Eigen::MatrixXcd((*problem.G)(chosen, Eigen::all));
-  if (problem.W->size() > 0) out.W = Eigen::MatrixXd((*problem.W)(chosen, Eigen::all));
-  return out;
-}
-
 }  // namespace
 
 double signal_cost(const FitProblem& problem) {
@@ -313,34 +297,6 @@ double signal_cost(const FitProblem& problem) {
 
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
   return Iteration(problem, beta, options).run();
-}
-
-void search_delay(const FitProblem& problem, FitParameters& beta) {
-  // The poles are not right yet. With weights from the noise, one sharp mode that is off by a part of its width would
-  // outweigh the phase of everything else. With relative errors it does not.
-  FitProblem relative = some_channels(problem);
-  const auto power = relative.G->array().abs2();
-  const Eigen::ArrayXd floor = 1e-6 * power.rowwise().mean() + 1e-300;
-  Eigen::MatrixXd weights = (power > 0.0).select((power.colwise() + floor).inverse(), 0.0).matrix();
-  if (relative.W->size() > 0) weights.array() *= (relative.W->array() > 0.0).cast<double>();
-  relative.W = std::move(weights);
-  const double highest = problem.lines.omega_rad_s.maxCoeff();
-  const double step =
-      0.5 / highest;  // rad at the highest line: well inside the basin of the best delay
-  double best_cost = std::numeric_limits<double>::infinity();
-  Eigen::VectorXd best = beta.input_delay_s;
-  FitParameters trial = beta;
-  trial.input_delay_s.setZero(relative.n_inputs);
-  trial.output_delay_s.setZero(relative.n_outputs);
-  for (int i = 0; i <= 24; ++i) {
-    trial.input_delay_s.setConstant(step * i);
-    const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
-    double cost = 0.0;
-    if (!solve_numerators(relative, groups, trial.B, cost) || !(cost < best_cost)) continue;
-    best_cost = cost;
-    best.setConstant(step * i);
-  }
-  beta.input_delay_s = best;
 }
 
 }  // namespace stageid

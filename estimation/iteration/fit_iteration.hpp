@@ -45,7 +45,4 @@ double signal_cost(const FitProblem& problem);
 /// With larger damping, no step is tried.
 inline constexpr double kLargestLevenberg = 1e8;
 
-/// Sets all input delays to the one of least cost on a grid, with numerators solved for every candidate.
-void search_delay(const FitProblem& problem, FitParameters& beta);
-
 }  // namespace stageid

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "frf/response/line_scatter.hpp"
+#include "frf/response/neighbour_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {

@@ -15,7 +15,7 @@
 #include "estimation/request/weight_file.hpp"
 #include "frf/response/dc_line.hpp"
 #include "frf/response/hold_compensation.hpp"
-#include "frf/response/line_scatter.hpp"
+#include "frf/response/neighbour_scatter.hpp"
 #include "frf/response/nonlinearity.hpp"
 #include "frf/response/nonlinearity_sentence.hpp"
 

@@ -7,7 +7,7 @@
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
-#include "frf/response/line_scatter.hpp"
+#include "frf/response/neighbour_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {

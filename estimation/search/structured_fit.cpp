@@ -1,5 +1,5 @@
 #include "estimation/search/structured_fit.hpp"
-#include "estimation/search/channel_delays.hpp"
+#include "estimation/search/late_channels.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "frf/response/line_estimate.hpp"
+#include "frf/response/noise_covariance.hpp"
 #include "frf/response/nonlinearity.hpp"
 
 namespace stageid {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "frf/response/line_estimate.hpp"
+#include "frf/response/noise_covariance.hpp"
 
 namespace stageid {
 namespace {

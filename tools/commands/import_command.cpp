@@ -13,11 +13,11 @@
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
-#include "tools/exchange/import/foreign_arrays.hpp"
-#include "tools/exchange/import/foreign_frf.hpp"
-#include "tools/exchange/import/import_frf.hpp"
-#include "tools/exchange/import/import_log.hpp"
+#include "tools/exchange/import/array_formats.hpp"
+#include "tools/exchange/import/frf_formats.hpp"
 #include "tools/exchange/import/import_summary.hpp"
+#include "tools/exchange/import/mapped_frf.hpp"
+#include "tools/exchange/import/mapped_log.hpp"
 #include "tools/exchange/import/si_unit.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
@@ -114,14 +114,14 @@ ImportSummary ImportCommand::import_with_map() const {
   if (map.kind == ImportMap::Kind::log) {
     const std::vector<ForeignFile> files = foreign_files(input_, map);
     for (const ForeignFile& file : files) require_no_input(output_, {file.path, map_});
-    return import_log(files, map, output_);
+    return import_mapped_log(files, map, output_);
   }
   if (!map.files.empty())
     throw FormatError(map_, "",
                       "key 'files' is for kind: log only; give the file on the command line");
   require_input();
   require_frf_output(output_);
-  return write_imported(output_, import_frf(read_foreign_arrays(input_), map), input_, {});
+  return write_imported(output_, mapped_frf(read_foreign_arrays(input_), map), input_, {});
 }
 
 void ImportCommand::require_input() const {

@@ -16,8 +16,8 @@
 #include "tools/plot/gnuplot.hpp"
 #include "tools/plot/picture.hpp"
 #include "tools/plot/response_pictures.hpp"
-#include "tools/report/report.hpp"
 #include "tools/report/report_input.hpp"
+#include "tools/report/report_page.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {

@@ -9,7 +9,7 @@
 #include "tools/dashboard/dashboard_server.hpp"
 #include "tools/dashboard/live_levels.hpp"
 #include "tools/dashboard/live_response.hpp"
-#include "tools/report/page_template.hpp"
+#include "tools/report/html_text.hpp"
 #include "tools/report/report_assets.hpp"
 #include "tools/terminal/interrupt.hpp"
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_text.hpp"
-#include "tools/report/page_template.hpp"
+#include "tools/report/html_text.hpp"
 #include "tools/report/timing_json.hpp"
 
 namespace stageid {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "tools/plot/picture.hpp"
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid {
 

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid::report {
 

@@ -5,7 +5,7 @@
 
 #include "estimation/start/stabilization.hpp"
 #include "frf/response/nonlinearity.hpp"
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid::report {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid {
 

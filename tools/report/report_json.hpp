@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid::report {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimation/model/additive_model.hpp"
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid {
 

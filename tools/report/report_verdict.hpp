@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "excitation/words/words.hpp"
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid {
 

@@ -10,7 +10,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "tests/tools/report/packed_reader.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid {
 namespace test_report_page {

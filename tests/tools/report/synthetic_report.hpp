@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 namespace stageid::test {
 

@@ -1,4 +1,4 @@
-#include "tools/exchange/import/import_log.hpp"
+#include "tools/exchange/import/mapped_log.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,7 +15,7 @@
 #include "acquisition/formats/convert_log.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "tools/exchange/import/foreign_arrays.hpp"
+#include "tools/exchange/import/array_formats.hpp"
 #include "tools/exchange/import/import_period.hpp"
 #include "tools/exchange/import/import_rate.hpp"
 
@@ -152,8 +152,8 @@ class LogImport {
 
 }  // namespace
 
-ImportSummary import_log(const std::vector<ForeignFile>& files, const ImportMap& map,
-                         const std::filesystem::path& output) {
+ImportSummary import_mapped_log(const std::vector<ForeignFile>& files, const ImportMap& map,
+                                const std::filesystem::path& output) {
   const std::string ending = output.extension().string();
   if (ending != ".slog" && ending != ".h5" && ending != ".hdf5")
     throw std::invalid_argument(

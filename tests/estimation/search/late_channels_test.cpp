@@ -1,9 +1,9 @@
-#include "estimation/search/channel_delays.hpp"
+#include "estimation/search/late_channels.hpp"
 
 #include <gtest/gtest.h>
 
 namespace stageid {
-namespace test_channel_delays {
+namespace test_late_channels {
 
 AdditiveModel with_delays(const Eigen::VectorXd& inputs_s, const Eigen::VectorXd& outputs_s) {
   AdditiveModel model;
@@ -38,5 +38,5 @@ TEST(ChannelDelays, OfTwoTheLaterIsNamed) {
   EXPECT_EQ(text.find("a2"), std::string::npos);
 }
 
-}  // namespace test_channel_delays
+}  // namespace test_late_channels
 }  // namespace stageid

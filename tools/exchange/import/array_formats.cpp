@@ -1,4 +1,4 @@
-#include "tools/exchange/import/foreign_arrays.hpp"
+#include "tools/exchange/import/array_formats.hpp"
 
 #include <fmt/format.h>
 

@@ -8,6 +8,6 @@ namespace stageid {
 
 /// The frequency response that a map selects from the arrays of a foreign file.
 /// @throws FormatError naming the file and the array, or the map and the key that is missing or wrong.
-FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map);
+FrfEstimate mapped_frf(const ArrayList& arrays, const ImportMap& map);
 
 }  // namespace stageid

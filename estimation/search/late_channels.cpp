@@ -1,4 +1,4 @@
-#include "estimation/search/channel_delays.hpp"
+#include "estimation/search/late_channels.hpp"
 
 #include <fmt/format.h>
 

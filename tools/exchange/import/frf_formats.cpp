@@ -1,4 +1,4 @@
-#include "tools/exchange/import/foreign_frf.hpp"
+#include "tools/exchange/import/frf_formats.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/arrays/frf_csv.hpp"
 #include "tools/exchange/arrays/touchstone_reader.hpp"
-#include "tools/exchange/import/foreign_arrays.hpp"
+#include "tools/exchange/import/array_formats.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
 
 namespace stageid {

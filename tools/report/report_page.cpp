@@ -1,11 +1,11 @@
-#include "tools/report/report.hpp"
+#include "tools/report/report_page.hpp"
 
 #include <fmt/format.h>
 
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
-#include "tools/report/page_template.hpp"
+#include "tools/report/html_text.hpp"
 #include "tools/report/report_assets.hpp"
 #include "tools/report/report_json.hpp"
 

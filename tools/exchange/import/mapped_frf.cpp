@@ -1,4 +1,4 @@
-#include "tools/exchange/import/import_frf.hpp"
+#include "tools/exchange/import/mapped_frf.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -202,7 +202,7 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
 
 }  // namespace
 
-FrfEstimate import_frf(const ArrayList& arrays, const ImportMap& map) {
+FrfEstimate mapped_frf(const ArrayList& arrays, const ImportMap& map) {
   FrfEstimate frf;
   if (map.sample_rate_hz > 0.0) (void)sample_rate_of(arrays, map);  // that of the file must agree
   const std::vector<double> frequency = map.frequency.empty()

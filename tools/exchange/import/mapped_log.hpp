@@ -15,7 +15,7 @@ namespace stageid {
 /// another.
 /// @throws FormatError naming the file and the array, or the map and the key that is missing or wrong.
 /// @throws std::invalid_argument for another extension. @throws FileError
-ImportSummary import_log(const std::vector<ForeignFile>& files, const ImportMap& map,
-                         const std::filesystem::path& output);
+ImportSummary import_mapped_log(const std::vector<ForeignFile>& files, const ImportMap& map,
+                                const std::filesystem::path& output);
 
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "frf/response/line_scatter.hpp"
+#include "frf/response/neighbour_scatter.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
-namespace test_line_scatter {
+namespace test_neighbour_scatter {
 
 constexpr Eigen::Index kLines = 400;
 constexpr double kNoise = 1e-4;         // variance of the first channel
@@ -80,5 +80,5 @@ TEST(LineScatter, OfTooFewLinesNothingIsSaid) {
   EXPECT_EQ(scatter.over_noise, 0.0);
 }
 
-}  // namespace test_line_scatter
+}  // namespace test_neighbour_scatter
 }  // namespace stageid

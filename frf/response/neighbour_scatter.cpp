@@ -1,4 +1,4 @@
-#include "frf/response/line_scatter.hpp"
+#include "frf/response/neighbour_scatter.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "tools/report/page_template.hpp"
+#include "tools/report/html_text.hpp"
 
 namespace stageid {
 
