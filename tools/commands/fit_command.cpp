@@ -62,11 +62,12 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
   command->add_option("--hold", flags_.hold,
-                      "none | phase: half a sample of delay | sinc: also its magnitude | exact: "
+                      "none | phase: half a sample of delay | sinc: phase and magnitude | exact: "
                       "hold, delay and sampler, including aliasing. Default: from the FRF");
-  command->add_option("--delay", flags_.delay,
-                      "SECONDS | estimate | per_channel. Default: from the FRF; per_channel if the "
-                      "data require it");
+  command->add_option(
+      "--delay", flags_.delay,
+      "SECONDS | estimate | per_channel. Default: estimate, or per_channel if the data "
+      "require it; the delay of a compensated FRF");
   command->add_option("--rigid-body", flags_.rigid_body,
                       "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
                       "below the lines, for a body on soft springs | suspension:F1:F2: the same at "

@@ -130,7 +130,7 @@ FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
                       "hold; default: as declared in the log");
   command->add_option(
       "--stage", stage_,
-      "stage file for the health checks of the data; default: the one stored in the log");
+      "stage or controller file for the health checks; default: the one stored in the log");
   command->add_flag("--no-health", no_health_, "skip the health checks of the data");
   command
       ->add_option("--fft-wisdom", fft_wisdom_,

@@ -36,7 +36,9 @@ IdentifyCommand::IdentifyCommand(CLI::App& app, Console& console) : console_(con
   command->add_option("-o,--output", output_, "directory for all results")->required();
   command->add_flag("--resume", resume_,
                     "continue an interrupted identification; steps that are up to date are kept");
-  command->add_flag("--force", force_, "measure even if a limit would be exceeded");
+  command->add_flag(
+      "--force", force_,
+      "measure even if the design predicts that a limit is exceeded; limits still stop the run");
   add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }

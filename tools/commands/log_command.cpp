@@ -118,7 +118,7 @@ LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
   info_command->add_flag("--health", health_, "read all samples and report health findings");
   info_command->add_option(
       "--stage", stage_,
-      "with --health: stage file for the checks; default: the one stored in the log");
+      "with --health: stage or controller file for the checks; default: the one stored in the log");
   info_command->final_callback([this] { info(); });
 
   CLI::App* verify_command =

@@ -40,7 +40,8 @@ ModesCommand::ModesCommand(CLI::App& app, Console& console) : console_(console) 
   command->add_option("frf", frf_, "frf.h5")->required();
   command->add_option("-o,--output", output_, "modes.json to write");
   command->add_option("--band", band_hz_, "LOW HIGH, Hz")->expected(2);
-  add_choice(*command, "--kind", kind_, "response | accelerance | whitened (by the variances)");
+  add_choice(*command, "--kind", kind_,
+             "response: G | accelerance: omega^2 G | whitened: G over its standard deviations");
   command->add_option("--prominence", prominence_db_, "minimum prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();

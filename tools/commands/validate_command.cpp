@@ -96,7 +96,7 @@ ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(con
       ->expected(2);
   command->add_option(
       "--stage", stage_,
-      "stage file for the health checks of a log; default: the one stored in the log");
+      "stage or controller file for the health checks of a log; default: the one stored in it");
   add_threads(*command, threads_);
   command->final_callback([this] { run(); });
 }

@@ -106,7 +106,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
        "weighting of the cost; by_frf: noise variance if known, else total variance, else "
        "relative; a single distorted realization is weighted by the scatter of its lines");
   word("hold", f.hold, words_of<HoldModel>(),
-       "none; phase: half a sample of delay; sinc: also its magnitude; exact: hold, delay and "
+       "none; phase: half a sample of delay; sinc: phase and magnitude; exact: hold, delay and "
        "sampler, including aliasing; by_frf: exact unless the FRF is already hold-compensated");
 
   /// Reads a word or a rank. @returns the rank; 0: a word
