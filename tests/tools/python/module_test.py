@@ -203,7 +203,11 @@ class SameAsTheProgram(unittest.TestCase):
         frf = stageid.read_frf(WORK / "frf.h5")
         bare = stageid.Frf(frf.frequency_hz, frf.response, inputs=frf.inputs, outputs=frf.outputs,
                            sample_rate_hz=frf.sample_rate_hz, hold=frf.hold)
-        found = stageid.validate(stageid.read_model(WORK / "model.json"), bare)
+        model = stageid.read_model(WORK / "model.json")
+        found = stageid.validate(model, bare)
+        self.assertEqual(found.variance, "scatter")
+        self.assertTrue(found.explained and 0.5 < found.chi_square_per_dof < 2)
+        found = stageid.validate(model, bare.select(band_hz=(100.0, 140.0)))  # too few lines for a scatter
         for name in ("variance", "chi_square_per_dof", "expected_chi_square", "reason", "whitened_above_95",
                      "whiteness", "whiteness_limit"):
             self.assertIsNone(getattr(found, name), name)
