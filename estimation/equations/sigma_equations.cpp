@@ -46,8 +46,7 @@ Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
   return std::move(triangles.front());
 }
 
-/// The share of the path of log H up to each line, summed over all channels, kPathShare of it; the rest is that of the
-/// lines.
+/// Fraction of the path up to each line: kPathShare by the change of log H over all channels, the rest by line index.
 Eigen::VectorXd path_of(const Eigen::MatrixXcd& H) {
   const Eigen::Index last = H.cols() - 1;
   Eigen::VectorXd path = Eigen::VectorXd::Zero(H.cols());
@@ -145,14 +144,14 @@ Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) co
   return by_factors(phi);
 }
 
-/// Lines at equal steps of the path: all of them where they are few for the poles.
+/// About `count` lines at equal steps of the path; after a steep one, all lines until their number is made up.
 std::vector<Eigen::Index> SigmaEquations::representative(Eigen::Index count) const {
   std::vector<Eigen::Index> lines;
   double next = 0.0;
   for (Eigen::Index k = 0; k < x_.size(); ++k) {
     if (path_[k] < next && x_.size() > count) continue;
     lines.push_back(k);
-    next = std::max(next + 1.0 / static_cast<double>(count), path_[k]);
+    next += 1.0 / static_cast<double>(count);
   }
   return lines;
 }

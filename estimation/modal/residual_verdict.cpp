@@ -131,7 +131,7 @@ constexpr Eigen::Index kTile = 64;  // lines
 using VarianceOfTile =
     std::function<Eigen::MatrixXd(Eigen::Index first, const Eigen::MatrixXcd& E)>;
 
-/// Judges by one variance. @returns what is not explained
+/// Judges by one variance.
 void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
               const Eigen::MatrixXd& weights, const VarianceOfTile& variance_of, const char* causes,
               ResidualVerdict& verdict) {
@@ -156,7 +156,8 @@ void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
   verdict.reason = verdict.explained ? "" : parts.reason(*unexplained, causes);
 }
 
-/// Data without variances: what their lines scatter is that of the residual. What a model misses is smooth.
+/// For data without variances: their variance is the scatter of the residual from line to line. What a model misses is
+/// smooth.
 ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse& model,
                                 const Eigen::MatrixXd& weights, int threads) {
   ResidualVerdict verdict;

@@ -101,9 +101,10 @@ class AutomaticFit {
     }
     restructure();
     if (!at_rounding()) {  // else the last fit is sufficient
-      quick_.max_iterations = options_.max_iterations;
-      quick_.deviation_tolerance = settled();
-      adopt(fit_additive_model(frf_, best_.model, quick_));
+      FitOptions last = quick_;
+      last.max_iterations = options_.max_iterations;
+      last.deviation_tolerance = settled();
+      adopt(fit_additive_model(frf_, best_.model, last));
     }
     say("{}, reached by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
         best_.model.fit.cost);
@@ -225,9 +226,11 @@ class AutomaticFit {
     double before = 0.0;
     do {
       before = cost();
-      adopt(fit_additive_model(frf_, best_.model, while_free));
+      FitResult free = fit_additive_model(frf_, best_.model, while_free);
+      if (free.status == FitStatus::singular) break;
+      adopt(std::move(free));
     } while (cost() < 0.5 * before && !at_rounding() && !limit_reached());
-    if (at_rounding() || best_.status == FitStatus::singular) return;
+    if (at_rounding()) return;
     const int hidden = hold_hidden_modes(frf_, quick_.user_weights, threads_, best_);
     say("{} of them exceed the noise; the poles of the other {} are held",
         count_modes(best_.model) - hidden, hidden);
@@ -583,7 +586,7 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
       const int surplus = std::min(static_cast<int>(most) - selection.exactly,
                                    1 + selection.exactly / static_cast<int>(kShareAtOnce));
       double before = std::numeric_limits<double>::infinity();
-      while (best->cost() < 0.5 * before && !best->explains_data()) {
+      while (surplus > 0 && best->cost() < 0.5 * before && !best->explains_data()) {
         before = best->cost();
         if (go(*best, surplus)) break;
       }

@@ -16,12 +16,14 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int kIterations = 20;
-constexpr double kSettled = 1e-3;  // movement of every pole in its own half-power widths
+constexpr double kSettled = 1e-3;         // movement of every pole in its own half-power widths
+constexpr double kSettledExactly = 1e-9;  // without noise
 constexpr double kStartDamping = 0.01;
 constexpr double kLeastDamping = 1e-5;
-constexpr double kLinesWide = 3.0;  // minimum half-power width of a pole, but see narrowest()
-constexpr double kExact = 2e-11;    // relative residual that is only rounding
-constexpr double kAccurate = 1e-4;  // relative residual below which sums are too inaccurate
+constexpr double kLinesWide = 3.0;   // minimum half-power width of a pole, but see narrowest()
+constexpr double kExact = 2e-11;     // relative residual that is only rounding
+constexpr double kAccurate = 1e-4;   // relative residual below which sums are too inaccurate
+constexpr double kNoiseless = 1e-8;  // relative residual that is no measurement's noise
 
 Eigen::VectorXcd complex(const SplitMatrix& column) {
   return column.re.cast<Complex>() + Complex(0.0, 1.0) * column.im.cast<Complex>();
@@ -50,7 +52,8 @@ class Relocation {
   std::vector<ModeCandidate> run(std::size_t modes) {
     spread(modes);
     for (int i = 0; i < kIterations; ++i)
-      if (const double moved = relocate(); !(moved > (accurate_ ? 0.0 : kSettled))) break;
+      if (const double moved = relocate(); !(moved > (noiseless_ ? kSettledExactly : kSettled)))
+        break;
     return modes_of_poles();
   }
 
@@ -108,6 +111,7 @@ class Relocation {
     sigma = scale.cwiseProduct(sigma);
     const double d = sigma[n];
     if (!sigma.allFinite() || d == 0.0) return 0.0;
+    noiseless_ = accurate_ && squares < kNoiseless * kNoiseless * signal_;
     accurate_ = squares < kAccurate * kAccurate * signal_;
     return move(zeros_of_sum(poles_, sigma.head(n) / d));
   }
@@ -115,7 +119,7 @@ class Relocation {
   /// The minimum damping ratio at a frequency, limited to that of the start. A sharper pole would be determined by the
   /// noise of one line, unless there is none. Modes may be sharper; the fit that follows finds their damping.
   double narrowest(double omega_rad_s) const {
-    if (accurate_) return kLeastDamping;
+    if (noiseless_) return kLeastDamping;
     const Eigen::VectorXd& omega = lines_.omega_rad_s;
     const Eigen::Index last = omega.size() - 1;
     const double* above = std::lower_bound(omega.data(), omega.data() + last, omega_rad_s);
@@ -180,6 +184,7 @@ class Relocation {
   int integrators_ = 0;
   bool constant_ = false;
   bool accurate_ = false;
+  bool noiseless_ = false;
   double signal_ = 0.0;  // sum w |G|^2
   std::optional<SigmaEquations> equations_;
   PoleSet poles_;  // x

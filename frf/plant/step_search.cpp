@@ -332,7 +332,7 @@ void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& membe
     const double by_common = explained(common, {t});
     const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
     const double by_own = own.empty() ? 0.0 : explained(own.front(), {t});
-    if (by_common > kOwnPower && by_common + kOwnCertainty > by_own)
+    if (by_common > kOwnPower && by_common + std::min(kOwnCertainty, by_common) > by_own)
       found.push_back(common);
     else
       others.push_back(t);

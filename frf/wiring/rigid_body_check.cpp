@@ -41,14 +41,16 @@ struct Gains {
   Eigen::MatrixXd weight;
 };
 
-/// The terms of a fit over the lines, in this order.
-enum Terms : Index { constant = 1, compliance = 3, suspension = 4 };
+// Number of terms of a fit over the lines: A alone, with compliance, and with a suspension.
+constexpr Index kConstantTerms = 1;
+constexpr Index kComplianceTerms = 3;
+constexpr Index kSuspensionTerms = 4;
 
 /// The constant terms of entry (i, j) of A and of A0, and their variance.
-Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j, Terms terms) {
+Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j, Index terms) {
   const auto K = static_cast<Index>(lines.size());
   const double highest = std::pow(lines.back().omega_rad_s, 2);
-  Eigen::MatrixXd X(K, Index{terms});
+  Eigen::MatrixXd X(K, terms);
   Eigen::MatrixXd rhs(K, 2);
   for (Index k = 0; k < K; ++k) {
     const PlantLine& line = lines[static_cast<std::size_t>(k)];
@@ -70,7 +72,7 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j,
   return {solution(0, 0), solution(0, 1), std::max(1.0, over_variance) * normal_inverse(0, 0)};
 }
 
-Gains fit_gains(const std::vector<PlantLine>& lines, Terms terms) {
+Gains fit_gains(const std::vector<PlantLine>& lines, Index terms) {
   const Index n_y = lines.front().G.rows();
   const Index n_u = lines.front().G.cols();
   Gains gains{Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u), Eigen::MatrixXd(n_y, n_u)};
@@ -117,11 +119,12 @@ struct Body {
 
 Body fit_body(const std::vector<PlantLine>& lines) {
   const auto middle = lines.begin() + static_cast<std::ptrdiff_t>(lines.size() / 2);
-  Body body{
-      fit_gains(lines, compliance),
-      {fit_gains({lines.begin(), middle}, constant), fit_gains({middle, lines.end()}, constant)}};
-  if (Gains suspended = fit_gains(lines, suspension); cost(suspended) < cost(body.all))
-    body.all = std::move(suspended);
+  Body body{fit_gains(lines, kComplianceTerms),
+            {fit_gains({lines.begin(), middle}, kConstantTerms),
+             fit_gains({middle, lines.end()}, kConstantTerms)}};
+  // With the weights of the first fit: a term more makes every entry less certain.
+  const Gains suspended{fit_gains(lines, kSuspensionTerms).A, body.all.A0, body.all.weight};
+  if (cost(suspended) < cost(body.all)) body.all = fit_gains(lines, kSuspensionTerms);
   return body;
 }
 
@@ -222,7 +225,7 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
       return change.kind == ChannelChange::Kind::gain && change.value > 0.0;
     });
     body.all = recorded;
-    for (const ChannelChange& change : changes) undo(change, body);
+    for (const ChannelChange& change : changes) body.all = undone(change, body.all);
   }
   check.deviation = deviation();
   for (const ChannelChange& change : changes)

@@ -29,10 +29,11 @@ struct RigidBodyCheck {
 /// closer to A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
 /// The variance of A is that of the scatter of the lines where it exceeds the noise: a nonlinear plant distorts the
 /// lines in all periods alike.
-/// The change that brings A closest to A0 is accepted if it does so in the lower and in the upper half of the lines too,
-/// and the search is repeated: a channel's gain is the same on all lines, a suspension that stiffens with the motion is not. Positive gains after which the body
-/// still differs by more than kLargestRigidDeviation are no explanation and are discarded. Entries have a tolerance of 10 % of
-/// the rms of their row, the accuracy of amplifiers, masses and positions. A gain is accepted from 30 % on, or if it
+/// The change that brings A closest to A0 is accepted if it does so in the lower and in the upper half of the lines
+/// too, and the search is repeated: a channel's gain is the same on all lines, a suspension that stiffens with the
+/// motion is not. Positive gains after which the body still differs by more than kLargestRigidDeviation are no
+/// explanation and are discarded. Entries have a tolerance of 10 % of the rms of their row, the accuracy of
+/// amplifiers, masses and positions. A gain is accepted from 30 % on, or if it
 /// is negative.
 /// The band ends at 0.7 of the frequency at which omega^2 |G| exceeds its median by half.
 ///

@@ -66,8 +66,8 @@ FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
                       "hold, delay and sampler, including aliasing. Default: from the FRF");
   command->add_option(
       "--delay", flags_.delay,
-      "SECONDS | estimate | per_channel. Default: estimate, or per_channel if the data "
-      "require it; the delay of a compensated FRF");
+      "SECONDS | estimate | per_channel. Default: estimate (per_channel if the data "
+      "require it); the known delay of a compensated FRF; none without a hold");
   command->add_option("--rigid-body", flags_.rigid_body,
                       "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
                       "below the lines, for a body on soft springs | suspension:F1:F2: the same at "

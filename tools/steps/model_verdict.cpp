@@ -48,7 +48,7 @@ std::string verdict_line(const ModelVerdict& verdict) {
   return fmt::format(
       "verdict: trustworthy{}{}",
       verdict.validated ? "; noise and known distortion explain the error on held-back data"
-                        : "; not validated: no held-back data",
+                        : "; not validated: no held-back data, or too few lines without variances",
       verdict.reasons.empty() ? "" : fmt::format(". Check: {}", fmt::join(verdict.reasons, "; ")));
 }
 

@@ -14,7 +14,7 @@ namespace stageid {
 /// Whether a model can be trusted, as in the exit code.
 struct ModelVerdict {
   bool trustworthy = true;
-  bool validated = false;            ///< compared with held-back data with variances
+  bool validated = false;            ///< compared with held-back data
   std::vector<std::string> reasons;  ///< the gravest first; for a trustworthy model, warnings
 };
 

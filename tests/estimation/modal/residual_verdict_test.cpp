@@ -151,7 +151,7 @@ TEST(ResidualVerdict, DataWithoutVariancesAreJudgedByTheirOwnScatter) {
 }
 
 // A window over the record correlates the noise of neighbouring lines: Hann, and an exponential one that ends at 1 %.
-TEST(ResidualVerdict, AWindowMakesNoiseNoError) {
+TEST(ResidualVerdict, NoiseBehindAWindowIsNotAnError) {
   constexpr Eigen::Index kReach = 8;
   const auto is_explained = [](const std::function<std::complex<double>(double)>& spectrum) {
     FrfEstimate frf = noise(18, 2000, 0);

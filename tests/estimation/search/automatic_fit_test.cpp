@@ -155,7 +155,6 @@ TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
   EXPECT_EQ(frequencies(fit.model).size(), 2U);
 }
 
-// There is no largest number: a search that ended at 60 modes was called trustworthy.
 /// The exact response of one channel with these modes, without variances.
 FrfEstimate response_of(const std::vector<double>& frequency_hz, double damping_ratio,
                         const Eigen::VectorXd& lines_hz) {
@@ -176,6 +175,7 @@ FrfEstimate response_of(const std::vector<double>& frequency_hz, double damping_
   return frf;
 }
 
+// There is no largest number: a search that ended at 60 modes was called trustworthy.
 TEST(AutomaticFit, FindsManyModes) {
   std::vector<double> frequency_hz(70);
   for (std::size_t r = 0; r < frequency_hz.size(); ++r)

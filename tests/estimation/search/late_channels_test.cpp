@@ -19,19 +19,19 @@ AdditiveModel with_delays(const Eigen::VectorXd& inputs_s, const Eigen::VectorXd
   return model;
 }
 
-TEST(ChannelDelays, ALateSensorAndAnEarlyActuatorAreNamed) {
+TEST(LateChannels, ALateSensorAndAnEarlyActuatorAreNamed) {
   const std::string text = late_channels(
       with_delays(Eigen::Vector4d(2e-3, 2e-3, 1.5e-3, 2e-3), Eigen::Vector3d(0.0, 1e-3, 0.0)));
   EXPECT_NE(text.find("z2 +1, a3 -0.5 samples relative"), std::string::npos) << text;
 }
 
-TEST(ChannelDelays, DifferencesWithinTheirDeviationsAreNotNamed) {
+TEST(LateChannels, DifferencesWithinTheirDeviationsAreNotNamed) {
   EXPECT_EQ(late_channels(
                 with_delays(Eigen::Vector3d(2e-3, 2.004e-3, 1.997e-3), Eigen::Vector2d(0.0, 3e-6))),
             "");
 }
 
-TEST(ChannelDelays, OfTwoTheLaterIsNamed) {
+TEST(LateChannels, OfTwoTheLaterIsNamed) {
   const std::string text =
       late_channels(with_delays(Eigen::Vector2d(3e-3, 2e-3), Eigen::VectorXd::Zero(1)));
   EXPECT_NE(text.find("a1 +1 samples"), std::string::npos) << text;

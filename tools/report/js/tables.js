@@ -141,7 +141,7 @@ function buildValidation() {
   const body = section('validation', 'Validation', 'Validation', 'On data not used in the fit.');
   body.append(facts([
     ['relative rms error', percent(v.relative_rms_error, 3)], ['normalized error', percent(v.normalized_error, 3)],
-    ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (expected from noise alone: ' + (v.expected_chi_square > 0 ? number(v.expected_chi_square) : 'unknown') + ')' : 'unknown: no variances'],
+    ['chi-square per degree of freedom', v.chi_square_per_dof > 0 ? number(v.chi_square_per_dof) + ' (expected from ' + ({noise: 'noise', scatter: 'the scatter of neighbouring lines'}[v.variance] || 'noise and distortion') + ' alone: ' + (v.expected_chi_square > 0 ? number(v.expected_chi_square) : 'unknown') + ')' : 'unknown: too few lines without variances'],
     ['whitened error above its 95 % point', v.chi_square_per_dof > 0 ? percent(v.whitened_above_95) + ' (expected: 5 %)' : null],
     ['largest autocorrelation over lines', v.whiteness_limit > 0 ? number(v.whiteness) + ' (99 % limit ' + number(v.whiteness_limit) + ')' : null],
   ]));
