@@ -27,8 +27,8 @@ class SigmaEquations {
   Eigen::MatrixXd triangle(const PoleSet& poles, bool accurate) const;
 
   const Eigen::VectorXcd& x() const noexcept { return x_; }
-  /// N, rising from 0 to 1 (to 0.5 for a constant response): half of it with the change of log H, half with the lines. Where it rises steeply, the data
-  /// need many poles and tell much about them.
+  /// N, rising from 0 to 1 (to 0.5 for a constant response): half of it with the change of log H, half with the lines.
+  /// Where it rises steeply, the data need many poles and tell much about them.
   const Eigen::VectorXd& path() const noexcept { return path_; }
 
  private:

@@ -168,16 +168,20 @@ ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse
   judge_by(
       frf, model, weights,
       [&](Eigen::Index first, const Eigen::MatrixXcd& E) -> Eigen::MatrixXd {
-        FrfEstimate rest;
-        rest.frequency_hz = frf.frequency_hz.segment(first, E.cols());
-        rest.response = E;
-        return verdict.scatter.middleCols(first, E.cols()) = line_scatter(rest, threads).variance;
+        return verdict.scatter.middleCols(first, E.cols()) =
+                   scatter_variance(frf.frequency_hz.segment(first, E.cols()), E, threads);
       },
       "neighbouring lines differ by", verdict);
   return verdict;
 }
 
 }  // namespace
+
+ModelLinesResponse lines_of(const AdditiveModel& model, const FrfEstimate& frf) {
+  return [&model, &frf](Eigen::Index first, Eigen::Index count) {
+    return response(model, frf.frequency_hz.segment(first, count), model.hold);
+  };
+}
 
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
                                const Eigen::MatrixXd& weights, int threads,

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 
+#include "estimation/model/additive_model.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/response/distortion_variance.hpp"
 #include "frf/response/frf_estimate.hpp"
@@ -38,6 +39,9 @@ struct ResidualVerdict {
 
 /// The response of a model on the lines [first, first + count), (n_y n_u) x count, as measured.
 using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Eigen::Index count)>;
+
+/// The response of a model through its own hold on the lines of `frf`; both must outlive it.
+ModelLinesResponse lines_of(const AdditiveModel& model, const FrfEstimate& frf);
 
 /// Compares the residual of a model with the variances of the data, one tile of lines after another.
 ///

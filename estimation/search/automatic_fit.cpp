@@ -115,13 +115,7 @@ class AutomaticFit {
   bool limit_reached() const { return options_.limit->reached(); }
 
   bool explains_data() const {
-    return judge_residual(
-               frf_,
-               [&](Eigen::Index first, Eigen::Index count) {
-                 return response(best_.model, frf_.frequency_hz.segment(first, count),
-                                 best_.model.hold);
-               },
-               quick_.user_weights, threads_)
+    return judge_residual(frf_, lines_of(best_.model, frf_), quick_.user_weights, threads_)
         .explained;
   }
 

@@ -19,12 +19,9 @@ namespace {
 double noise_of(const FrfEstimate& frf, const Eigen::MatrixXd& weights, const FitResult& fit,
                 int threads) {
   const double all = fit.model.fit.cost / static_cast<double>(frf.response.rows());
-  FrfEstimate rest;
-  rest.frequency_hz = frf.frequency_hz;
-  rest.response = frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
-  const LineScatter scatter = line_scatter(rest, threads);
-  if (scatter.variance.size() == 0) return all;
-  return std::min(all, 0.5 * weights.cwiseProduct(scatter.variance).mean());
+  const Eigen::MatrixXcd E = frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
+  const Eigen::MatrixXd variance = scatter_variance(frf.frequency_hz, E, threads);
+  return variance.size() == 0 ? all : std::min(all, 0.5 * weights.cwiseProduct(variance).mean());
 }
 
 }  // namespace

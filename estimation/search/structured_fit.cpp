@@ -1,5 +1,4 @@
 #include "estimation/search/structured_fit.hpp"
-#include "estimation/search/late_channels.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,6 +13,7 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/search_limit.hpp"
+#include "estimation/search/late_channels.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/start/residual_modes.hpp"
@@ -193,13 +193,8 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
 /// Why the residual is clearly larger than noise and known distortion, with advice; else empty.
 std::string why_unexplained(const FrfEstimate& frf, const FitOptions& options, bool cut_short,
                             const FitResult& result) {
-  const AdditiveModel& model = result.model;
-  const ResidualVerdict verdict = judge_residual(
-      frf,
-      [&](Eigen::Index first, Eigen::Index count) {
-        return response(model, frf.frequency_hz.segment(first, count), model.hold);
-      },
-      *options.user_weights, options.threads);
+  const ResidualVerdict verdict =
+      judge_residual(frf, lines_of(result.model, frf), *options.user_weights, options.threads);
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);

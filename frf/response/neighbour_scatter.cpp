@@ -22,15 +22,15 @@ constexpr Eigen::Index kWindow = kOrder + 1 + kScatterDof;
 constexpr double kMostByDistance = 3.0;
 constexpr double kMostOfResponse = 0.04;
 
-LocalFit fit_around(const FrfEstimate& frf, Eigen::Index k) {
-  const Eigen::Index first = std::clamp<Eigen::Index>(k - kWindow / 2, 0, frf.lines() - kWindow);
-  const Eigen::ArrayXd away =
-      frf.frequency_hz.segment(first, kWindow).array() - frf.frequency_hz[k];
+LocalFit fit_around(const Eigen::VectorXd& frequency_hz, const Eigen::MatrixXcd& lines,
+                    Eigen::Index k) {
+  const Eigen::Index first = std::clamp<Eigen::Index>(k - kWindow / 2, 0, lines.cols() - kWindow);
+  const Eigen::ArrayXd away = frequency_hz.segment(first, kWindow).array() - frequency_hz[k];
   LocalProblem problem;
-  problem.Z = frf.response.middleCols(first, kWindow);
+  problem.Z = lines.middleCols(first, kWindow);
   problem.r = (away / away.abs().maxCoeff()).matrix();
   problem.groups = {kWindow};
-  problem.independent_noise = problem.pole_channels = frf.response.rows();
+  problem.independent_noise = problem.pole_channels = lines.rows();
   problem.K.resize(kOrder + 1, kWindow);
   for (Eigen::Index i = 0; i <= kOrder; ++i)
     problem.K.row(i) = problem.r.array()
@@ -74,14 +74,21 @@ double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 bool has_line_scatter(Eigen::Index lines) noexcept { return lines >= kWindow; }
 
+Eigen::MatrixXd scatter_variance(const Eigen::VectorXd& frequency_hz, const Eigen::MatrixXcd& lines,
+                                 int threads) {
+  if (!has_line_scatter(lines.cols())) return {};
+  Eigen::MatrixXd variance(lines.rows(), lines.cols());
+  for_each_line(worker_count(threads), lines.cols(), [&](Eigen::Index k) {
+    const LocalFit fit = fit_around(frequency_hz, lines, k);
+    variance.col(k) = fit.residual.rowwise().squaredNorm() / fit.dof;
+  });
+  return variance;
+}
+
 LineScatter line_scatter(const FrfEstimate& frf, int threads) {
   LineScatter scatter;
-  if (!has_line_scatter(frf.lines())) return scatter;
-  scatter.variance.resize(frf.response.rows(), frf.lines());
-  for_each_line(worker_count(threads), frf.lines(), [&](Eigen::Index k) {
-    const LocalFit fit = fit_around(frf, k);
-    scatter.variance.col(k) = fit.residual.rowwise().squaredNorm() / fit.dof;
-  });
+  scatter.variance = scatter_variance(frf.frequency_hz, frf.response, threads);
+  if (scatter.variance.size() == 0) return scatter;
   scatter.dof = static_cast<double>(kScatterDof);
   scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
   return scatter;
@@ -91,13 +98,9 @@ bool lines_are_coarse(const FrfEstimate& frf, const LineScatter& scatter, int th
   if (frf.lines() < 2 * kWindow) return true;
   if (median_ratio(scatter.variance, frf.response.cwiseAbs2()) > kMostOfResponse) return true;
   const auto others = Eigen::seq(0, frf.lines() - 1, 2);
-  FrfEstimate half;
-  half.inputs = frf.inputs;
-  half.outputs = frf.outputs;
-  half.frequency_hz = frf.frequency_hz(others);
-  half.response = frf.response(Eigen::all, others);
-  return median_ratio(line_scatter(half, threads).variance, scatter.variance(Eigen::all, others)) >
-         kMostByDistance;
+  const Eigen::MatrixXd of_half =
+      scatter_variance(frf.frequency_hz(others), frf.response(Eigen::all, others), threads);
+  return median_ratio(of_half, scatter.variance(Eigen::all, others)) > kMostByDistance;
 }
 
 }  // namespace stageid

@@ -35,7 +35,12 @@ struct LineScatter {
 /// @returns empty matrices if there are too few lines
 LineScatter line_scatter(const FrfEstimate& frf, int threads = 0);
 
-/// Whether there are enough lines for line_scatter().
+/// The variance of line_scatter() for any values on lines: a response or a residual. @param lines n_c x N
+/// @returns n_c x N; empty if there are too few lines
+Eigen::MatrixXd scatter_variance(const Eigen::VectorXd& frequency_hz, const Eigen::MatrixXcd& lines,
+                                 int threads = 0);
+
+/// Whether there are enough lines for a scatter.
 bool has_line_scatter(Eigen::Index lines) noexcept;
 
 /// Whether the lines are too coarse for line_scatter(), so that the response itself looks like scatter. There are

@@ -123,8 +123,9 @@ Body fit_body(const std::vector<PlantLine>& lines) {
             {fit_gains({lines.begin(), middle}, kConstantTerms),
              fit_gains({middle, lines.end()}, kConstantTerms)}};
   // With the weights of the first fit: a term more makes every entry less certain.
-  const Gains suspended{fit_gains(lines, kSuspensionTerms).A, body.all.A0, body.all.weight};
-  if (cost(suspended) < cost(body.all)) body.all = fit_gains(lines, kSuspensionTerms);
+  Gains suspended = fit_gains(lines, kSuspensionTerms);
+  if (cost({suspended.A, body.all.A0, body.all.weight}) < cost(body.all))
+    body.all = std::move(suspended);
   return body;
 }
 

@@ -139,10 +139,10 @@ NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
       ->capture_default_str();
   modbus_.add_options(*command);
   command
-      ->add_option("--watchdog", watchdog_s_,
-                   "stop the stage if the host is silent for this many seconds. 0: over CAN, "
-                   "'watchdog_s' of "
-                   "the group 'can'; over Modbus, the time of a repeated request plus one sample")
+      ->add_option(
+          "--watchdog", watchdog_s_,
+          "stop the stage if the host is silent for this many seconds. 0: over CAN, 'watchdog_s' "
+          "of the group 'can'; over Modbus, the time of a repeated request plus one sample")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([this] { run(); });
 }
