@@ -104,9 +104,14 @@ void Examination::check_samples() {
           sensor ? expected_to_respond(c, known) || !known
                  : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
       if (!driven) continue;
-      find(Severity::fault, Cause::dead, name(c), "dead: repeats one value",
-           fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz),
-           "check its cable and amplifier, then measure again");
+      const std::string figure = fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz);
+      if (scan.is_coarse())
+        find(Severity::fault, Cause::resolution, name(c),
+             "repeats one value: it moves by less than a step of its converter, or is dead", figure,
+             "raise the level or use a finer range, or check its cable, then measure again");
+      else
+        find(Severity::fault, Cause::dead, name(c), "dead: repeats one value", figure,
+             "check its cable and amplifier, then measure again");
       spoilt_.push_back(c);
       continue;
     }

@@ -49,14 +49,17 @@ enum class Cause : std::uint8_t {
   excitation_timing,  ///< the excitation was recorded whole samples late or early
   drift,              ///< the response changes during the measurement
   actuator_step,      ///< an actuator applies its recorded command in coarse steps
+  resolution,         ///< a channel stays within one step of its converter, or is dead
 };
 template <>
 inline constexpr std::array kWords<Cause> = {
-    "dead",      "saturated",    "marked",       "late",        "swapped",      "sign",
-    "scale",     "skew",         "unrecorded",   "controller",  "rigid_body",   "unknown_stage",
-    "injection", "excluded",     "excitation",   "inputs",      "incoherent",   "interpolation",
-    "aperiodic", "unsettled",    "uneven_noise", "limit_cycle", "lost_samples", "excitation_timing",
-    "drift",     "actuator_step"};
+    "dead",         "saturated",     "marked",       "late",
+    "swapped",      "sign",          "scale",        "skew",
+    "unrecorded",   "controller",    "rigid_body",   "unknown_stage",
+    "injection",    "excluded",      "excitation",   "inputs",
+    "incoherent",   "interpolation", "aperiodic",    "unsettled",
+    "uneven_noise", "limit_cycle",   "lost_samples", "excitation_timing",
+    "drift",        "actuator_step", "resolution"};
 
 /// Runs, frequencies or channels that a finding lists by name; it counts the rest.
 inline constexpr std::size_t kMostNamed = 4;

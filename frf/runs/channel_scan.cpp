@@ -67,6 +67,7 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
       const bool repeats_last = stretch_ > 0 && v == last_;
       stretch_ = repeats_last ? stretch_ + 1 : 1;
       stretches_ += repeats_last ? 0 : 1;
+      repeating_ += stretch_ == 2 ? 1 : 0;
       driven_ = repeats_last ? driven_ + counts : 1;
       longest_ = std::max(longest_, stretch_);
       longest_driven_ = std::max(longest_driven_, driven_);
@@ -86,6 +87,7 @@ void ChannelScan::add(const ChannelScan& other) noexcept {
   low_.add(other.low_);
   samples_ += other.samples_;
   stretches_ += other.stretches_;
+  repeating_ += other.repeating_;
   longest_ = std::max(longest_, other.longest_);
   longest_driven_ = std::max(longest_driven_, other.longest_driven_);
 }

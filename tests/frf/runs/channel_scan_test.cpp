@@ -43,6 +43,8 @@ TEST(ChannelScan, SumOfPartsIsTheWhole) {
   EXPECT_EQ(first.high().count, whole.high().count);
   EXPECT_EQ(first.low().count, whole.low().count);
   EXPECT_EQ(first.samples(), whole.samples());
+  EXPECT_EQ(first.expected_constant(), whole.expected_constant());
+  EXPECT_EQ(first.is_coarse(), whole.is_coarse());
 }
 
 // A slow signal behind a coarse converter repeats values for long everywhere; a stuck channel does so once.
@@ -60,6 +62,8 @@ TEST(ChannelScan, ExpectsTheRepetitionsOfACoarseConverter) {
   ChannelScan stuck;
   stuck.add(slow);
   EXPECT_LT(100.0 * stuck.expected_constant(), static_cast<double>(stuck.longest_constant()));
+  EXPECT_TRUE(coarse.is_coarse());
+  EXPECT_FALSE(stuck.is_coarse());
 }
 
 /// The definition, sample by sample.

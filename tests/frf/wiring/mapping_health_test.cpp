@@ -138,6 +138,20 @@ TEST(Chirp, FollowedByRestIsNotDead) {
   EXPECT_EQ(first_with(stuck, Cause::dead)->channel, "z2");
 }
 
+TEST(CoarseConverter, AMotionWithinOneStepIsNotCalledDead) {
+  MemoryLog log = chirp_log(2);
+  // A twentieth of the rms motion in the first experiment, and more than the second one moves the sensor.
+  const double step = 0.05 * std::sqrt(log.records[0].sensors.col(1).squaredNorm() /
+                                       static_cast<double>(log.records[0].sensors.rows()));
+  log.records[1].sensors.col(1) *= 0.0;
+  for (LogSamples& record : log.records)
+    record.sensors.col(1) = (record.sensors.col(1) / step).array().round() * step;
+  const std::vector<Finding> found = health_of(log);
+  EXPECT_EQ(first_with(found, Cause::dead), nullptr);
+  ASSERT_NE(first_with(found, Cause::resolution), nullptr);
+  EXPECT_EQ(first_with(found, Cause::resolution)->channel, "z2");
+}
+
 /// As computed by a controller from the sensors' noise.
 void add_noise_to_actuators(MemoryLog& log, double rms) {
   test::RandomNumbers random(9);
