@@ -1,7 +1,9 @@
 #include "hal/can/can_encoding.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+#include <tuple>
 
 namespace stageid {
 namespace {
@@ -17,6 +19,46 @@ CanHeader numbered(std::uint32_t number, std::uint8_t run, std::uint16_t detail)
 }
 std::uint32_t number_of(const CanHeader& header) noexcept {
   return header.sequence | static_cast<std::uint32_t>(header.kind) << 16;
+}
+
+// The bytes of chunk `index` in a memory.
+template <typename Byte>
+std::span<Byte> part_of(std::span<Byte> memory, std::size_t index) noexcept {
+  const std::size_t from = index * kCanChunkBytes;
+  return memory.subspan(from, std::min(kCanChunkBytes, memory.size() - from));
+}
+
+// The fields of the payload, in order and without gaps.
+template <typename Command>
+auto fields_of_command(Command& command) noexcept {
+  return std::tie(command.a, command.b, command.c, command.d, command.host, command.session,
+                  command.version);
+}
+template <typename State>
+auto fields_of_state(State& state) noexcept {
+  return std::tie(state.version, state.cause, state.answer, state.resident, state.gaps,
+                  state.repeated, state.rejected, state.sample, state.fingerprint, state.boot,
+                  state.host, state.session);
+}
+
+template <typename... Fields>
+void put_fields(CanFrame& frame, const std::tuple<const Fields&...>& fields) noexcept {
+  std::size_t at = kAt;
+  const auto put = [&](const auto& field) {
+    put_can(frame, at, field);
+    at += sizeof(field);
+  };
+  std::apply([&](const Fields&... field) { (put(field), ...); }, fields);
+}
+
+template <typename... Fields>
+void get_fields(const CanFrame& frame, const std::tuple<Fields&...>& fields) noexcept {
+  std::size_t at = kAt;
+  const auto get = [&]<typename Field>(Field& field) {
+    field = get_can<Field>(frame, at);
+    at += sizeof(field);
+  };
+  std::apply([&](Fields&... field) { (get(field), ...); }, fields);
 }
 
 }  // namespace
@@ -56,13 +98,7 @@ bool decode_can_values(const CanValueFrame& layout, std::span<const CanScale> sc
 CanFrame encode_can_command(const CanCommand& command) noexcept {
   CanFrame frame;
   frame.id = kCanCommandId;
-  put_can(frame, kAt, command.a);
-  put_can(frame, kAt + 8, command.b);
-  put_can(frame, kAt + 16, command.c);
-  put_can(frame, kAt + 20, command.d);
-  put_can(frame, kAt + 24, command.host);
-  put_can(frame, kAt + 28, command.session);
-  put_can(frame, kAt + 32, command.version);
+  put_fields(frame, fields_of_command(command));
   seal_can_frame(
       frame,
       {command.sequence, static_cast<std::uint8_t>(command.code), can_run(command.session), 0},
@@ -82,35 +118,17 @@ bool decode_can_command(const CanFrame& frame, CanCommand& command) noexcept {
   command = {};
   command.code = static_cast<CanCommandCode>(header.kind);
   command.sequence = header.sequence;
-  if (old) {
+  if (old)
     command.version = 1;
-    return quick || slow;
-  }
-  command.a = get_can<std::uint64_t>(frame, kAt);
-  command.b = get_can<std::uint64_t>(frame, kAt + 8);
-  command.c = get_can<std::uint32_t>(frame, kAt + 16);
-  command.d = get_can<std::uint32_t>(frame, kAt + 20);
-  command.host = get_can<std::uint32_t>(frame, kAt + 24);
-  command.session = get_can<std::uint32_t>(frame, kAt + 28);
-  command.version = get_can<std::uint8_t>(frame, kAt + 32);
+  else
+    get_fields(frame, fields_of_command(command));
   return quick || slow;
 }
 
 CanFrame encode_can_state(const CanState& state) noexcept {
   CanFrame frame;
   frame.id = kCanStateId;
-  put_can(frame, kAt, state.version);
-  put_can(frame, kAt + 1, static_cast<std::uint8_t>(state.cause));
-  put_can(frame, kAt + 2, static_cast<std::uint8_t>(state.answer));
-  put_can(frame, kAt + 3, static_cast<std::uint8_t>(state.resident));
-  put_can(frame, kAt + 4, state.gaps);
-  put_can(frame, kAt + 8, state.repeated);
-  put_can(frame, kAt + 12, state.rejected);
-  put_can(frame, kAt + 16, state.sample);
-  put_can(frame, kAt + 24, state.fingerprint);
-  put_can(frame, kAt + 28, state.boot);
-  put_can(frame, kAt + 32, state.host);
-  put_can(frame, kAt + 36, state.session);
+  put_fields(frame, fields_of_state(state));
   seal_can_frame(frame, {state.sequence, static_cast<std::uint8_t>(state.state), state.run, 0},
                  kCanStateBytes);
   return frame;
@@ -122,18 +140,7 @@ bool decode_can_state(const CanFrame& frame, CanState& state) noexcept {
   state.sequence = header.sequence;
   state.state = static_cast<NodeState>(header.kind);
   state.run = header.run;
-  state.version = get_can<std::uint8_t>(frame, kAt);
-  state.cause = static_cast<FaultCause>(get_can<std::uint8_t>(frame, kAt + 1));
-  state.answer = static_cast<CanAnswer>(get_can<std::uint8_t>(frame, kAt + 2));
-  state.resident = static_cast<CanResident>(get_can<std::uint8_t>(frame, kAt + 3));
-  state.gaps = get_can<std::uint32_t>(frame, kAt + 4);
-  state.repeated = get_can<std::uint32_t>(frame, kAt + 8);
-  state.rejected = get_can<std::uint32_t>(frame, kAt + 12);
-  state.sample = get_can<std::uint64_t>(frame, kAt + 16);
-  state.fingerprint = get_can<std::uint32_t>(frame, kAt + 24);
-  state.boot = get_can<std::uint32_t>(frame, kAt + 28);
-  state.host = get_can<std::uint32_t>(frame, kAt + 32);
-  state.session = get_can<std::uint32_t>(frame, kAt + 36);
+  get_fields(frame, fields_of_state(state));
   return true;
 }
 
@@ -191,6 +198,33 @@ bool decode_can_missing(const CanFrame& frame, CanMissing& missing) noexcept {
   missing.token = header.run;
   std::copy_n(frame.data.begin() + kAt, kMissingBytes, missing.received.begin());
   return true;
+}
+
+CanFrame encode_can_part(std::uint16_t id, std::uint8_t token, std::size_t index,
+                         std::span<const std::uint8_t> memory) noexcept {
+  return encode_can_chunk(id, {static_cast<std::uint32_t>(index), token, part_of(memory, index)});
+}
+
+bool take_can_part(const CanChunk& chunk, std::span<std::uint8_t> memory) noexcept {
+  if (chunk.index >= can_chunks(memory.size())) return false;
+  const std::span<std::uint8_t> part = part_of(memory, chunk.index);
+  if (chunk.bytes.size() != part.size()) return false;
+  std::copy(chunk.bytes.begin(), chunk.bytes.end(), part.begin());
+  return true;
+}
+
+void append_can_word(std::vector<std::uint8_t>& memory, std::uint32_t word) {
+  for (int i = 0; i < 4; ++i) memory.push_back(static_cast<std::uint8_t>(word >> (8 * i)));
+}
+
+void append_can_float(std::vector<std::uint8_t>& memory, double value) {
+  append_can_word(memory, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
+}
+
+double can_float_at(std::span<const std::uint8_t> memory, std::size_t at) noexcept {
+  float value = 0.0F;
+  std::memcpy(&value, memory.data() + at, kCanFloatBytes);
+  return static_cast<double>(value);
 }
 
 std::uint64_t can_digest(std::span<const std::uint8_t> bytes) noexcept {

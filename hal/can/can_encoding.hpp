@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "hal/can/can_frame.hpp"
 #include "hal/can/can_layout.hpp"
@@ -68,6 +69,7 @@ struct CanCommand {
   std::uint32_t host = 0;     ///< random; its low byte, not 0, numbers the host's transfers
   std::uint32_t session = 0;  ///< key of the run, from the answer to start or arm
   std::uint8_t version = kCanProtocolVersion;
+  friend bool operator==(const CanCommand&, const CanCommand&) = default;
 };
 inline constexpr std::size_t kCanCommandBytes = 33;
 CanFrame encode_can_command(const CanCommand& command) noexcept;
@@ -95,6 +97,7 @@ struct CanState {
   std::uint32_t boot = 0;     ///< random, new at every start of the node
   std::uint32_t host = 0;     ///< host of the answered command; 0: none
   std::uint32_t session = 0;  ///< the key, in answers to the host that owns the stage; otherwise 0
+  friend bool operator==(const CanState&, const CanState&) = default;
 };
 inline constexpr std::size_t kCanStateBytes = 40;
 CanFrame encode_can_state(const CanState& state) noexcept;
@@ -107,7 +110,6 @@ CanFrame encode_can_text(const std::string& text, std::size_t part, std::uint8_t
 
 /// One chunk of a transfer, in either direction.
 inline constexpr std::size_t kCanChunkBytes = 56;
-inline constexpr std::size_t kCanFloatBytes = 4;
 /// Number of chunks for `bytes`.
 constexpr std::size_t can_chunks(std::size_t bytes) noexcept {
   return (bytes + kCanChunkBytes - 1) / kCanChunkBytes;
@@ -120,6 +122,18 @@ struct CanChunk {
 CanFrame encode_can_chunk(std::uint16_t id, const CanChunk& chunk) noexcept;
 /// `chunk.bytes` points into the frame.
 [[nodiscard]] bool decode_can_chunk(const CanFrame& frame, CanChunk& chunk) noexcept;
+
+/// Chunk `index` of the memory that is transferred.
+CanFrame encode_can_part(std::uint16_t id, std::uint8_t token, std::size_t index,
+                         std::span<const std::uint8_t> memory) noexcept;
+/// @returns false without changing the memory if the chunk does not fit it
+[[nodiscard]] bool take_can_part(const CanChunk& chunk, std::span<std::uint8_t> memory) noexcept;
+
+// Little-endian words and float32 of waveforms and traces.
+inline constexpr std::size_t kCanFloatBytes = 4;
+void append_can_word(std::vector<std::uint8_t>& memory, std::uint32_t word);
+void append_can_float(std::vector<std::uint8_t>& memory, double value);
+double can_float_at(std::span<const std::uint8_t> memory, std::size_t at) noexcept;
 
 enum class CanMemory : std::uint8_t { waveform = 0, trace = 1 };
 

@@ -95,7 +95,10 @@ bool CanLink::wait_for_answer(const CanCommand& command, const Other& other) {
   }
 }
 
-bool CanLink::exchange(const CanCommand& command, const Other& other) {
+bool CanLink::exchange(CanCommand command, const Other& other) {
+  command.sequence = ++sequence_;
+  command.host = host_;
+  command.session = session_;
   for (std::string& piece : text_) piece.clear();
   const CanFrame frame = encode_can_command(command);
   for (int attempt = 0; attempt < kAttempts && !interrupted(); ++attempt) {
@@ -105,10 +108,7 @@ bool CanLink::exchange(const CanCommand& command, const Other& other) {
   return false;
 }
 
-CanState CanLink::command(CanCommand command, const Other& other) {
-  command.sequence = ++sequence_;
-  command.host = host_;
-  command.session = session_;
+CanState CanLink::command(const CanCommand& command, const Other& other) {
   const std::string& bus = transport_.name(0);
   const bool greeting = boot_ == 0;
   const bool answered = exchange(command, other);
@@ -135,11 +135,8 @@ CanState CanLink::command(CanCommand command, const Other& other) {
   return answer_;
 }
 
-bool CanLink::try_command(CanCommand command) noexcept {
+bool CanLink::try_command(const CanCommand& command) noexcept {
   try {
-    command.sequence = ++sequence_;
-    command.host = host_;
-    command.session = session_;
     // An interrupted run must still be stopped.
     std::function<bool()> interrupted;
     std::swap(interrupted, interrupted_);

@@ -26,9 +26,9 @@ class CanLink {
 
   /// Sends the command until the node answers, at most ten times.
   /// @throws StageError if there is no answer, or with the node's text if it refuses.
-  CanState command(CanCommand command, const Other& other = {});
+  CanState command(const CanCommand& command, const Other& other = {});
   /// The same without exceptions. @returns false if the command was refused or not answered.
-  bool try_command(CanCommand command) noexcept;
+  bool try_command(const CanCommand& command) noexcept;
 
   /// Identifies the node. Clears a fault first if `reset_fault`.
   /// @throws StageError also if the node has another protocol version or another stage
@@ -53,7 +53,7 @@ class CanLink {
   bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:
-  bool exchange(const CanCommand& command, const Other& other);
+  bool exchange(CanCommand command, const Other& other);
   bool wait_for_answer(const CanCommand& command, const Other& other);
   bool answers(const CanState& state, std::uint16_t sequence) const noexcept;
   void listen_for_a_second_node();

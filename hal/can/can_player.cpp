@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -16,15 +15,6 @@ constexpr std::int64_t kHostSilence_ns = 1'000'000'000;
 constexpr int kSamplesAtOnce = 256;  // between two checks of the bus
 constexpr std::size_t kChunksAtOnce = 32;
 constexpr std::uint32_t kLargestDownload = 256;
-
-std::span<const std::uint8_t> chunk_of(const std::vector<std::uint8_t>& memory, std::size_t index) {
-  const std::size_t from = index * kCanChunkBytes;
-  return {memory.data() + from, std::min(kCanChunkBytes, memory.size() - from)};
-}
-
-void append(std::vector<std::uint8_t>& bytes, std::uint32_t word) {
-  for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<std::uint8_t>(word >> (8 * i)));
-}
 
 bool gives_measurement(Outcome outcome) {
   return outcome != Outcome::fault && outcome != Outcome::limit && outcome != Outcome::bus_off &&
@@ -74,11 +64,8 @@ std::string CanPlayer::prepare(const CanCommand& command) {
 bool CanPlayer::take_chunk(const CanChunk& chunk) noexcept {
   // The digest of an armed waveform has been checked already.
   if (busy() || status_ == CanResident::armed) return false;
-  if (chunk.token != token_ || chunk.index >= received_.size()) return false;
-  const std::size_t from = chunk.index * kCanChunkBytes;
-  if (chunk.bytes.size() != std::min(kCanChunkBytes, waveform_.size() - from)) return false;
-  std::copy(chunk.bytes.begin(), chunk.bytes.end(),
-            waveform_.begin() + static_cast<std::ptrdiff_t>(from));
+  if (chunk.token != token_) return false;
+  if (!take_can_part(chunk, waveform_)) return false;
   received_[chunk.index] = true;
   while (missing_from_ < received_.size() && received_[missing_from_]) ++missing_from_;
   return true;
@@ -181,11 +168,8 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
   const double gain =
       static_cast<double>(ramp_samples_ + 1 - past) / static_cast<double>(ramp_samples_ + 1);
   const std::size_t row = static_cast<std::size_t>(played_ % period_samples_) * columns_.size();
-  for (std::size_t k = 0; k < columns_.size(); ++k) {
-    float value = 0.0F;
-    std::memcpy(&value, waveform_.data() + kCanFloatBytes * (row + k), kCanFloatBytes);
-    r_[columns_[k]] = gain * static_cast<double>(value);
-  }
+  for (std::size_t k = 0; k < columns_.size(); ++k)
+    r_[columns_[k]] = gain * can_float_at(waveform_, kCanFloatBytes * (row + k));
   measured_ = y_;  // y[n], from which u[n] is computed
   Inputs inputs;
   inputs.y = y_;
@@ -203,9 +187,8 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
 
 void CanPlayer::record() {
   for (const std::vector<double>* values : {&u_, &measured_})
-    for (const double value : *values)
-      append(trace_, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
-  append(trace_, static_cast<std::uint32_t>(outcome_));
+    for (const double value : *values) append_can_float(trace_, value);
+  append_can_word(trace_, static_cast<std::uint32_t>(outcome_));
 }
 
 void CanPlayer::finish(CanResident status) {
@@ -224,9 +207,7 @@ void CanPlayer::abandon() {
 void CanPlayer::send_chunks(CanTransport& transport) {
   const std::vector<std::uint8_t>& memory = download_of_ == CanMemory::trace ? trace_ : waveform_;
   for (std::size_t i = 0; i < kChunksAtOnce && download_next_ < download_end_; ++i) {
-    const CanFrame frame = encode_can_chunk(
-        kCanDownloadId,
-        {static_cast<std::uint32_t>(download_next_), token_, chunk_of(memory, download_next_)});
+    const CanFrame frame = encode_can_part(kCanDownloadId, token_, download_next_, memory);
     if (transport.send({&frame, 1}) == 0) return;
     ++download_next_;
   }

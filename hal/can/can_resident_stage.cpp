@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <utility>
 
@@ -21,12 +19,6 @@ constexpr std::int64_t kPause_ns = 1'000'000;
 constexpr std::int64_t kSilence_ns = 50'000'000;  // then the rest of the window is requested again
 constexpr std::int64_t kFull_ns = 1'000'000'000;  // then the rest is sent with the next window
 constexpr int kLargestTries = 20;                 // windows without any progress
-
-float float_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
-  float value = 0.0F;
-  std::memcpy(&value, bytes.data() + at, kCanFloatBytes);
-  return value;
-}
 
 }  // namespace
 
@@ -52,16 +44,6 @@ std::size_t CanResidentStage::row_bytes() const noexcept {
 
 std::uint64_t CanResidentStage::depth_samples() const noexcept {
   return CanPlayer::depth_bytes() / row_bytes();
-}
-
-CanState CanResidentStage::command(CanCommandCode code, std::uint64_t a, std::uint64_t b,
-                                   std::uint32_t c, std::uint32_t d, const CanLink::Other& other) {
-  CanCommand command{code};
-  command.a = a;
-  command.b = b;
-  command.c = c;
-  command.d = d;
-  return link_.command(command, other);
 }
 
 void CanResidentStage::connect() {
@@ -96,21 +78,13 @@ void CanResidentStage::pack(const Waveforms& waveforms) {
         samples_, depth_samples()));
   waveform_.clear();
   for (Eigen::Index n = 0; n < samples.rows(); ++n)
-    for (const Eigen::Index column : columns) {
-      const auto word = std::bit_cast<std::uint32_t>(static_cast<float>(samples(n, column)));
-      for (int i = 0; i < 4; ++i) waveform_.push_back(static_cast<std::uint8_t>(word >> (8 * i)));
-    }
+    for (const Eigen::Index column : columns) append_can_float(waveform_, samples(n, column));
   digest_ = can_digest(waveform_);
 }
 
 void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
   for (const std::uint32_t index : chunks) {
-    const std::size_t from = index * kCanChunkBytes;
-    const CanFrame frame = encode_can_chunk(
-        kCanUploadId,
-        {index,
-         token_,
-         {waveform_.data() + from, std::min(kCanChunkBytes, waveform_.size() - from)}});
+    const CanFrame frame = encode_can_part(kCanUploadId, token_, index, waveform_);
     // A full queue means that the bus is slower than the sender.
     const std::int64_t until_ns = transport_->now_ns() + kFull_ns;
     while (transport_->send({&frame, 1}) == 0 && worst_bus(*transport_).state < CanBusState::off) {
@@ -126,7 +100,7 @@ void CanResidentStage::send_all() {
   std::uint32_t first = 0;
   for (int tries = 0; tries < kLargestTries;) {
     CanMissing missing;
-    command(CanCommandCode::missing, 0, 0, 0, 0, [&](const CanFrame& frame) {
+    link_.command({CanCommandCode::missing}, [&](const CanFrame& frame) {
       CanMissing said;
       if (decode_can_missing(frame, said) && said.token == token_) missing = said;
     });
@@ -150,11 +124,10 @@ void CanResidentStage::send_all() {
 JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
   pack(waveforms);
   connect();
-  command(CanCommandCode::upload, mask_, digest_, period_samples_);
+  link_.command({.code = CanCommandCode::upload, .a = mask_, .b = digest_, .c = period_samples_});
   send_all();
-  std::vector<std::uint8_t> back;
+  std::vector<std::uint8_t> back(waveform_.size());
   std::size_t chunks = 0;
-  back.resize(waveform_.size());
   if (!read(CanMemory::waveform, back, chunks) || back != waveform_)
     throw StageError(
         fmt::format("can: {}: the waveform in the node differs from the one sent; upload it again",
@@ -171,15 +144,18 @@ JobProgress CanResidentStage::arm(const Trigger& trigger) {
   if (!(ramp >= 0.0 && ramp < 1e9))
     throw std::invalid_argument(
         fmt::format("can: ramp_s must be 0 or more; got {}", trigger.ramp_s));
-  command(CanCommandCode::arm, trigger.run_seed, samples_, static_cast<std::uint32_t>(ramp),
-          static_cast<std::uint32_t>(digest_));
+  link_.command({.code = CanCommandCode::arm,
+                 .a = trigger.run_seed,
+                 .b = samples_,
+                 .c = static_cast<std::uint32_t>(ramp),
+                 .d = static_cast<std::uint32_t>(digest_)});
   while (transport_->now_ns() < trigger.t_start_ns) transport_->wait(trigger.t_start_ns);
-  command(CanCommandCode::trigger);
+  link_.command({CanCommandCode::trigger});
   return poll();
 }
 
 JobProgress CanResidentStage::poll() {
-  const CanState node = command(CanCommandCode::hello);
+  const CanState node = link_.command({CanCommandCode::hello});
   JobProgress progress;
   progress.done = std::min(node.sample, samples_);
   progress.total = samples_;
@@ -210,12 +186,8 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
   const CanLink::Other take = [&](const CanFrame& frame) {
     CanChunk chunk;
     if (frame.id != kCanDownloadId || !decode_can_chunk(frame, chunk) || chunk.token != token_ ||
-        chunk.index >= total)
+        !take_can_part(chunk, bytes))
       return;
-    const std::size_t from = chunk.index * kCanChunkBytes;
-    if (chunk.bytes.size() != std::min(kCanChunkBytes, bytes.size() - from)) return;
-    std::copy(chunk.bytes.begin(), chunk.bytes.end(),
-              bytes.begin() + static_cast<std::ptrdiff_t>(from));
     repeated_chunks_ += have[chunk.index] ? 1U : 0U;
     if (!have[chunk.index]) heard_ns = transport_->now_ns();  // duplicates are not progress
     have[chunk.index] = true;
@@ -224,8 +196,11 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
   for (int tries = 0; chunks_done < total && tries < kLargestTries; ++tries) {
     const std::size_t before = chunks_done;
     const std::size_t end = std::min<std::size_t>(total, chunks_done + kDownloadWindow);
-    command(CanCommandCode::download, chunks_done, static_cast<std::uint64_t>(memory),
-            static_cast<std::uint32_t>(end - chunks_done), 0, take);
+    link_.command({.code = CanCommandCode::download,
+                   .a = chunks_done,
+                   .b = static_cast<std::uint64_t>(memory),
+                   .c = static_cast<std::uint32_t>(end - chunks_done)},
+                  take);
     heard_ns = transport_->now_ns();
     const auto advance = [&] {
       while (chunks_done < total && have[chunks_done]) ++chunks_done;
@@ -242,7 +217,7 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
 }
 
 JobProgress CanResidentStage::download(TraceSink& sink) {
-  const CanState node = command(CanCommandCode::hello);
+  const CanState node = link_.command({CanCommandCode::hello});
   const std::uint64_t rows = std::min(node.sample, samples_);
   trace_.resize(rows * row_bytes());
   if (!read(CanMemory::trace, trace_, trace_chunks_))
@@ -260,7 +235,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
     for (std::uint64_t row = rows_given_; row < end; ++row) {
       const std::size_t at = row * row_bytes();
       for (std::size_t i = 0; i < columns; ++i)
-        values.push_back(static_cast<double>(float_at(trace_, at + kCanFloatBytes * i)));
+        values.push_back(can_float_at(trace_, at + kCanFloatBytes * i));
       outcomes.push_back(outcome_of_code(trace_[at + kCanFloatBytes * columns]));
     }
     sink.rows(rows_given_, values, outcomes);

@@ -38,8 +38,6 @@ class CanResidentStage final : public ResidentStage {
   std::uint64_t repeated_chunks() const noexcept { return repeated_chunks_; }
 
  private:
-  CanState command(CanCommandCode code, std::uint64_t a = 0, std::uint64_t b = 0,
-                   std::uint32_t c = 0, std::uint32_t d = 0, const CanLink::Other& other = {});
   void pack(const Waveforms& waveforms);
   void send_missing(const std::vector<std::uint32_t>& chunks);
   void send_all();
