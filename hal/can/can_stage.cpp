@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -66,9 +67,7 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   const CanLink::Other take_value = [this](const CanFrame& frame) { take(frame); };
   for (int attempt = 0; attempt < kStartAttempts; ++attempt) {
     begin_cycle(0);
-    CanCommand command{CanCommandCode::start};
-    command.a = run_seed;
-    static_cast<void>(link_.command(command, take_value));
+    link_.command({.code = CanCommandCode::start, .a = run_seed}, take_value);
     states_before_ = link_.states();
     if (!complete()) collect(transport_->now_ns() + reply_timeout_ns_);
     if (complete()) break;
@@ -95,9 +94,7 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   instant_ns_ = transport_->now_ns();
   const Pacer::Instant now =
       info_.sets_pace ? Pacer::Instant{instant_ns_, instant_ns_, 0, false} : pacer_.restart();
-  first.cycle = 0;
-  first.t_sample_ns = now.sample_ns;
-  first.t_rx_ns = now.now_ns;
+  now.put(0, first);
 }
 
 void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
@@ -147,12 +144,8 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
   if (wall_ && frames_seen_ != 0) stamp(inputs);
   const Pacer::Instant now = info_.sets_pace ? wait_for_instant(ready_ns) : pacer_.wait();
-  inputs.t_ready_ns = now.ready_ns;
-  inputs.cycle = outputs.cycle + 1;
-  inputs.t_sample_ns = now.sample_ns;
-  inputs.t_rx_ns = now.now_ns;
-  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
-  return outcome == Outcome::ok && (now.late || past_deadline) ? Outcome::late : outcome;
+  now.put(outputs.cycle + 1, inputs);
+  return outcome == Outcome::ok && now.too_late(deadline) ? Outcome::late : outcome;
 }
 
 /// The node's time has 16 bits. The arrival time shows how often it has wrapped around.
@@ -254,18 +247,9 @@ void CanStage::give(Inputs& inputs) const noexcept {
 }
 
 PeerStatus CanStage::bus_status() const noexcept {
-  switch (worst_bus(*transport_).state) {
-    case CanBusState::active:
-    case CanBusState::warning:
-      return PeerStatus::good;
-    case CanBusState::passive:
-      return PeerStatus::passive;
-    case CanBusState::off:
-      return PeerStatus::bus_off;
-    case CanBusState::down:
-      return PeerStatus::link_down;
-  }
-  return PeerStatus::link_down;
+  using enum PeerStatus;
+  constexpr std::array kStatus = {good, good, passive, bus_off, link_down};
+  return kStatus[static_cast<std::size_t>(worst_bus(*transport_).state)];
 }
 
 /// Status from the node's state and measurement frames of this cycle.

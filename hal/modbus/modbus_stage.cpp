@@ -106,10 +106,7 @@ void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
   sequence_ = 0;
   missed_ = 0;
   running_ = true;
-  const Pacer::Instant now = pacer_.restart();
-  first.cycle = 0;
-  first.t_sample_ns = now.sample_ns;
-  first.t_rx_ns = now.now_ns;
+  pacer_.restart().put(0, first);
   const PeerStatus status = status_ = take_measurement(first);
   if (status == PeerStatus::good) return;
   stop();
@@ -143,14 +140,10 @@ Outcome ModbusStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline d
   status_ = transact();
   if (status_ == PeerStatus::good) inputs.t_arrival_ns = inputs.stamp_ns = monotonic_ns();
   const Pacer::Instant now = pacer_.wait();
-  inputs.cycle = sequence_;
-  inputs.t_ready_ns = now.ready_ns;
-  inputs.t_sample_ns = now.sample_ns;
-  inputs.t_rx_ns = now.now_ns;
+  now.put(sequence_, inputs);
   if (status_ == PeerStatus::good || status_ == PeerStatus::late)
     status_ = std::max(status_, take_measurement(inputs));
-  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
-  if (status_ == PeerStatus::good && (now.late || past_deadline)) status_ = PeerStatus::late;
+  if (status_ == PeerStatus::good && now.too_late(deadline)) status_ = PeerStatus::late;
   return meaning(status_).outcome;
 }
 

@@ -147,11 +147,8 @@ void SimulatedStage::start(std::uint64_t run_seed, Inputs& first) {
   s.noise.restart(s.spec.seed, run_seed);
   s.noise.next();
   s.measure();
-  const Pacer::Instant now = s.pacer.restart();
+  s.pacer.restart().put(0, first);
   std::copy(s.y.begin(), s.y.end(), first.y.begin());
-  first.cycle = 0;
-  first.t_sample_ns = now.sample_ns;
-  first.t_rx_ns = now.now_ns;
   first.valid = s.all_sensors;
   first.node_state = NodeState::operation_enabled;
   s.running = true;
@@ -177,11 +174,7 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
       faulty ? s.faults.spoil(s.cycle, fresh, {s.last_y.data(), inputs.y.size()}) : 0;
   const Pacer::Instant now = s.pacer.wait();
 
-  ++s.cycle;
-  inputs.cycle = s.cycle;
-  inputs.t_sample_ns = now.sample_ns;
-  inputs.t_rx_ns = now.now_ns;
-  inputs.t_ready_ns = now.ready_ns;
+  now.put(++s.cycle, inputs);
   inputs.node_state = off || !accepted ? NodeState::fault : NodeState::operation_enabled;
   inputs.valid = missed ? 0 : s.all_sensors & ~missing;
   if (missed) {
@@ -192,8 +185,7 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
   if (off || !accepted) return Outcome::fault;
   if (missed) return Outcome::stale;
   if (missing != 0) return Outcome::incomplete;
-  const bool past_deadline = deadline.t_ns != 0 && now.now_ns > deadline.t_ns;
-  return now.late || past_deadline ? Outcome::late : Outcome::ok;
+  return now.too_late(deadline) ? Outcome::late : Outcome::ok;
 }
 
 void SimulatedStage::stop() noexcept {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "hal/stage/stage.hpp"
+
 namespace stageid {
 
 /// Time of CLOCK_MONOTONIC.
@@ -19,6 +21,18 @@ class Pacer {
     std::int64_t now_ns = 0;     ///< end of the wait
     std::int64_t ready_ns = 0;   ///< start of the wait; 0 in virtual time
     bool late = false;           ///< the instant had passed before the wait began
+
+    /// Whether the cycle is late, also by the deadline of its exchange.
+    bool too_late(Deadline deadline) const noexcept {
+      return late || (deadline.t_ns != 0 && now_ns > deadline.t_ns);
+    }
+    /// Sets number and times of a measurement.
+    void put(std::uint64_t cycle, Inputs& inputs) const noexcept {
+      inputs.cycle = cycle;
+      inputs.t_sample_ns = sample_ns;
+      inputs.t_rx_ns = now_ns;
+      inputs.t_ready_ns = ready_ns;
+    }
   };
 
   /// The first sample instant: now, or zero in virtual time.
