@@ -3,20 +3,7 @@
 namespace stageid {
 
 bool NodeStateMachine::powered() const noexcept {
-  switch (state_) {
-    case NodeState::switched_on:
-    case NodeState::operation_enabled:
-    case NodeState::measuring:
-    case NodeState::quick_stop:
-    case NodeState::fault_reaction:
-      return true;
-    case NodeState::not_ready:
-    case NodeState::switch_on_disabled:
-    case NodeState::ready:
-    case NodeState::fault:
-      break;
-  }
-  return false;
+  return state_ >= NodeState::switched_on && state_ <= NodeState::fault_reaction;
 }
 
 void NodeStateMachine::self_test_passed() noexcept {

@@ -22,22 +22,10 @@ std::string text_of(Text& text) {
 }
 
 Outcome outcome_of(int code) noexcept {
-  switch (code) {
-    case STAGEID_OK:
-      return Outcome::ok;
-    case STAGEID_LATE:
-      return Outcome::late;
-    case STAGEID_INCOMPLETE:
-      return Outcome::incomplete;
-    case STAGEID_STALE:
-      return Outcome::stale;
-    case STAGEID_CORRUPT:
-      return Outcome::corrupt;
-    case STAGEID_LINK_DOWN:
-      return Outcome::link_down;
-    default:
-      return Outcome::fault;
-  }
+  using enum Outcome;
+  constexpr std::array kOutcomes = {ok, late, incomplete, stale, corrupt, link_down};
+  return code >= STAGEID_OK && code <= STAGEID_LINK_DOWN ? kOutcomes[static_cast<std::size_t>(code)]
+                                                         : fault;
 }
 
 std::vector<stageid_channel> channels_of(const std::vector<Channel>& channels) {

@@ -209,36 +209,28 @@ std::string describe(const LimitViolation& violation, const StageInfo& info) {
                        std::abs(violation.value), unit, per, violation.limit, unit, per,
                        violation.cycle);
   };
-  switch (violation.kind) {
-    case LimitKind::none:
-      break;
-    case LimitKind::actuator:
-      return line("|u| would be");
-    case LimitKind::slew:
-      return line("slew would be", "/s");
-    case LimitKind::thermal_rms:
-      return line("thermal rms would be");
-    case LimitKind::position:
-      return line("|y| is");
-    case LimitKind::not_finite:
-      return fmt::format("{}: {} is not finite (cycle {})", who,
-                         violation.of_sensor ? "the measurement" : "the command", violation.cycle);
-    case LimitKind::stuck_sensor:
-      return fmt::format("{}: has repeated the value {:.6g} {} for {:.4g} s (cycle {})", who,
-                         violation.value, unit, violation.limit, violation.cycle);
-    case LimitKind::sensor_jump:
-      return line("jumped from the predicted motion by");
-    case LimitKind::deviation:
-      return line("deviation from the predicted motion is");
-    case LimitKind::contradiction:
-      return line("differs from the rigid motion of all sensors by");
-    case LimitKind::speed:
-      return line("speed is", "/s");
-    case LimitKind::stopping_distance:
-      return line("the stopping position with half of the forces is");
-    case LimitKind::hard_position:
-      return line("|y| is").insert(who.size() + 1, " beyond the hard window:");
-  }
+  if (violation.kind == LimitKind::not_finite)
+    return fmt::format("{}: {} is not finite (cycle {})", who,
+                       violation.of_sensor ? "the measurement" : "the command", violation.cycle);
+  if (violation.kind == LimitKind::stuck_sensor)
+    return fmt::format("{}: has repeated the value {:.6g} {} for {:.4g} s (cycle {})", who,
+                       violation.value, unit, violation.limit, violation.cycle);
+  if (violation.kind == LimitKind::hard_position)
+    return line("|y| is").insert(who.size() + 1, " beyond the hard window:");
+  struct Row {
+    LimitKind kind;
+    const char* what;
+    const char* per = "";
+  };
+  for (const Row& row :
+       {Row{LimitKind::actuator, "|u| would be"}, Row{LimitKind::slew, "slew would be", "/s"},
+        Row{LimitKind::thermal_rms, "thermal rms would be"}, Row{LimitKind::position, "|y| is"},
+        Row{LimitKind::sensor_jump, "jumped from the predicted motion by"},
+        Row{LimitKind::deviation, "deviation from the predicted motion is"},
+        Row{LimitKind::contradiction, "differs from the rigid motion of all sensors by"},
+        Row{LimitKind::speed, "speed is", "/s"},
+        Row{LimitKind::stopping_distance, "the stopping position with half of the forces is"}})
+    if (violation.kind == row.kind) return line(row.what, row.per);
   return who;
 }
 
