@@ -1,35 +1,51 @@
 #pragma once
 
+#include <gmock/gmock.h>
+
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "hal/simulator/simulated_stage.hpp"
 
 namespace stageid::test {
 
-// Open loop, one stage with accessible commands and measurements.
-class Bench {
+/// Of a call: it throws a StageError with this text.
+inline auto refuses(const std::string& text) {
+  return testing::ThrowsMessage<StageError>(testing::HasSubstr(text));
+}
+
+/// Exchanges with a stage in open loop; commands and measurements are accessible.
+class Driver {
  public:
-  explicit Bench(const WaferStageSpec& spec)
-      : stage_(spec), u(spec.info.actuators.size()), y(spec.info.sensors.size()) {
+  explicit Driver(CyclicStage& stage)
+      : u(stage.info().actuators.size()), y(stage.info().sensors.size()), stage_(stage) {
     inputs.y = y;
   }
+  Driver(const Driver&) = delete;
+  Driver& operator=(const Driver&) = delete;
   void start(std::uint64_t run_seed = 1) { stage_.start(run_seed, inputs); }
   Outcome step(Deadline deadline = {}) {
-    Outputs outputs;
-    outputs.cycle = inputs.cycle;
-    outputs.u = u;
-    return stage_.exchange(outputs, inputs, deadline);
+    return stage_.exchange({inputs.cycle, u}, inputs, deadline);
   }
 
- private:
-  SimulatedStage stage_;
-
- public:
   std::vector<double> u;
   std::vector<double> y;
   Inputs inputs;
-  SimulatedStage& stage() { return stage_; }
+
+ private:
+  CyclicStage& stage_;
+};
+
+struct OwnSimulatedStage {
+  SimulatedStage simulated;
+};
+
+class Bench : private OwnSimulatedStage, public Driver {
+ public:
+  explicit Bench(const WaferStageSpec& spec)
+      : OwnSimulatedStage{SimulatedStage(spec)}, Driver(simulated) {}
+  SimulatedStage& stage() { return simulated; }
 };
 
 }  // namespace stageid::test

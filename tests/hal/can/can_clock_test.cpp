@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/hal/can/can_host.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_can_clock {
@@ -31,8 +32,7 @@ class TickingNode {
  public:
   explicit TickingNode(std::int64_t tick_ns = 1'000'000)
       : end_(pair_.node()),
-        node_(std::make_unique<SimulatedStage>(rig_.stage_spec()), rig_.stage_spec().limits,
-              rig_.stage_spec().controller, {}, {.watchdog_s = 0.1}),
+        node_(rig_.new_node(0.1)),
         front_(node_, rig_.layout(), end_),
         tick_ns_(tick_ns) {
     pair_.when_host_waits([this] { serve(); }, 1'000);
@@ -80,18 +80,15 @@ struct Samples {
   std::vector<Outcome> outcomes;
 };
 
-Samples measure(CanStage& stage, int count) {
+Samples measure(CanStage& stage, int count,
+                std::int64_t deadline_ns = 2 * std::llround(kPeriod_ns)) {
   Samples samples;
-  std::vector<double> y(1);
-  const std::vector<double> u(2, 0.0);
-  Inputs inputs;
-  inputs.y = y;
-  stage.start(7, inputs);
+  test::Driver host(stage);
+  Inputs& inputs = host.inputs;
+  host.start();
   for (int n = 0; n < count; ++n) {
-    const Outputs outputs{static_cast<std::uint64_t>(n), u};
     inputs.stamp_ns = inputs.t_arrival_ns = 0;
-    samples.outcomes.push_back(
-        stage.exchange(outputs, inputs, {inputs.t_sample_ns + 2 * std::llround(kPeriod_ns)}));
+    samples.outcomes.push_back(host.step({inputs.t_sample_ns + deadline_ns}));
     samples.instant_ns.push_back(inputs.t_sample_ns);
     samples.stamp_ns.push_back(inputs.stamp_ns);
     samples.arrival_ns.push_back(inputs.t_arrival_ns);
@@ -119,20 +116,10 @@ TEST(CanClock, TheHostFollowsTheTicksOfTheNode) {
 
 TEST(CanClock, TheNodesTimeGoesOnOverItsSixteenBits) {
   TickingNode node(40'000'000);  // 40 ms of 65.536 ms
-  const std::unique_ptr<CanStage> host = node.host(true);
-  std::vector<double> y(1);
-  const std::vector<double> u(2, 0.0);
-  Inputs inputs;
-  inputs.y = y;
-  host->start(7, inputs);
-  std::int64_t last = 0;
-  for (std::uint64_t n = 0; n < 20; ++n) {
-    ASSERT_EQ(host->exchange({n, u}, inputs, {inputs.t_sample_ns + 100'000'000}), Outcome::ok);
-    if (n > 0) {
-      EXPECT_NEAR(static_cast<double>(inputs.stamp_ns - last), 40e6, 2e3) << n;
-    }
-    last = inputs.stamp_ns;
-  }
+  const Samples samples = measure(*node.host(true), 20, 100'000'000);
+  EXPECT_THAT(samples.outcomes, testing::Each(Outcome::ok));
+  for (std::size_t n = 1; n < 20; ++n)
+    EXPECT_NEAR(static_cast<double>(samples.stamp_ns[n] - samples.stamp_ns[n - 1]), 40e6, 2e3) << n;
 }
 
 TEST(CanClock, ASkippedTickShowsInTheStamps) {

@@ -10,6 +10,7 @@
 
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_can_flood {
@@ -36,15 +37,12 @@ TEST(CanFlood, AFrozenNodeIsNoticedInTime) {
         return flooded ? alter(frames, count) : count;
       });
   CanStage stage(rig.stage_spec().info, rig.spec(), std::move(transport), {});
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
-  stage.start(1, inputs);
+  test::Driver host(stage);
+  host.start();
   rig.freeze();
   flooded = true;
   const std::int64_t before_ns = rig.pair().now_ns();
-  const std::vector<double> u(2);
-  EXPECT_EQ(stage.exchange({0, u}, inputs, {}), Outcome::stale);
+  EXPECT_EQ(host.step(), Outcome::stale);
   EXPECT_LE(rig.pair().now_ns() - before_ns, 4 * 5'100'000) << "four times reply_timeout_s";
   stage.stop();  // must return too
 }
@@ -67,8 +65,7 @@ TEST(CanFlood, AnInterruptEndsTheWaitForAnAnswer) {
 TEST(CanFlood, TheNodesWatchdogLooksAtTheTimeAllTheSame) {
   CanRig rig;
   Host host(rig);
-  StageNode stage(std::make_unique<SimulatedStage>(rig.stage_spec()), rig.stage_spec().limits,
-                  rig.stage_spec().controller, NodePanel{}, {0.02, 0.1});
+  StageNode stage = rig.new_node();
   bool flooded = false;
   const auto alter = flood(rig);
   test::AlteredCan bus(rig.pair().node(), [&](std::span<CanFrame> frames, std::size_t count) {

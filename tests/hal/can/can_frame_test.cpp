@@ -8,7 +8,7 @@
 
 #include "hal/can/can_encoding.hpp"
 #include "hal/can/can_layout.hpp"
-#include "tests/support/stages/wafer_stage.hpp"
+#include "tests/hal/can/can_rig.hpp"
 
 namespace stageid {
 namespace test_can_frame {
@@ -112,22 +112,9 @@ TEST(CanFrame, WhatIsNoNumberComesAsNoValue) {
   }
 }
 
-CanSpec wafer_spec(const StageInfo& info) {
-  CanSpec spec;
-  spec.buses.resize(1);
-  spec.buses[0].interface = "can0";
-  for (int i = 0; i < static_cast<int>(info.actuators.size()); ++i)
-    spec.buses[0].actuators.push_back(i);
-  for (int i = 0; i < static_cast<int>(info.sensors.size()); ++i)
-    spec.buses[0].sensors.push_back(i);
-  spec.actuator_range_n.assign(info.actuators.size(), 62.5);
-  spec.sensor_range_m.assign(info.sensors.size(), 250e-6);
-  return spec;
-}
-
 TEST(CanLayout, AWaferStageIsOneFrameEachWay) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
-  const CanLayout layout = can_layout(wafer_spec(info), info);
+  const CanLayout layout = can_layout(test::one_bus_spec(info), info);
   ASSERT_EQ(layout.setpoints.size(), 1U);
   ASSERT_EQ(layout.sensors.size(), 1U);
   EXPECT_EQ(layout.setpoints[0].id, 0x100);
@@ -138,7 +125,7 @@ TEST(CanLayout, AWaferStageIsOneFrameEachWay) {
 
 TEST(CanLayout, SpreadsOverBusesAndFrames) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
-  CanSpec spec = wafer_spec(info);
+  CanSpec spec = test::one_bus_spec(info);
   spec.buses.push_back({"can1", 1e6, 5e6, {16, 3}, {}});
   std::erase(spec.buses[0].actuators, 16);
   std::erase(spec.buses[0].actuators, 3);
@@ -153,7 +140,7 @@ TEST(CanLayout, SpreadsOverBusesAndFrames) {
 
 TEST(CanLayout, TheFingerprintTellsWhatBothSidesMustAgreeOn) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
-  const CanSpec spec = wafer_spec(info);
+  const CanSpec spec = test::one_bus_spec(info);
   const std::uint32_t fingerprint = can_layout(spec, info).fingerprint;
   const auto differs = [&](auto change) {
     CanSpec other = spec;
@@ -172,7 +159,7 @@ TEST(CanLayout, TheFingerprintTellsWhatBothSidesMustAgreeOn) {
 TEST(CanLayout, RefusesWhatMakesNoSense) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
   const auto refused = [&](auto change) {
-    CanSpec spec = wafer_spec(info);
+    CanSpec spec = test::one_bus_spec(info);
     change(spec);
     EXPECT_THROW(can_layout(spec, info), std::invalid_argument);
   };
@@ -195,15 +182,8 @@ TEST(CanMessages, CommandsStatesAndTransfersComeBack) {
                      0xDEADBEEF,          0xCAFE0003, 0xA1B2C3};
   CanCommand back;
   ASSERT_TRUE(decode_can_command(encode_can_command(command), back));
-  EXPECT_EQ(back.code, command.code);
-  EXPECT_EQ(back.sequence, 77);
-  EXPECT_EQ(back.host, command.host);
-  EXPECT_EQ(back.session, command.session);
+  EXPECT_EQ(back, command);
   EXPECT_EQ(back.version, kCanProtocolVersion);
-  EXPECT_EQ(back.a, command.a);
-  EXPECT_EQ(back.b, command.b);
-  EXPECT_EQ(back.c, command.c);
-  EXPECT_EQ(back.d, command.d);
 
   CanState state;
   state.state = NodeState::fault;
@@ -220,18 +200,7 @@ TEST(CanMessages, CommandsStatesAndTransfersComeBack) {
   state.session = 0xA1B2C3;
   CanState told;
   ASSERT_TRUE(decode_can_state(encode_can_state(state), told));
-  EXPECT_EQ(told.state, state.state);
-  EXPECT_EQ(told.cause, state.cause);
-  EXPECT_EQ(told.answer, state.answer);
-  EXPECT_EQ(told.resident, state.resident);
-  EXPECT_EQ(told.gaps, 1U);
-  EXPECT_EQ(told.repeated, 2U);
-  EXPECT_EQ(told.rejected, 3U);
-  EXPECT_EQ(told.sample, state.sample);
-  EXPECT_EQ(told.fingerprint, state.fingerprint);
-  EXPECT_EQ(told.boot, state.boot);
-  EXPECT_EQ(told.host, state.host);
-  EXPECT_EQ(told.session, state.session);
+  EXPECT_EQ(told, state);
 
   const std::vector<std::uint8_t> bytes{1, 2, 3, 250};
   CanChunk chunk;

@@ -14,6 +14,7 @@
 #include "hal/can/can_resident_stage.hpp"
 #include "hal/stage/peer_status.hpp"
 #include "tests/hal/can/can_host.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/resident_bytes.hpp"
 
 namespace stageid {
@@ -21,17 +22,8 @@ namespace test_can_ownership {
 
 using test::CanRig;
 using Host = test::CanHost;
+using test::refuses;
 using testing::HasSubstr;
-
-template <typename Action>
-std::string refusal(Action action) {
-  try {
-    action();
-  } catch (const StageError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
 
 /// Result of an undisturbed run.
 std::vector<double> undisturbed(int samples) {
@@ -54,8 +46,8 @@ TEST(CanOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
   first.start();
   for (std::size_t n = 0; n < y.size(); ++n) {
     if (n == 50) {
-      EXPECT_THAT(refusal([&] { second.start(); }),
-                  HasSubstr("another host measures with this stage; wait until it has ended"));
+      EXPECT_THAT([&] { second.start(); },
+                  refuses("another host measures with this stage; wait until it has ended"));
     }
     if (n == 100) second.stage().stop();
     ASSERT_EQ(first.exchange(), Outcome::ok) << n << first.stage().trouble();
@@ -84,7 +76,7 @@ class Forger {
     command.session = static_cast<std::uint32_t>(engine_());
     command.c = 1;
     command.a = 1;
-    to_node(encode_can_command(command));
+    rig_.send_to_node(encode_can_command(command));
     // The run number is right, because it can be read on the bus; the rest of the key is wrong.
     CanConversions conversions;
     CanFrame setpoint;
@@ -93,19 +85,18 @@ class Forger {
       CanHeader header{next, 0, guess, tag_};
       encode_can_values(rig_.layout().setpoints[0], rig_.layout().actuator_scale, u, header,
                         setpoint, conversions);
-      to_node(setpoint);
+      rig_.send_to_node(setpoint);
     }
     const std::vector<double> y(1, 1e-3);
     CanFrame measurement;
     encode_can_values(rig_.layout().sensors[0], rig_.layout().sensor_scale, y,
                       {next, 5, static_cast<std::uint8_t>(run + 1), 0}, measurement, conversions);
-    static_cast<void>(rig_.pair().node().send({&measurement, 1}));
+    rig_.send_to_host(measurement);
   }
   /// Another tag than that of the run.
   void avoid(std::uint16_t tag) { tag_ = static_cast<std::uint16_t>(tag + 1); }
 
  private:
-  void to_node(const CanFrame& frame) { static_cast<void>(rig_.pair().host().send({&frame, 1})); }
   CanRig& rig_;
   std::mt19937 engine_{7};
   std::uint16_t tag_ = 0;
@@ -148,8 +139,8 @@ TEST(CanOwnership, AHundredThousandRandomFramesChangeNoSample) {
                                         kCanSensorId,  kCanTextId,     0x7FF,        kCanMissingId};
       frame.id = kIds[engine() % 8];
       frame.length = static_cast<std::uint8_t>(can_fd_length(engine() % 65));
-      static_cast<void>(rig.pair().host().send({&frame, 1}));
-      static_cast<void>(rig.pair().node().send({&frame, 1}));
+      rig.send_to_node(frame);
+      rig.send_to_host(frame);
     }
     ASSERT_EQ(host.exchange(), Outcome::ok) << n << host.stage().trouble();
     ASSERT_EQ(host.y()[0], y[n]) << n;
@@ -162,10 +153,7 @@ TEST(CanOwnership, AnybodyMayAskForAQuickStop) {
   CanRig rig;
   Host host(rig);
   host.start();
-  CanCommand command{CanCommandCode::quick_stop};
-  command.host = 1;
-  const CanFrame frame = encode_can_command(command);
-  static_cast<void>(rig.pair().host().send({&frame, 1}));
+  rig.send_to_node(encode_can_command({.code = CanCommandCode::quick_stop, .host = 1}));
   rig.serve_ms(1);
   EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
   EXPECT_EQ(host.exchange(), Outcome::fault);
@@ -176,7 +164,7 @@ TEST(CanOwnership, AHostOfVersionOneIsToldToBeUpdated) {
   CanFrame frame;  // 24 bytes after the header, as in version 1
   frame.id = kCanCommandId;
   seal_can_frame(frame, {7, static_cast<std::uint8_t>(CanCommandCode::start), 1, 0}, 24);
-  static_cast<void>(rig.pair().host().send({&frame, 1}));
+  rig.send_to_node(frame);
   rig.serve_ms(1);
   std::vector<CanFrame> said(64);
   said.resize(rig.pair().host().receive(said));
@@ -226,11 +214,7 @@ class Hub {
 
 /// A second node with its own stage, using the same identifiers.
 struct Twin {
-  Twin(CanRig& rig, Hub& hub)
-      : end(hub),
-        stage(std::make_unique<SimulatedStage>(rig.stage_spec()), rig.stage_spec().limits,
-              rig.stage_spec().controller, NodePanel{}, {0.02, 0.1}),
-        front(stage, rig.layout(), end) {}
+  Twin(CanRig& rig, Hub& hub) : end(hub), stage(rig.new_node()), front(stage, rig.layout(), end) {}
   Hub::End end;
   StageNode stage;
   CanNode front;
@@ -248,7 +232,7 @@ TEST(CanOwnership, TwoNodesWithOneIdentifierAreRefused) {
     b.front.serve(0);
   });
   Host host(rig);
-  EXPECT_THAT(refusal([&] { host.start(); }), HasSubstr("two nodes answer"));
+  EXPECT_THAT([&] { host.start(); }, refuses("two nodes answer"));
   EXPECT_EQ(a.stage.state(), NodeState::switch_on_disabled);
   EXPECT_EQ(b.stage.state(), NodeState::switch_on_disabled);
 }
@@ -303,17 +287,17 @@ TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
   first->arm({});
   ASSERT_EQ(rig.node().state(), NodeState::measuring);
   const std::string held = "another host measures with this stage";
-  EXPECT_THAT(refusal([&] { second->upload(waveforms(1)); }), HasSubstr(held));
-  EXPECT_THAT(refusal([&] { second->arm({}); }), HasSubstr(held));
+  EXPECT_THAT([&] { second->upload(waveforms(1)); }, refuses(held));
+  EXPECT_THAT([&] { second->arm({}); }, refuses(held));
   second->stop();
   Host streaming(rig);
-  EXPECT_THAT(refusal([&] { streaming.start(); }), HasSubstr(held));
+  EXPECT_THAT([&] { streaming.start(); }, refuses(held));
   EXPECT_EQ(rig.node().state(), NodeState::measuring);
   EXPECT_EQ(first->poll().status, JobStatus::running);
   first->stop();
   EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
   NoRows rows;
-  EXPECT_THAT(refusal([&] { second->download(rows); }), HasSubstr("belongs to another host"));
+  EXPECT_THAT([&] { second->download(rows); }, refuses("belongs to another host"));
   EXPECT_NO_THROW(first->download(rows));
 }
 
@@ -327,9 +311,9 @@ TEST(CanOwnership, AStageStaysReservedBetweenTheRunsOfAResidentExperiment) {
   rig.serve_ms(100);
   ASSERT_EQ(first->poll().status, JobStatus::done);
   const std::string held = "another host measures with this stage";
-  EXPECT_THAT(refusal([&] { second->upload(waveforms(1)); }), HasSubstr(held));
+  EXPECT_THAT([&] { second->upload(waveforms(1)); }, refuses(held));
   Host streaming(rig);
-  EXPECT_THAT(refusal([&] { streaming.start(); }), HasSubstr(held));
+  EXPECT_THAT([&] { streaming.start(); }, refuses(held));
   NoRows rows;
   EXPECT_EQ(first->download(rows).done, 100U);
   first->upload(waveforms(2));
@@ -355,7 +339,7 @@ TEST(CanOwnership, OthersDoNotKeepASilentHostsRunAlive) {
   first->arm({});
   for (int i = 0; i < 11; ++i) {
     second->connect();
-    static_cast<void>(refusal([&] { second->arm({}); }));
+    EXPECT_THROW(second->arm({}), StageError);
     rig.serve_ms(100);
   }
   EXPECT_EQ(rig.node().cause(), FaultCause::watchdog);
@@ -373,20 +357,19 @@ TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   std::memcpy(bytes.data() + 12, &half, sizeof half);
   arm.d = static_cast<std::uint32_t>(can_digest(bytes));
   const CanFrame frame = encode_can_command(arm);
-  static_cast<void>(rig.pair().host().send({&frame, 1}));
+  rig.send_to_node(frame);
   rig.serve_ms(1);
   ASSERT_NE(rig.node().session(), 0U);
   // A chunk received now must not change the waveform whose digest was checked.
   const std::uint32_t rejected = rig.front().rejected();
   for (int token = 0; token < 256; ++token) {
-    const CanFrame late = encode_can_chunk(
-        kCanUploadId, {0, static_cast<std::uint8_t>(token), std::span(bytes).first(56)});
-    static_cast<void>(rig.pair().host().send({&late, 1}));
+    rig.send_to_node(encode_can_chunk(
+        kCanUploadId, {0, static_cast<std::uint8_t>(token), std::span(bytes).first(56)}));
   }
   rig.serve_ms(5);
   EXPECT_EQ(rig.front().rejected(), rejected + 256);
   Host host(rig);
-  EXPECT_THAT(refusal([&] { host.start(); }), HasSubstr("another host measures"));
+  EXPECT_THAT([&] { host.start(); }, refuses("another host measures"));
   rig.serve_ms(1100);
   EXPECT_EQ(rig.node().session(), 0U);
   EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);

@@ -11,6 +11,7 @@
 
 #include "hal/stage/motion_controller.hpp"
 #include "tests/hal/can/can_rig.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_can_resident_stage {
@@ -98,23 +99,26 @@ JobProgress play(CanRig& rig, CanResidentStage& stage, std::uint64_t seed) {
 
 /// u = C(y) + r on the stage without bus: rows of u and y.
 std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed) {
-  SimulatedStage stage(spec);
+  test::Bench stage(spec);
   MotionController controller(spec.controller);
   const Waveforms w = waveforms();
-  std::vector<double> y(1);
-  std::vector<double> u(2);
   std::vector<double> rows;
-  Inputs inputs;
-  inputs.y = y;
-  stage.start(seed, inputs);
-  for (std::uint64_t n = 0; n < 3 * kPeriod; ++n) {
-    controller.update(y.data(), u.data());
+  stage.start(seed);
+  for (int n = 0; n < 3 * kPeriod; ++n) {
+    controller.update(stage.y.data(), stage.u.data());
     // The waveform is transferred as float32.
-    u[1] += static_cast<double>(static_cast<float>(w.samples(static_cast<int>(n % kPeriod), 1)));
-    rows.insert(rows.end(), {u[0], u[1], y[0]});
-    EXPECT_EQ(stage.exchange({n, u}, inputs, {}), Outcome::ok);
+    stage.u[1] += static_cast<double>(static_cast<float>(w.samples(n % kPeriod, 1)));
+    rows.insert(rows.end(), {stage.u[0], stage.u[1], stage.y[0]});
+    EXPECT_EQ(stage.step(), Outcome::ok);
   }
   return rows;
+}
+
+/// To half a unit of float32's last place.
+void expect_rows(const std::vector<double>& rows, const std::vector<double>& expected) {
+  ASSERT_EQ(rows.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    ASSERT_NEAR(rows[i], expected[i], 0x1p-24 * std::abs(expected[i]) + 1e-40) << i;
 }
 
 TEST(CanResidentStage, RecordsWhatTheLoopHereWouldHaveMeasured) {
@@ -126,10 +130,7 @@ TEST(CanResidentStage, RecordsWhatTheLoopHereWouldHaveMeasured) {
     ASSERT_EQ(play(rig, *stage, seed).status, JobStatus::done);
     Rows rows;
     EXPECT_EQ(stage->download(rows).done, 3U * kPeriod);
-    const std::vector<double> expected = expected_rows(rig.stage_spec(), seed);
-    ASSERT_EQ(rows.value.size(), expected.size());
-    for (std::size_t i = 0; i < expected.size(); ++i)  // half a unit of float32's last place
-      ASSERT_NEAR(rows.value[i], expected[i], 0x1p-24 * std::abs(expected[i]) + 1e-40) << i;
+    expect_rows(rows.value, expected_rows(rig.stage_spec(), seed));
     EXPECT_THAT(rows.outcome, testing::Each(Outcome::ok));
   }
   EXPECT_EQ(rig.node().state(), NodeState::operation_enabled);
@@ -146,10 +147,7 @@ TEST(CanResidentStage, TransfersHealOnABusThatLosesAFifth) {
   Rows rows;
   stage.download(rows);
   EXPECT_GT(stage.repeated_chunks(), 0U);
-  const std::vector<double> expected = expected_rows(rig.stage_spec(), 3);
-  ASSERT_EQ(rows.value.size(), expected.size());
-  for (std::size_t i = 0; i < expected.size(); ++i)
-    ASSERT_NEAR(rows.value[i], expected[i], 0x1p-24 * std::abs(expected[i]) + 1e-40) << i;
+  expect_rows(rows.value, expected_rows(rig.stage_spec(), 3));
 }
 
 TEST(CanResidentStage, ATransferThatBrokeOffGoesOn) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,19 @@
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test {
+
+/// All channels of a stage on one bus.
+inline CanSpec one_bus_spec(const StageInfo& info, double data_bit_rate_hz = 5e6) {
+  CanSpec spec;
+  spec.buses = {{"can0", 1e6, data_bit_rate_hz, {}, {}}};
+  spec.buses[0].actuators.resize(info.actuators.size());
+  spec.buses[0].sensors.resize(info.sensors.size());
+  std::iota(spec.buses[0].actuators.begin(), spec.buses[0].actuators.end(), 0);
+  std::iota(spec.buses[0].sensors.begin(), spec.buses[0].sensors.end(), 0);
+  spec.actuator_range_n.assign(info.actuators.size(), 62.5);
+  spec.sensor_range_m.assign(info.sensors.size(), 250e-6);
+  return spec;
+}
 
 inline std::vector<CanFault> can_faults(const std::vector<std::string>& texts) {
   std::vector<CanFault> faults;
@@ -54,14 +68,15 @@ class CanRig {
     return spec;
   }
 
+  StageNode new_node(double watchdog_s = 0.02) const {
+    return StageNode(std::make_unique<SimulatedStage>(stage_spec_), stage_spec_.limits,
+                     stage_spec_.controller, NodePanel{}, {.watchdog_s = watchdog_s});
+  }
+
   /// Replaces the node by a new one, as after a restart.
   void boot() {
-    NodeOptions options;
-    options.watchdog_s = spec_.watchdog_s;
     front_.reset();
-    stage_node_ = std::make_unique<StageNode>(std::make_unique<SimulatedStage>(stage_spec_),
-                                              stage_spec_.limits, stage_spec_.controller,
-                                              NodePanel{}, options);
+    stage_node_.reset(new StageNode(new_node(spec_.watchdog_s)));
     front_ = std::make_unique<CanNode>(*stage_node_, layout_, node_bus_);
     thaw();
   }
@@ -85,6 +100,9 @@ class CanRig {
   std::unique_ptr<CanStage> host(CanHostOptions options = {}) {
     return std::make_unique<CanStage>(stage_spec_.info, spec_, host_bus(), options);
   }
+
+  void send_to_node(const CanFrame& frame) { static_cast<void>(pair_.host().send({&frame, 1})); }
+  void send_to_host(const CanFrame& frame) { static_cast<void>(pair_.node().send({&frame, 1})); }
 
   const WaferStageSpec& stage_spec() const { return stage_spec_; }
   const CanSpec& spec() const { return spec_; }

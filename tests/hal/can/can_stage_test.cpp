@@ -10,6 +10,7 @@
 
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_can_stage {
@@ -25,20 +26,17 @@ TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
   spec.force_noise_n = 1e-3;
   CanRig rig({}, spec);
   Host host(rig);
-  SimulatedStage bare(spec);
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
+  test::Bench bare(spec);
   for (const std::uint64_t seed : {7U, 8U}) {
     Host again(rig);
     again.start(seed);
-    bare.start(seed, inputs);
+    bare.start(seed);
     for (std::uint64_t n = 0; n < 300; ++n) {
       // The wire may change a measurement by at most half a count.
-      ASSERT_NEAR(again.y()[0], y[0], 0.5001 * 1.25e-3 / kCanCountsOfRange) << n;
-      const std::vector<double> u{Host::command(n), -0.5 * Host::command(n)};
+      ASSERT_NEAR(again.y()[0], bare.y[0], 0.5001 * 1.25e-3 / kCanCountsOfRange) << n;
+      bare.u = {Host::command(n), -0.5 * Host::command(n)};
       ASSERT_EQ(again.exchange(), Outcome::ok);
-      ASSERT_EQ(bare.exchange({n, u}, inputs, {}), Outcome::ok);
+      ASSERT_EQ(bare.step(), Outcome::ok);
     }
     again.stage().stop();
     EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
@@ -102,26 +100,26 @@ TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
   host.stage().stop();
 }
 
-TEST(CanStage, ASensorThatGivesNoNumberEndsTheRunForSafety) {
-  WaferStageSpec spec = CanRig::quiet_stage();
-  spec.faults = {{WaferStageSpec::Fault::Kind::nan_sensor, 0, 2, 1, -1}};
-  CanRig rig({}, spec);
-  Host host(rig);
-  host.start();
-  EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::limit));
-  EXPECT_EQ(host.inputs().valid, 0U);
-  EXPECT_THAT(host.stage().trouble(),
-              testing::HasSubstr("sensor s1: the measurement is not finite"));
-}
-
-TEST(CanStage, AnInterlockIsAFault) {
-  WaferStageSpec spec = CanRig::quiet_stage();
-  spec.faults = {{WaferStageSpec::Fault::Kind::interlock, 0, 2, 1, -1}};
-  CanRig rig({}, spec);
-  Host host(rig);
-  host.start();
-  EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::fault));
-  EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the stage reported a fault"));
+TEST(CanStage, FaultsOfTheStageEndTheRun) {
+  using Kind = WaferStageSpec::Fault::Kind;
+  struct Row {
+    Kind kind;
+    Outcome outcome;
+    const char* trouble;
+  };
+  for (const Row& row : {Row{Kind::nan_sensor, Outcome::limit, "s1: the measurement is not finite"},
+                         Row{Kind::interlock, Outcome::fault, "the stage reported a fault"}}) {
+    WaferStageSpec spec = CanRig::quiet_stage();
+    spec.faults = {{row.kind, 0, 2, 1, -1}};
+    CanRig rig({}, spec);
+    Host host(rig);
+    host.start();
+    EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, row.outcome));
+    if (row.outcome == Outcome::limit) {
+      EXPECT_EQ(host.inputs().valid, 0U);
+    }
+    EXPECT_THAT(host.stage().trouble(), testing::HasSubstr(row.trouble));
+  }
 }
 
 TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
@@ -147,8 +145,8 @@ TEST(CanStage, ADelayOfTheNodeIsNotTheSilenceOfItsHost) {
     return count;
   });
   CanNode front(rig.node(), rig.layout(), slow);
-  Inputs first;
   std::vector<double> y(1);
+  Inputs first;
   first.y = y;
   ASSERT_TRUE(rig.node().request(SupervisorCommand::enable).accepted);
   static_cast<void>(rig.node().begin_run(3, slow.now_ns(), first));
@@ -164,15 +162,10 @@ TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
   host.start();
   rig.serve_ms(200);
   ASSERT_EQ(rig.node().state(), NodeState::fault);
-  try {
-    Host(rig).start();
-    FAIL() << "in fault";
-  } catch (const StageError& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "can: pair0: the node is in fault (the host stopped sending); remove the cause and "
-        "add --reset-fault");
-  }
+  EXPECT_THAT([&] { Host(rig).start(); },
+              testing::ThrowsMessage<StageError>(
+                  "can: pair0: the node is in fault (the host stopped sending); remove the cause "
+                  "and add --reset-fault"));
   Host resetting(rig, {0.0, true});
   resetting.start();
   EXPECT_EQ(resetting.exchange(), Outcome::ok);
@@ -230,19 +223,10 @@ TEST(CanStage, ANodeWhoseBusIsOffStopsByItself) {
 TEST(CanStage, StartRefusesInWords) {
   CanRig rig;
   rig.freeze();
-  try {
-    Host(rig).start();
-    FAIL() << "nobody there";
-  } catch (const StageError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: no node answered within 600 ms"));
-  }
+  const auto start = [&] { Host(rig).start(); };
+  EXPECT_THAT(start, test::refuses("can: pair0: no node answered within 600 ms"));
   rig.pair().set_state(0, CanBusState::off);
-  try {
-    Host(rig).start();
-    FAIL() << "bus off";
-  } catch (const StageError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("can: pair0: bus off"));
-  }
+  EXPECT_THAT(start, test::refuses("can: pair0: bus off"));
   rig.pair().set_state(0, CanBusState::active);
   rig.thaw();
   WaferStageSpec other = rig.stage_spec();
@@ -252,13 +236,9 @@ TEST(CanStage, StartRefusesInWords) {
   NodePanel open;
   open.interlock_closed = false;
   rig.node().set_panel(open);
-  try {
-    Host(rig).start();
-    FAIL() << "interlock";
-  } catch (const StageError& error) {
-    EXPECT_STREQ(error.what(),
-                 "can: pair0: the node refused the command: the interlock is open; close it");
-  }
+  EXPECT_THAT(start, testing::ThrowsMessage<StageError>(
+                         "can: pair0: the node refused the command: the interlock is open; close "
+                         "it"));
 }
 
 TEST(CanStage, ARunStartsThoughItsFirstFramesAreLost) {
@@ -274,53 +254,26 @@ TEST(CanStage, ARunStartsThoughItsFirstFramesAreLost) {
 
 TEST(CanStage, WhatIsNoNumberReachesNoFrame) {
   CanRig rig;
-  auto stage = rig.host();
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
-  stage->start(1, inputs);
-  const std::vector<double> u{std::numeric_limits<double>::quiet_NaN(), 0.0};
-  EXPECT_EQ(stage->exchange({0, u}, inputs, {}), Outcome::fault);
+  const auto stage = rig.host();
+  test::Driver host(*stage);
+  host.start();
+  host.u[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(host.step(), Outcome::fault);
   EXPECT_EQ(rig.node().sample(), 0U);
-  EXPECT_EQ(stage->exchange({0, {}}, inputs, {}), Outcome::fault);
+  host.u.clear();
+  EXPECT_EQ(host.step(), Outcome::fault);
 }
 
 TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
   CanRig rig;
-  auto stage = rig.host();
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
-  stage->start(1, inputs);
-  const std::vector<double> large{100.0, 0.0};
-  EXPECT_EQ(stage->exchange({0, large}, inputs, {}), Outcome::fault);
+  const auto stage = rig.host();
+  test::Driver host(*stage);
+  host.start();
+  host.u[0] = 100.0;
+  EXPECT_EQ(host.step(), Outcome::fault);
   EXPECT_EQ(stage->counts().saturated, 1U);
   EXPECT_EQ(rig.node().sample(), 0U) << "no other value instead";
   EXPECT_THAT(stage->trouble(), testing::HasSubstr("exceeds actuator_range_n"));
-}
-
-TEST(CanStage, GarbageDoesNoHarm) {
-  CanRig rig;
-  Host host(rig);
-  host.start();
-  std::uint64_t random = 1;
-  for (int n = 0; n < 2000; ++n) {
-    CanFrame frame;
-    for (std::uint8_t& byte : frame.data) {
-      random = random * 6364136223846793005U + 1442695040888963407U;
-      byte = static_cast<std::uint8_t>(random >> 56);
-    }
-    constexpr std::uint16_t kIds[] = {kCanCommandId, kCanSetpointId, kCanUploadId, kCanStateId,
-                                      kCanSensorId,  kCanTextId,     0x7FF,        kCanMissingId};
-    frame.id = kIds[random >> 40 & 7U];
-    frame.length = static_cast<std::uint8_t>(can_fd_length(random >> 33 & 63U));
-    static_cast<void>(rig.pair().host().send({&frame, 1}));
-    static_cast<void>(rig.pair().node().send({&frame, 1}));
-    ASSERT_EQ(host.exchange(), Outcome::ok) << n;
-  }
-  EXPECT_EQ(rig.node().sample(), 2000U);
-  EXPECT_EQ(rig.node().state(), NodeState::measuring);
-  EXPECT_EQ(rig.front().rejected(), 2000U);
 }
 
 }  // namespace test_can_stage

@@ -10,9 +10,11 @@
 #include "hal/modbus/modbus_fault.hpp"
 #include "hal/modbus/modbus_node.hpp"
 #include "hal/modbus/modbus_server.hpp"
+#include "hal/modbus/modbus_stage.hpp"
 #include "hal/node/stage_node.hpp"
 #include "tests/hal/node/small_node.hpp"
 #include "tests/hal/stage/fake_stage.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/pty_pair.hpp"
 
 namespace stageid::test {
@@ -108,6 +110,25 @@ class ModbusBench {
   StageNode node_;
   ModbusNode registers_;
   std::unique_ptr<ServerThread> server_;
+};
+
+/// The host's side of a server.
+struct ModbusHost {
+  explicit ModbusHost(const ModbusAddress& address, const StageInfo& info = ModbusBench::info(),
+                      const ModbusHostOptions& options = {})
+      : stage(info, address, kQuickTiming, options), driver(stage) {}
+  void start(std::uint64_t seed = 1) { driver.start(seed); }
+  Outcome exchange(double u0 = 0.0, double u1 = 0.0) {
+    driver.u = {u0, u1};
+    driver.inputs.cycle = cycle++;
+    return driver.step();
+  }
+
+  ModbusStage stage;
+  Driver driver;
+  const std::vector<double>& y = driver.y;
+  const Inputs& inputs = driver.inputs;
+  std::uint64_t cycle = 0;
 };
 
 }  // namespace stageid::test

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <utility>
+
+#include "tests/support/process/file_bytes.hpp"
 
 namespace stageid::modbus_map {
 namespace test_modbus_map {
@@ -31,25 +31,16 @@ TEST(ModbusMap, OneTransactionCarriesEveryBlock) {
 }
 
 TEST(ModbusMap, TheDocumentHoldsTheTable) {
-  const std::ifstream file(STAGEID_SOURCE_DIR "/docs/modbus-map.md");
-  std::ostringstream text;
-  text << file.rdbuf();
-  EXPECT_THAT(text.str(), testing::HasSubstr(markdown_table()));
-}
-
-Channel channel(std::string name, std::string unit) {
-  Channel c;
-  c.name = std::move(name);
-  c.unit = std::move(unit);
-  return c;
+  EXPECT_THAT(test::bytes_of(STAGEID_SOURCE_DIR "/docs/modbus-map.md"),
+              testing::HasSubstr(markdown_table()));
 }
 
 // Computed with Python: h = 0x811C9DC5; for b in b"a1 N\na2 N\ns1 m\n": h = (h ^ b) * 0x01000193 % 2**32
 TEST(ModbusMap, TheChannelHashIsFnv1aOfNamesAndUnits) {
   StageInfo info;
   EXPECT_EQ(channel_hash(info), 0x811C9DC5U);
-  info.actuators = {channel("a1", "N"), channel("a2", "N")};
-  info.sensors = {channel("s1", "m")};
+  info.actuators = {{.name = "a1", .unit = "N"}, {.name = "a2", .unit = "N"}};
+  info.sensors = {{.name = "s1", .unit = "m"}};
   EXPECT_EQ(channel_hash(info), 0x8C02120DU);
   std::swap(info.actuators[0], info.actuators[1]);
   EXPECT_NE(channel_hash(info), 0x8C02120DU);

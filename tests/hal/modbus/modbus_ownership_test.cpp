@@ -14,6 +14,7 @@
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
+#include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
 namespace test_modbus_ownership {
@@ -199,66 +200,33 @@ TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
 }
 
 TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
-  /// Several nodes in turn on one line.
-  class Line final : public ModbusRegisters {
-   public:
-    explicit Line(ModbusRegisters& first) : now(&first) {}
-    void begin_request(ModbusConnection from) override { now.load()->begin_request(from); }
-    void tick() override { now.load()->tick(); }
-    ModbusException write(int first, std::span<const std::uint16_t> values) override {
-      return now.load()->write(first, values);
-    }
-    ModbusException read(int first, std::span<std::uint16_t> values) override {
-      return now.load()->read(first, values);
-    }
-    std::atomic<ModbusRegisters*> now;
-  };
   ModbusBench before;
   before.stop();
   ModbusBench after;
   after.stop();
   ModbusNode restarted(after.node(), ModbusBench::limits(), ModbusBench::kBootId + 1, nullptr);
-  Line line(before.registers());
+  test::RegistersThrough line(before.registers());  // several nodes in turn on one line
   const test::ServerThread server(line, nullptr, true);
-  ModbusStage host(ModbusBench::info(), server.address(), test::kQuickTiming);
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
-  host.start(1, inputs);
-  line.now = &restarted;
-  const std::vector<double> u(2, 1.0);
-  EXPECT_EQ(host.exchange({0, u}, inputs, {}), Outcome::fault);
-  EXPECT_THAT(host.trouble(), HasSubstr("the node was restarted"));
+  test::ModbusHost host(server.address());
+  host.start();
+  line.inner = &restarted;
+  EXPECT_EQ(host.exchange(1.0, 1.0), Outcome::fault);
+  EXPECT_THAT(host.stage.trouble(), HasSubstr("the node was restarted"));
 }
 
 TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
   ModbusBench bench;
-  const auto start = [&](ModbusStage& stage, std::vector<double>& y) {
-    Inputs inputs;
-    inputs.y = y;
-    stage.start(1, inputs);
-  };
-  std::vector<double> y(1);
-  ModbusStage first(ModbusBench::info(), bench.address(), test::kQuickTiming);
-  ModbusStage second(ModbusBench::info(), bench.address(), test::kQuickTiming);
-  start(first, y);
-  Inputs inputs;
-  inputs.y = y;
-  const std::vector<double> u(2, 1.0);
-  for (std::uint64_t n = 0; n < 100; ++n) {
+  test::ModbusHost first(bench.address());
+  test::ModbusHost second(bench.address());
+  first.start();
+  for (int n = 0; n < 100; ++n) {
     if (n == 50) {
-      std::vector<double> other(1);
-      try {
-        start(second, other);
-        FAIL() << "started";
-      } catch (const StageError& error) {
-        EXPECT_THAT(error.what(), HasSubstr("another host measures with this stage"));
-      }
-      second.stop();
+      EXPECT_THAT([&] { second.start(); }, test::refuses("another host measures with this stage"));
+      second.stage.stop();
     }
-    ASSERT_EQ(first.exchange({n, u}, inputs, {}), Outcome::ok) << n << first.trouble();
+    ASSERT_EQ(first.exchange(1.0, 1.0), Outcome::ok) << n << first.stage.trouble();
   }
-  first.stop();
+  first.stage.stop();
   EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);
   bench.stop();
   EXPECT_EQ(bench.fake->commands.size(), 100U);

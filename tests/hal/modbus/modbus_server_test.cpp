@@ -134,14 +134,9 @@ const Bytes kReadRequest = tcp_frame(1, 1, Bytes{3, 0, 0, 0, 100});
 TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   const std::size_t before = test::resident_bytes();
   test::ModbusBench bench;
-  ModbusStage owner(test::ModbusBench::info(), bench.address(), test::kQuickTiming);
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
-  owner.start(1, inputs);
-  std::uint64_t cycle = 0;
-  const std::vector<double> u(2, 0.5);
-  const auto exchange = [&] { return owner.exchange({cycle++, u}, inputs, {}); };
+  test::ModbusHost owner(bench.address());
+  owner.start();
+  const auto exchange = [&] { return owner.exchange(0.5, 0.5); };
   ASSERT_EQ(exchange(), Outcome::ok);
 
   Clients clients;
@@ -149,7 +144,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   for (int i = 0; i < 1000; ++i) {
     clients.add(port);
     if (i % 20 != 0) continue;
-    ASSERT_EQ(exchange(), Outcome::ok) << i << owner.trouble();
+    ASSERT_EQ(exchange(), Outcome::ok) << i << owner.stage.trouble();
   }
   for (int i = 0; i < 100; ++i) {
     const int client = clients.add(port);
@@ -160,7 +155,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
         write_to(client, kReadRequest);
     }
     if (i % 5 != 0) continue;
-    ASSERT_EQ(exchange(), Outcome::ok) << i << owner.trouble();
+    ASSERT_EQ(exchange(), Outcome::ok) << i << owner.stage.trouble();
   }
   ModbusLink another(bench.address(), test::kQuickTiming);
   another.connect();
@@ -171,10 +166,10 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
   for (const int client : clients.all) open += hung_up(client, MSG_DONTWAIT) ? 0U : 1U;
   EXPECT_LE(open, ModbusServer::kMostClients) << "places are bounded";
   EXPECT_LT(test::resident_bytes() - before, std::size_t{8} << 20);
-  owner.stop();
+  owner.stage.stop();
   EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);
   bench.stop();
-  EXPECT_EQ(bench.fake->commands.size(), cycle);
+  EXPECT_EQ(bench.fake->commands.size(), owner.cycle);
 }
 
 TEST(ModbusServer, ARequestThatIsNotCompletedEndsItsConnection) {
@@ -201,12 +196,8 @@ TEST(ModbusServer, RepliesThatNobodyTakesEndTheConnection) {
 
 // For any client, the registers are updated every few milliseconds, and the server ends.
 TEST(ModbusServer, WatchesAndEndsWhileAClientStalls) {
-  class Ticking final : public ModbusRegisters {
-   public:
-    void begin_request(ModbusConnection) override {}
+  struct Ticking final : test::NoRegisters {
     void tick() override { ++ticks; }
-    ModbusException write(int, std::span<const std::uint16_t>) override { return {}; }
-    ModbusException read(int, std::span<std::uint16_t>) override { return {}; }
     std::atomic<int> ticks = 0;
   };
   Ticking registers;
@@ -224,14 +215,10 @@ TEST(ModbusServer, WatchesAndEndsWhileAClientStalls) {
 }
 
 TEST(ModbusServer, ANewClientGetsThePlaceThatIsIdleLongestButNotAnOwners) {
-  class Owned final : public ModbusRegisters {
-   public:
+  struct Owned final : test::NoRegisters {
     void begin_request(ModbusConnection from) override {
       if (owner == 0) owner = from;
     }
-    void tick() override {}
-    ModbusException write(int, std::span<const std::uint16_t>) override { return {}; }
-    ModbusException read(int, std::span<std::uint16_t>) override { return {}; }
     bool needs(ModbusConnection connection) const override { return connection == owner; }
     ModbusConnection owner = 0;
   };

@@ -11,6 +11,7 @@
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
+#include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
 namespace test_modbus_supervisor {
@@ -103,13 +104,7 @@ TEST(ModbusSupervisor, ConnectsAgainWhenTheServerIsBack) {
 
 TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
   // The status must be readable before its magic can be wrong.
-  class Zeros final : public ModbusRegisters {
-   public:
-    void begin_request(ModbusConnection) override {}
-    void tick() override {}
-    ModbusException write(int, std::span<const std::uint16_t>) override {
-      return ModbusException::none;
-    }
+  struct Zeros final : test::NoRegisters {
     ModbusException read(int first, std::span<std::uint16_t> values) override {
       std::fill(values.begin(), values.end(), std::uint16_t{0});
       if (version == 0 || first != modbus_map::kMagic || values.size() < 4) return {};

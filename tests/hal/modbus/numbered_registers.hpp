@@ -2,12 +2,37 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <span>
 
 #include "hal/modbus/modbus_pdu.hpp"
 
 namespace stageid::test {
+
+/// Accepts everything.
+class NoRegisters : public ModbusRegisters {
+ public:
+  void begin_request(ModbusConnection) override {}
+  void tick() override {}
+  ModbusException write(int, std::span<const std::uint16_t>) override { return {}; }
+  ModbusException read(int, std::span<std::uint16_t>) override { return {}; }
+};
+
+/// Passes everything on. Another thread may exchange the registers.
+class RegistersThrough : public ModbusRegisters {
+ public:
+  explicit RegistersThrough(ModbusRegisters& registers) : inner(&registers) {}
+  void begin_request(ModbusConnection from) override { inner.load()->begin_request(from); }
+  void tick() override { inner.load()->tick(); }
+  ModbusException write(int first, std::span<const std::uint16_t> values) override {
+    return inner.load()->write(first, values);
+  }
+  ModbusException read(int first, std::span<std::uint16_t> values) override {
+    return inner.load()->read(first, values);
+  }
+  std::atomic<ModbusRegisters*> inner;
+};
 
 /// 130 registers, each with its own number as value.
 class NumberedRegisters final : public ModbusRegisters {

@@ -10,6 +10,7 @@
 
 #include "tests/hal/node/small_node.hpp"
 #include "tests/hal/stage/fake_stage.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
@@ -287,26 +288,23 @@ TEST(StageNode, GivesTheSamplesOfTheStageItself) {
   spec.force_noise_n = 1e-3;
   MotionControllerSpec loop = controller();
   StageNode node(std::make_unique<SimulatedStage>(spec), {}, loop, {}, {});
-  SimulatedStage bare(spec);
+  test::Bench bare(spec);
   ASSERT_TRUE(node.request(SupervisorCommand::enable).accepted);
-  std::vector<double> y_node(1);
-  std::vector<double> y_bare(1);
-  Inputs of_node;
-  Inputs of_bare;
-  of_node.y = y_node;
-  of_bare.y = y_bare;
+  std::vector<double> y(1);
+  Inputs inputs;
+  inputs.y = y;
   for (int run = 0; run < 2; ++run) {
-    node.begin_run(7, 0, of_node);
-    bare.start(7, of_bare);
-    EXPECT_EQ(y_node, y_bare);
+    node.begin_run(7, 0, inputs);
+    bare.start(7);
+    EXPECT_EQ(y, bare.y);
     for (std::uint64_t n = 0; n < 50; ++n) {
-      const std::vector<double> u{std::sin(0.1 * static_cast<double>(n)), 0.2};
-      ASSERT_EQ(node.advance(0, u, of_node), Outcome::ok);
-      ASSERT_EQ(bare.exchange({n, u}, of_bare, {}), Outcome::ok);
-      ASSERT_EQ(y_node, y_bare) << n;
+      bare.u = {std::sin(0.1 * static_cast<double>(n)), 0.2};
+      ASSERT_EQ(node.advance(0, bare.u, inputs), Outcome::ok);
+      ASSERT_EQ(bare.step(), Outcome::ok);
+      ASSERT_EQ(y, bare.y) << n;
     }
     node.end_run();
-    bare.stop();
+    bare.stage().stop();
   }
 }
 

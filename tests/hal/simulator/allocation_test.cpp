@@ -10,6 +10,7 @@
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/replay_stage.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -29,19 +30,13 @@ class Allocation : public testing::Test {
     limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
     LimitedStage stage(std::make_unique<SimulatedStage>(spec), limits);
     MotionController controller(spec.controller);
-    std::vector<double> y(7);
-    std::vector<double> u(17);
-    Inputs inputs;
-    inputs.y = y;
-    stage.start(1, inputs);
-    Outputs outputs;
-    outputs.u = u;
+    test::Driver host(stage);
+    host.start();
     const test::AllocationCounter counter;
     for (int n = 0; n < 2000; ++n) {
-      controller.update(y.data(), u.data());
-      u[0] += n % 100 < 50 ? 1.0 : -1.0;
-      outputs.cycle = inputs.cycle;
-      seen += stage.exchange(outputs, inputs, {}) == Outcome::ok ? 0 : 1;
+      controller.update(host.y.data(), host.u.data());
+      host.u[0] += n % 100 < 50 ? 1.0 : -1.0;
+      seen += host.step() == Outcome::ok ? 0 : 1;
     }
     return counter.count();
   }
@@ -111,15 +106,10 @@ TEST_F(Allocation, AReplayedCycleHasNone) {
   info.actuators.resize(2);
   info.sensors.resize(1);
   ReplayStage replay(info, std::make_unique<OneRun>(), 0.0);
-  std::vector<double> y(1);
-  const std::vector<double> u(2);
-  Inputs inputs;
-  inputs.y = y;
-  replay.start(0, inputs);
-  Outputs outputs;
-  outputs.u = u;
+  test::Driver host(replay);
+  host.start();
   const test::AllocationCounter counter;
-  for (int n = 0; n < 101; ++n) std::ignore = replay.exchange(outputs, inputs, {});
+  for (int n = 0; n < 101; ++n) std::ignore = host.step();
   EXPECT_EQ(counter.count(), 0U);
 }
 

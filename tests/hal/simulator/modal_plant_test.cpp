@@ -23,15 +23,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-VectorXd vector(std::initializer_list<double> values) {
-  VectorXd v(static_cast<Eigen::Index>(values.size()));
-  std::copy(values.begin(), values.end(), v.begin());
-  return v;
-}
-
 std::vector<PlantMode> two_modes() {
-  return {{40.0, 0.02, vector({1.0, -0.5}), vector({0.8, 0.3})},
-          {210.0, 0.005, vector({0.4, 1.2}), vector({-0.6, 1.0})}};
+  return {{40.0, 0.02, VectorXd{{1.0, -0.5}}, VectorXd{{0.8, 0.3}}},
+          {210.0, 0.005, VectorXd{{0.4, 1.2}}, VectorXd{{-0.6, 1.0}}}};
 }
 
 // The same plant as one dense continuous-time system, x = [q; q' / v]. v makes the entries of a T of order one, as the
@@ -90,7 +84,7 @@ TEST_P(DelayedPlant, FollowsTheMatrixExponentialOfTheWholeSystem) {
   double largest = 0.0;
   double error = 0.0;
   for (int n = 0; n < 80; ++n) {
-    u.push_back(vector({normal(engine), normal(engine)}));
+    u.push_back(VectorXd{{normal(engine), normal(engine)}});
     plant.step(u.back().data());
     x = advance(s, x, held(n - whole - 1), fraction / rate_hz);
     x = advance(s, x, held(n - whole), (1.0 - fraction) / rate_hz);
@@ -181,7 +175,7 @@ TEST(ModalPlant, ConservesEnergy) {
   VectorXd next(4);
   double work = 0.0;
   for (int n = 0; n < 200; ++n) {
-    const VectorXd u = vector({normal(engine), normal(engine)});
+    const VectorXd u{{normal(engine), normal(engine)}};
     plant.step(u.data());
     plant.output(next.data());
     work += u.dot(next.head<2>() - y.head<2>());
@@ -207,7 +201,7 @@ TEST(ModalPlant, ConservesEnergy) {
 
 TEST(ModalPlant, MovesAFreeMassByNewtonsLaw) {
   const double rate_hz = 1e4;
-  const PlantMode free_mass{0.0, 0.0, vector({0.5}), vector({0.5})};  // 4 kg
+  const PlantMode free_mass{0.0, 0.0, VectorXd{{0.5}}, VectorXd{{0.5}}};  // 4 kg
   ModalPlant plant({free_mass}, 0.0, rate_hz);
   const double u = 3.0;
   constexpr int kSteps = 10000;
@@ -299,7 +293,7 @@ TEST(ModalPlant, GoesOnFromItsStateWithARetunedMode) {
   modes[1].natural_frequency_hz = 190.0;
   modes[1].damping_ratio = 0.01;
   ModalPlant other(modes, 0.6e-3, 1000.0);
-  const VectorXd u = vector({1.0, -2.0});
+  const VectorXd u{{1.0, -2.0}};
   VectorXd a(2);
   VectorXd b(2);
   for (int n = 0; n < 50; ++n) {

@@ -3,9 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -19,19 +17,13 @@ namespace test_limited_stage {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Eigen::VectorXd vector(std::initializer_list<double> values) {
-  Eigen::VectorXd v(static_cast<Eigen::Index>(values.size()));
-  std::copy(values.begin(), values.end(), v.begin());
-  return v;
-}
-
 StageLimits generous() {
   StageLimits limits;
-  limits.actuator_n = vector({10.0, 20.0});
-  limits.slew_n_s = vector({8e3, 1e5});  // 8 and 100 N per sample at 1 kHz
-  limits.thermal_rms_n = vector({9.0, 15.0});
+  limits.actuator_n = Eigen::VectorXd{{10.0, 20.0}};
+  limits.slew_n_s = Eigen::VectorXd{{8e3, 1e5}};  // 8 and 100 N per sample at 1 kHz
+  limits.thermal_rms_n = Eigen::VectorXd{{9.0, 15.0}};
   limits.thermal_time_constant_s = 0.05;
-  limits.position_window_m = vector({1e-3, 1e-3, 1e-3});
+  limits.position_window_m = Eigen::VectorXd{{1e-3, 1e-3, 1e-3}};
   return limits;
 }
 
@@ -283,23 +275,19 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
     return LimitedStage(std::make_unique<test::FakeStage>(2, 3, 1e3), limits);
   };
   EXPECT_NO_THROW(make([](StageLimits&) {}));
-  EXPECT_THROW(make([](StageLimits& l) { l.actuator_n.resize(3); }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.actuator_n[1] = 0.0; }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.slew_n_s[0] = -1.0; }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.thermal_rms_n[0] = kNan; }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.position_window_m.resize(2); }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.thermal_time_constant_s = 0.0; }),
-               std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) {
-                 l.hard_window_m = vector({1e-3, 1e-3, 9e-4});
-               }),
-               std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.speed_m_s = vector({1.0}); }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.motion.acceleration_per_n.setOnes(2, 2); }),
-               std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = -1.0; }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = kNan; }), std::invalid_argument);
-  EXPECT_THROW(make([](StageLimits& l) { l.stuck_sensor_s = 1e-3; }), std::invalid_argument);
+  const auto refused = [&](auto change) { EXPECT_THROW(make(change), std::invalid_argument); };
+  refused([](StageLimits& l) { l.actuator_n.resize(3); });
+  refused([](StageLimits& l) { l.actuator_n[1] = 0.0; });
+  refused([](StageLimits& l) { l.slew_n_s[0] = -1.0; });
+  refused([](StageLimits& l) { l.thermal_rms_n[0] = kNan; });
+  refused([](StageLimits& l) { l.position_window_m.resize(2); });
+  refused([](StageLimits& l) { l.thermal_time_constant_s = 0.0; });
+  refused([](StageLimits& l) { l.hard_window_m = Eigen::Vector3d(1e-3, 1e-3, 9e-4); });
+  refused([](StageLimits& l) { l.speed_m_s.setOnes(1); });
+  refused([](StageLimits& l) { l.motion.acceleration_per_n.setOnes(2, 2); });
+  refused([](StageLimits& l) { l.stuck_sensor_s = -1.0; });
+  refused([](StageLimits& l) { l.stuck_sensor_s = kNan; });
+  refused([](StageLimits& l) { l.stuck_sensor_s = 1e-3; });
   EXPECT_THROW(LimitedStage(nullptr, generous()), std::invalid_argument);
   EXPECT_THROW(LimitedStage(std::make_unique<test::FakeStage>(2, 3, 0.0), generous()),
                std::invalid_argument);
@@ -307,19 +295,12 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
 
 TEST(LimitedStage, DescribesEveryKind) {
   EXPECT_EQ(describe({}, {}), "no limit was exceeded");
-  EXPECT_STREQ(to_string(LimitKind::none), "none");
-  EXPECT_STREQ(to_string(LimitKind::actuator), "actuator");
-  EXPECT_STREQ(to_string(LimitKind::slew), "slew");
-  EXPECT_STREQ(to_string(LimitKind::thermal_rms), "thermal rms");
-  EXPECT_STREQ(to_string(LimitKind::position), "position");
-  EXPECT_STREQ(to_string(LimitKind::not_finite), "not finite");
-  EXPECT_STREQ(to_string(LimitKind::stuck_sensor), "stuck sensor");
-  EXPECT_STREQ(to_string(LimitKind::sensor_jump), "sensor jump");
-  EXPECT_STREQ(to_string(LimitKind::deviation), "deviation");
-  EXPECT_STREQ(to_string(LimitKind::contradiction), "contradiction");
-  EXPECT_STREQ(to_string(LimitKind::speed), "speed");
-  EXPECT_STREQ(to_string(LimitKind::stopping_distance), "stopping distance");
-  EXPECT_STREQ(to_string(LimitKind::hard_position), "hard position");
+  const char* const names[] = {"none",         "actuator",      "slew",         "thermal rms",
+                               "position",     "not finite",    "stuck sensor", "sensor jump",
+                               "deviation",    "contradiction", "speed",        "stopping distance",
+                               "hard position"};
+  for (int kind = 0; kind < 13; ++kind)
+    EXPECT_STREQ(to_string(static_cast<LimitKind>(kind)), names[kind]);
 }
 
 }  // namespace test_limited_stage

@@ -62,12 +62,7 @@ class GuardedLoop {
 
 WaferStageSpec with_fault(Kind kind, double value, int channel = -1) {
   WaferStageSpec spec = test::stop_stage_spec();
-  WaferStageSpec::Fault fault;
-  fault.kind = kind;
-  fault.channel = channel;
-  fault.from_cycle = 100;
-  fault.value = value;
-  spec.faults = {fault};
+  spec.faults = {{kind, channel, 100, 1, -1, value}};
   return spec;
 }
 
@@ -146,11 +141,7 @@ TEST(LoopGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
 TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
   WaferStageSpec spec = test::wafer_stage_spec();
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
-  WaferStageSpec::Fault fault;
-  fault.kind = Kind::sensor_drift;
-  fault.from_cycle = 100;
-  fault.value = 1e-3;
-  spec.faults = {fault};
+  spec.faults = {{Kind::sensor_drift, 0, 100, 1, -1, 1e-3}};
   GuardedLoop loop(spec);
   EXPECT_EQ(loop.steps(6000), Outcome::braking);
   EXPECT_EQ(loop.stage->violation().kind, LimitKind::contradiction);

@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cctype>
-#include <fstream>
 #include <functional>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,6 +16,8 @@
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
+#include "tests/hal/modbus/numbered_registers.hpp"
+#include "tests/support/process/file_bytes.hpp"
 
 namespace stageid {
 namespace test_peer_status {
@@ -37,10 +37,8 @@ TEST(PeerStatus, HasOneMeaningEach) {
 }
 
 TEST(PeerStatus, TheDocsHaveTheTable) {
-  const std::ifstream file(STAGEID_SOURCE_DIR "/docs/stops.md");
-  std::ostringstream text;
-  text << file.rdbuf();
-  EXPECT_THAT(text.str(), testing::HasSubstr(peer_meanings_table()));
+  EXPECT_THAT(test::bytes_of(STAGEID_SOURCE_DIR "/docs/stops.md"),
+              testing::HasSubstr(peer_meanings_table()));
 }
 
 TEST(PeerStatus, CodesOfOutcomesMeanThemselvesOrAFault) {
@@ -135,37 +133,30 @@ TEST_P(CanPeer, HasTheReactionOfTheTable) {
   const auto bus = rig.host_bus();
   CanStage stage(rig.stage_spec().info, rig.spec(), std::make_unique<test::AlteredCan>(*bus, alter),
                  {1e3, false});
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
+  test::Driver host(stage);
+  host.u.assign(2, 0.1);
   if (row.before_the_run) {
-    try {
-      stage.start(1, inputs);
-      FAIL() << "started";
-    } catch (const StageError& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr(wanted.words));
-    }
+    EXPECT_THAT([&] { host.start(); }, test::refuses(wanted.words));
     EXPECT_NE(rig.node().state(), NodeState::measuring);
     return;
   }
-  stage.start(1, inputs);
-  const std::vector<double> u(2, 0.1);
-  const auto exchange = [&](std::uint64_t cycle) {
-    const Outcome outcome = stage.exchange({cycle, u}, inputs, {});
+  host.start();
+  const auto exchange = [&] {
+    const Outcome outcome = host.step();
     rig.pair().pass_time(1'000'000);
     return outcome == Outcome::late ? Outcome::ok : outcome;  // of a busy machine
   };
-  for (std::uint64_t cycle = 0; cycle < 2; ++cycle) ASSERT_EQ(exchange(cycle), Outcome::ok);
+  for (int cycle = 0; cycle < 2; ++cycle) ASSERT_EQ(exchange(), Outcome::ok);
   say = true;
-  const Outcome outcome = stage.exchange({2, u}, inputs, {});
+  const Outcome outcome = host.step();
   say = false;
   EXPECT_EQ(outcome, wanted.outcome) << stage.trouble();
   if (wanted.reaction == PeerReaction::mark) {
-    EXPECT_EQ(exchange(3), Outcome::ok);
+    EXPECT_EQ(exchange(), Outcome::ok);
   } else {
     EXPECT_THAT(stage.trouble(), testing::Not(testing::IsEmpty()));
     // At a limit the excitation is ramped down; the node may be good again meanwhile.
-    if (wanted.outcome == Outcome::limit) static_cast<void>(exchange(3));
+    if (wanted.outcome == Outcome::limit) static_cast<void>(exchange());
     EXPECT_THAT(stage.trouble(), testing::Not(testing::IsEmpty()));
   }
 }
@@ -229,16 +220,11 @@ INSTANTIATE_TEST_SUITE_P(
     name_of<CanSaid>);
 
 /// The registers of a node, changed before they are sent.
-class LyingRegisters final : public ModbusRegisters {
+class LyingRegisters final : public test::RegistersThrough {
  public:
-  explicit LyingRegisters(ModbusRegisters& node) : node_(node) {}
-  void begin_request(ModbusConnection from) override { node_.begin_request(from); }
-  void tick() override { node_.tick(); }
-  ModbusException write(int first, std::span<const std::uint16_t> values) override {
-    return node_.write(first, values);
-  }
+  using RegistersThrough::RegistersThrough;
   ModbusException read(int first, std::span<std::uint16_t> values) override {
-    const ModbusException refused = node_.read(first, values);
+    const ModbusException refused = RegistersThrough::read(first, values);
     first_ = first;
     values_ = values;
     if (say && (first == map::kMeasurementBootId || always)) say(*this);
@@ -252,7 +238,6 @@ class LyingRegisters final : public ModbusRegisters {
   bool always = false;
 
  private:
-  ModbusRegisters& node_;
   int first_ = 0;
   std::span<std::uint16_t> values_;
 };
@@ -276,33 +261,23 @@ TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
   const test::ServerThread server(lying, nullptr);
   lying.always = row.before_the_run;
   if (row.before_the_run) lying.say = row.say;
-  const auto stage = std::make_unique<ModbusStage>(test::ModbusBench::info(), server.address(),
-                                                   test::kQuickTiming);
-  std::vector<double> y(1);
-  Inputs inputs;
-  inputs.y = y;
+  test::ModbusHost host(server.address());
   if (row.before_the_run) {
-    try {
-      stage->start(1, inputs);
-      FAIL() << "started";
-    } catch (const StageError& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr(wanted.words));
-    }
+    EXPECT_THAT([&] { host.start(); }, test::refuses(wanted.words));
     EXPECT_NE(bench.node().state(), NodeState::measuring);
     return;
   }
-  stage->start(1, inputs);
-  const std::vector<double> u(2, 0.1);
-  ASSERT_EQ(stage->exchange({0, u}, inputs, {}), Outcome::ok);
+  host.start();
+  ASSERT_EQ(host.exchange(0.1, 0.1), Outcome::ok);
   lying.say = row.say;
-  EXPECT_EQ(stage->exchange({1, u}, inputs, {}), wanted.outcome) << stage->trouble();
-  const std::string trouble = stage->trouble();
+  EXPECT_EQ(host.exchange(0.1, 0.1), wanted.outcome) << host.stage.trouble();
+  const std::string trouble = host.stage.trouble();
   EXPECT_THAT(trouble, testing::Not(testing::IsEmpty()));
   if (wanted.outcome != Outcome::limit) return;
   // The excitation is ramped down; the node may be good again meanwhile.
   lying.say = nullptr;
-  EXPECT_EQ(stage->exchange({2, u}, inputs, {}), Outcome::ok);
-  EXPECT_EQ(stage->trouble(), trouble);
+  EXPECT_EQ(host.exchange(0.1, 0.1), Outcome::ok);
+  EXPECT_EQ(host.stage.trouble(), trouble);
 }
 
 INSTANTIATE_TEST_SUITE_P(
