@@ -15,6 +15,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 
@@ -46,17 +47,7 @@ void set_limits(std::size_t file_bytes) {
   limit(RLIMIT_AS, bytes_in_use() + kChildBytes + kChildBytesPerByte * file_bytes);
 }
 
-/// False if the parent has gone.
-bool send(int to, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t sent = ::write(to, text.data(), text.size());
-    if (sent < 0 && errno != EINTR) return false;
-    if (sent > 0) text.remove_prefix(static_cast<std::size_t>(sent));
-  }
-  return true;
-}
-
-[[noreturn]] void work_and_end(int to, std::size_t file_bytes,
+[[noreturn]] void work_and_end(const FileDescriptor& to, std::size_t file_bytes,
                                const std::function<std::string()>& work) noexcept {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   // A crash is the parent's to report, not that of a handler for crashes.
@@ -77,19 +68,8 @@ bool send(int to, std::string_view text) {
   } catch (...) {
     ::_exit(1);
   }
-  const bool sent = send(to, std::string_view(&answer, 1)) && send(to, text);
+  const bool sent = write_whole(to, std::string_view(&answer, 1)) && write_whole(to, text);
   ::_exit(sent ? 0 : 1);
-}
-
-std::string receive(int from) {
-  std::string text;
-  char piece[1 << 16];
-  while (true) {
-    const ssize_t got = ::read(from, piece, sizeof(piece));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return text;
-    text.append(piece, static_cast<std::size_t>(got));
-  }
 }
 
 /// The same error again: FormatError puts the file in front.
@@ -112,20 +92,22 @@ std::string in_child(const std::filesystem::path& file, const std::function<std:
   };
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) throw cannot(errno);
+  FileDescriptor from(ends[0]);
+  FileDescriptor to(ends[1]);
   const pid_t child = ::fork();
   if (child == 0) {
-    ::close(ends[0]);
-    work_and_end(ends[1], file_bytes, work);
+    from.reset();
+    work_and_end(to, file_bytes, work);
   }
   const int error = errno;
-  ::close(ends[1]);
+  to.reset();
   std::string answer;
   try {
-    if (child > 0) answer = receive(ends[0]);
+    if (child > 0) static_cast<void>(read_to_end(from, answer));
   } catch (const std::bad_alloc&) {
     answer = kNoMemory;
   }
-  ::close(ends[0]);
+  from.reset();
   if (child < 0) throw cannot(error);
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {

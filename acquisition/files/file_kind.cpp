@@ -66,7 +66,7 @@ std::string sentence_of_format(const std::string& format, const std::string& wan
 /// Value of the key `format` in JSON or YAML, or of the attribute of an HDF5 file with .h5 appended; empty if
 /// there is none.
 std::string named_format(const std::filesystem::path& file, const std::string& head) {
-  if (head.starts_with("\x89HDF")) {
+  if (is_hdf5_head(head)) {
     try {
       const Hdf5File hdf5 = Hdf5File::open(file);
       return hdf5.has_attribute("/", "format")

@@ -9,10 +9,10 @@
 namespace stageid {
 namespace {
 
-/// One attribute opened for reading, with its names for error messages.
-struct Attribute {
-  Attribute(const Hdf5File& source, std::string object_name, std::string attribute_name)
-      : file(source), object(std::move(object_name)), name(std::move(attribute_name)) {
+/// One attribute opened for reading.
+struct Attribute : hdf5::StoredValue {
+  Attribute(const Hdf5File& source, const std::string& object_name, const std::string& name)
+      : StoredValue{source, object_name, "attribute '" + name + "' ", "damaged"} {
     if (!file.exists(object)) throw FormatError(file.path(), object, "is missing");
     handle = {H5Aopen_by_name(file.id(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),
               H5Aclose};
@@ -20,53 +20,28 @@ struct Attribute {
       hdf5::take_reason();
       fail("is missing");
     }
-    type = {H5Aget_type(handle.get()), H5Tclose};
-    space = {H5Aget_space(handle.get()), H5Sclose};
-    if (!type || !space)
-      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
-    kind = hdf5::kind_of(type.get());
+    set({H5Aget_type(handle.get()), H5Tclose}, {H5Aget_space(handle.get()), H5Sclose});
     count = hdf5::plausible_count(file.path(), object, hdf5::shape_of(space.get()),
                                   H5Tget_size(type.get()), false);
     if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) count = 0;
   }
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw FormatError(file.path(), object, "attribute '" + name + "' " + what);
-  }
   void expect_one(const std::string& wanted) const {
     if (count != 1) fail("has " + std::to_string(count) + " values; expected " + wanted);
   }
-  void expect(bool matches, const std::string& wanted) const {
-    if (!matches) fail("contains " + hdf5::name_of(kind) + "; expected " + wanted);
-  }
-  bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
   void read(hid_t memory_type, void* buffer) const {
-    if (H5Aread(handle.get(), memory_type, buffer) < 0) {
-      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
-    }
+    if (H5Aread(handle.get(), memory_type, buffer) < 0) fail_to_read();
+  }
+  std::vector<std::string> texts() const {
+    expect(kind == Hdf5Kind::text, "strings");
+    return read_texts(count, [this](hid_t memory_type, void* buffer) {
+      return H5Aread(handle.get(), memory_type, buffer);
+    });
   }
 
-  const Hdf5File& file;
-  std::string object;
-  std::string name;
-  Hdf5Handle handle, type, space;
-  Hdf5Kind kind = Hdf5Kind::other;
+  Hdf5Handle handle;
   std::size_t count = 0;
 };
-
-std::vector<std::string> read_texts_of(const Attribute& attribute) {
-  attribute.expect(attribute.kind == Hdf5Kind::text, "strings");
-  std::vector<std::string> texts;
-  const auto read = [&attribute](hid_t memory_type, void* buffer) {
-    return H5Aread(attribute.handle.get(), memory_type, buffer) >= 0;
-  };
-  if (!hdf5::read_strings(attribute.type.get(), attribute.space.get(), attribute.count, read,
-                          texts)) {
-    attribute.fail("cannot be read" + hdf5::take_system_reason() +
-                   "; the file is damaged, copy it again");
-  }
-  return texts;
-}
 
 void write_values(const Hdf5File& file, const std::string& object, const std::string& name,
                   const Hdf5Handle& space, hid_t file_type, hid_t memory_type, const void* data) {
@@ -102,13 +77,9 @@ bool Hdf5File::has_attribute(const std::string& object, const std::string& name)
 
 std::vector<std::string> Hdf5File::attributes(const std::string& object) const {
   if (!exists(object)) throw FormatError(path_, object, "is missing");
-  const auto collect = [](hid_t, const char* name, const H5A_info_t*, void* names) -> herr_t {
-    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
-    return 0;
-  };
   std::vector<std::string> names;
-  if (H5Aiterate_by_name(id(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names,
-                         H5P_DEFAULT) < 0) {
+  if (H5Aiterate_by_name(id(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr,
+                         hdf5::collect_name<H5A_info_t>, &names, H5P_DEFAULT) < 0) {
     throw FormatError(path_, object,
                       "its attributes cannot be listed" + hdf5::take_system_reason() +
                           "; the file is damaged, copy it again");
@@ -122,7 +93,7 @@ Hdf5Kind Hdf5File::attribute_kind(const std::string& object, const std::string& 
 
 double Hdf5File::read_real_attribute(const std::string& object, const std::string& name) const {
   const Attribute attribute(*this, object, name);
-  attribute.expect(attribute.is_number(), "a number");
+  attribute.expect_number("a number");
   attribute.expect_one("one number");
   double value = 0.0;
   attribute.read(H5T_NATIVE_DOUBLE, &value);
@@ -132,7 +103,7 @@ double Hdf5File::read_real_attribute(const std::string& object, const std::strin
 long long Hdf5File::read_integer_attribute(const std::string& object,
                                            const std::string& name) const {
   const Attribute attribute(*this, object, name);
-  attribute.expect(attribute.is_number(), "an integer");
+  attribute.expect_number("an integer");
   attribute.expect_one("one integer");
   if (attribute.kind == Hdf5Kind::integer) {
     long long value = 0;
@@ -153,13 +124,13 @@ std::string Hdf5File::read_text_attribute(const std::string& object,
   const Attribute attribute(*this, object, name);
   attribute.expect(attribute.kind == Hdf5Kind::text, "a string");
   attribute.expect_one("one string");
-  return read_texts_of(attribute).front();
+  return attribute.texts().front();
 }
 
 std::vector<double> Hdf5File::read_reals_attribute(const std::string& object,
                                                    const std::string& name) const {
   const Attribute attribute(*this, object, name);
-  attribute.expect(attribute.is_number(), "numbers");
+  attribute.expect_number("numbers");
   std::vector<double> values(attribute.count);
   if (!values.empty()) attribute.read(H5T_NATIVE_DOUBLE, values.data());
   return values;
@@ -167,7 +138,7 @@ std::vector<double> Hdf5File::read_reals_attribute(const std::string& object,
 
 std::vector<std::string> Hdf5File::read_texts_attribute(const std::string& object,
                                                         const std::string& name) const {
-  return read_texts_of(Attribute(*this, object, name));
+  return Attribute(*this, object, name).texts();
 }
 
 void Hdf5File::write_attribute(const std::string& object, const std::string& name, double value) {

@@ -2,16 +2,14 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <string_view>
 
 #include "acquisition/files/child_process.hpp"
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_heap_check.hpp"
@@ -34,21 +32,11 @@ namespace {
 
 /// HDF5's messages do not distinguish a missing file from a forbidden one; the operating system's do.
 void check_can_be_opened(const std::filesystem::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
-    throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
-  }
+  const FileDescriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!descriptor) throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
   struct stat status {};
-  const bool regular = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
-  ::close(descriptor);
-  if (!regular)
+  if (::fstat(descriptor.get(), &status) != 0 || !S_ISREG(status.st_mode))
     throw FileError(file.string() + ": is not a regular file; give the name of an HDF5 file");
-}
-
-bool begins_as_hdf5(const std::filesystem::path& file) {
-  char head[4] = {};
-  std::ifstream(file, std::ios::binary).read(head, sizeof(head));
-  return std::string_view(head, sizeof(head)) == "\x89HDF";
 }
 
 }  // namespace
@@ -80,7 +68,7 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   if (H5Fis_hdf5(file.c_str()) <= 0) {
     H5Eclear2(H5E_DEFAULT);
     // other_kind() opens HDF5 files to read their format.
-    const std::string other = begins_as_hdf5(file) ? "" : other_kind(file, "an HDF5 file");
+    const std::string other = is_hdf5(file) ? "" : other_kind(file, "an HDF5 file");
     throw FormatError(file, "",
                       !other.empty()
                           ? other
@@ -163,12 +151,9 @@ std::vector<std::string> Hdf5File::children(const std::string& group) const {
     hdf5::take_reason();
     fail("is not a group; expected a group");
   }
-  const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* names) -> herr_t {
-    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
-    return 0;
-  };
   std::vector<std::string> names;
-  if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) {
+  if (H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, hdf5::collect_name<H5L_info_t>,
+                 &names) < 0) {
     fail("cannot be listed" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
   }
   return names;

@@ -10,45 +10,23 @@ namespace stageid {
 namespace {
 
 /// Properties of an open dataset before its data are read.
-struct DatasetInfo {
-  DatasetInfo(const Hdf5File& source, std::string dataset_name, hid_t id)
-      : file(source),
-        name(std::move(dataset_name)),
-        dataset(id),
-        type(H5Dget_type(id), H5Tclose),
-        space(H5Dget_space(id), H5Sclose) {
-    if (!type || !space)
-      fail("cannot be read" + hdf5::take_system_reason() + "; the file is damaged, copy it again");
-    kind = hdf5::kind_of(type.get());
+struct DatasetInfo : hdf5::StoredValue {
+  DatasetInfo(const Hdf5File& source, const std::string& name, hid_t id)
+      : StoredValue{source, name, "", "truncated or damaged"}, dataset(id) {
+    set({H5Dget_type(id), H5Tclose}, {H5Dget_space(id), H5Sclose});
     shape = hdf5::shape_of(space.get());
   }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw FormatError(file.path(), name, what);
-  }
-  void expect(bool matches, const std::string& wanted) const {
-    if (!matches) fail("contains " + hdf5::name_of(kind) + "; expected " + wanted);
-  }
-  bool is_number() const { return kind == Hdf5Kind::real || kind == Hdf5Kind::integer; }
 
   std::size_t count() const {
     const Hdf5Handle properties(H5Dget_create_plist(dataset), H5Pclose);
     const bool compressed = H5Pget_nfilters(properties.get()) > 0;
-    return hdf5::plausible_count(file.path(), name, shape, H5Tget_size(type.get()), compressed);
+    return hdf5::plausible_count(file.path(), object, shape, H5Tget_size(type.get()), compressed);
   }
-  /// @throws FormatError with HDF5's reason if `status` is a failure.
   void check_read(herr_t status) const {
-    if (status < 0) {
-      fail("cannot be read" + hdf5::take_system_reason() +
-           "; the file is truncated or damaged, copy it again");
-    }
+    if (status < 0) fail_to_read();
   }
 
-  const Hdf5File& file;
-  std::string name;
   hid_t dataset;
-  Hdf5Handle type, space;
-  Hdf5Kind kind = Hdf5Kind::other;
   std::vector<hsize_t> shape;
 };
 
@@ -80,7 +58,7 @@ Hdf5Kind Hdf5File::kind(const std::string& dataset) const {
 
 std::vector<double> Hdf5File::read_reals(const std::string& dataset) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.expect(info.is_number(), "real numbers");
+  info.expect_number("real numbers");
   return read_all<double>(info, H5T_NATIVE_DOUBLE);
 }
 
@@ -98,20 +76,15 @@ std::vector<std::string> Hdf5File::read_texts(const std::string& dataset) const 
   if (info.shape.size() != 1) {
     info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected a list of strings");
   }
-  std::vector<std::string> texts;
-  const auto read = [&info](hid_t memory_type, void* buffer) {
-    return H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, buffer) >= 0;
-  };
-  if (!hdf5::read_strings(info.type.get(), info.space.get(), info.count(), read, texts)) {
-    info.check_read(-1);
-  }
-  return texts;
+  return info.read_texts(info.count(), [&info](hid_t memory_type, void* buffer) {
+    return H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, buffer);
+  });
 }
 
 void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t count,
                          double* out) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.expect(info.is_number(), "real numbers");
+  info.expect_number("real numbers");
   const std::size_t rank = info.shape.size();
   if (rank != 1 && rank != 2) {
     info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected rows x columns");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <string_view>
@@ -89,19 +90,9 @@ Hdf5Kind kind_of(hid_t type) {
 }
 
 std::string name_of(Hdf5Kind kind) {
-  switch (kind) {
-    case Hdf5Kind::real:
-      return "real numbers";
-    case Hdf5Kind::integer:
-      return "integers";
-    case Hdf5Kind::complex:
-      return "complex numbers";
-    case Hdf5Kind::text:
-      return "text";
-    case Hdf5Kind::other:
-      break;
-  }
-  return "data of an unsupported type";
+  constexpr std::array kNames = {"real numbers", "integers", "complex numbers", "text",
+                                 "data of an unsupported type"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::vector<hsize_t> shape_of(hid_t space) {
@@ -127,9 +118,7 @@ std::size_t plausible_count(const std::filesystem::path& file, const std::string
   if (!ignored) limit += file_bytes * (compressed ? kGreatestCompression : 1);
 
   std::uintmax_t bytes = std::max<std::size_t>(element_bytes, 1);
-  bool empty = false;
-  for (const hsize_t extent : shape) empty = empty || extent == 0;
-  if (empty) return 0;
+  if (std::find(shape.begin(), shape.end(), hsize_t{0}) != shape.end()) return 0;
   std::size_t count = 1;
   for (const hsize_t extent : shape) {
     if (extent > limit / bytes) {
@@ -143,47 +132,56 @@ std::size_t plausible_count(const std::filesystem::path& file, const std::string
   return count;
 }
 
-namespace {
-
-bool read_variable_strings(hid_t file_type, hid_t space, std::size_t count,
-                           const std::function<bool(hid_t, void*)>& read,
-                           std::vector<std::string>& texts) {
-  const Hdf5Handle type = text_type(H5Tget_cset(file_type));
-  std::vector<char*> pointers(count, nullptr);
-  const bool done = read(type.get(), pointers.data());
-  if (done) {
-    for (const char* pointer : pointers) texts.emplace_back(pointer != nullptr ? pointer : "");
-  }
-  H5Dvlen_reclaim(type.get(), space, H5P_DEFAULT, pointers.data());
-  return done;
+void StoredValue::set(Hdf5Handle stored_type, Hdf5Handle stored_space) {
+  type = std::move(stored_type);
+  space = std::move(stored_space);
+  if (!type || !space)
+    fail("cannot be read" + take_system_reason() + "; the file is damaged, copy it again");
+  kind = kind_of(type.get());
 }
 
-bool read_fixed_strings(hid_t file_type, std::size_t count,
-                        const std::function<bool(hid_t, void*)>& read,
-                        std::vector<std::string>& texts) {
-  const std::size_t size = H5Tget_size(file_type);
+void StoredValue::fail(const std::string& what) const {
+  throw FormatError(file.path(), object, subject + what);
+}
+
+void StoredValue::fail_to_read() const {
+  fail("cannot be read" + take_system_reason() + "; the file is " + damage + ", copy it again");
+}
+
+void StoredValue::expect(bool matches, const std::string& wanted) const {
+  if (!matches) fail("contains " + name_of(kind) + "; expected " + wanted);
+}
+
+void StoredValue::expect_number(const std::string& wanted) const {
+  expect(kind == Hdf5Kind::real || kind == Hdf5Kind::integer, wanted);
+}
+
+std::vector<std::string> StoredValue::read_texts(
+    std::size_t count, const std::function<herr_t(hid_t, void*)>& read) const {
+  std::vector<std::string> texts;
+  if (count == 0) return texts;
+  texts.reserve(count);
+  if (H5Tis_variable_str(type.get()) > 0) {
+    const Hdf5Handle memory = text_type(H5Tget_cset(type.get()));
+    std::vector<char*> pointers(count, nullptr);
+    const bool done = read(memory.get(), pointers.data()) >= 0;
+    if (done)
+      for (const char* pointer : pointers) texts.emplace_back(pointer != nullptr ? pointer : "");
+    H5Dvlen_reclaim(memory.get(), space.get(), H5P_DEFAULT, pointers.data());
+    if (!done) fail_to_read();
+    return texts;
+  }
+  const std::size_t size = H5Tget_size(type.get());
   std::vector<char> buffer(count * size);
-  if (!read(file_type, buffer.data())) return false;
-  const bool space_padded = H5Tget_strpad(file_type) == H5T_STR_SPACEPAD;
+  if (read(type.get(), buffer.data()) < 0) fail_to_read();
+  const bool space_padded = H5Tget_strpad(type.get()) == H5T_STR_SPACEPAD;
   for (std::size_t i = 0; i < count; ++i) {
     const char* start = buffer.data() + i * size;
     std::string text(start, ::strnlen(start, size));
     if (space_padded) text.erase(text.find_last_not_of(' ') + 1);
     texts.push_back(std::move(text));
   }
-  return true;
-}
-
-}  // namespace
-
-bool read_strings(hid_t file_type, hid_t space, std::size_t count,
-                  const std::function<bool(hid_t, void*)>& read, std::vector<std::string>& texts) {
-  texts.clear();
-  if (count == 0) return true;
-  texts.reserve(count);
-  return H5Tis_variable_str(file_type) > 0
-             ? read_variable_strings(file_type, space, count, read, texts)
-             : read_fixed_strings(file_type, count, read, texts);
+  return texts;
 }
 
 }  // namespace stageid::hdf5

@@ -34,9 +34,31 @@ std::size_t plausible_count(const std::filesystem::path& file, const std::string
                             const std::vector<hsize_t>& shape, std::size_t element_bytes,
                             bool compressed);
 
-/// Reads `count` strings of fixed or variable length. `read(memory_type, buffer)` calls H5Dread or H5Aread and
-/// returns whether it succeeded. @returns the same
-bool read_strings(hid_t file_type, hid_t space, std::size_t count,
-                  const std::function<bool(hid_t, void*)>& read, std::vector<std::string>& texts);
+/// An attribute or a dataset that is read, with its names for error messages.
+struct StoredValue {
+  const Hdf5File& file;
+  std::string object;
+  std::string subject;   ///< starts every message about it: "attribute 'unit' ", or nothing
+  const char* damage;    ///< what may be wrong with a file that cannot be read
+  Hdf5Handle type = {};  ///< of the file
+  Hdf5Handle space = {};
+  Hdf5Kind kind = Hdf5Kind::other;
+
+  void set(Hdf5Handle stored_type, Hdf5Handle stored_space);
+  [[noreturn]] void fail(const std::string& what) const;
+  [[noreturn]] void fail_to_read() const;  ///< with HDF5's reason
+  void expect(bool matches, const std::string& wanted) const;
+  void expect_number(const std::string& wanted) const;
+  /// `count` strings of fixed or variable length. `read(memory_type, buffer)` calls H5Dread or H5Aread.
+  std::vector<std::string> read_texts(std::size_t count,
+                                      const std::function<herr_t(hid_t, void*)>& read) const;
+};
+
+/// For H5Literate() and H5Aiterate(): appends the name to a list of texts.
+template <typename Info>
+herr_t collect_name(hid_t, const char* name, const Info*, void* names) {
+  static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+  return 0;
+}
 
 }  // namespace stageid::hdf5

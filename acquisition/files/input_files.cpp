@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <mutex>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 
@@ -66,26 +66,16 @@ std::string read_whole_file(const std::filesystem::path& file) {
   const auto fail = [&file](const std::string& what) {
     throw FileError(file.string() + ": " + what);
   };
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) fail("cannot be read: " + system_reason(errno));
-  struct Close {
-    int descriptor;
-    ~Close() { ::close(descriptor); }
-  } const closed_at_the_end{descriptor};
+  const FileDescriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (::fstat(descriptor, &status) != 0) fail("cannot be read: " + system_reason(errno));
+  if (!descriptor || ::fstat(descriptor.get(), &status) != 0)
+    fail("cannot be read: " + system_reason(errno));
   if (S_ISDIR(status.st_mode)) fail("is a directory; give the name of a file");
   if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
     fail("is not a regular file; give the name of a file");
   std::string text;
-  std::string piece(std::size_t{1} << 18, '\0');
-  while (true) {
-    const ssize_t got = ::read(descriptor, piece.data(), piece.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail("cannot be read: " + system_reason(errno));
-    if (got == 0) return text;
-    text.append(piece, 0, static_cast<std::size_t>(got));
-  }
+  if (!read_to_end(descriptor, text)) fail("cannot be read: " + system_reason(errno));
+  return text;
 }
 
 }  // namespace stageid

@@ -13,8 +13,8 @@
 #include <set>
 #include <string>
 #include <system_error>
-#include <utility>
 
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
@@ -40,26 +40,6 @@ UnfinishedFiles& unfinished() {
       "{}: {}: {}", shown_name(file).string(), what,
       remedy.empty() ? system_reason(error) : fmt::format("{}; {}", std::strerror(error), remedy)));
 }
-
-/// A file descriptor that closes itself; write errors surface at fsync(), so close() is not
-/// checked.
-class Descriptor {
- public:
-  explicit Descriptor(int descriptor) noexcept : descriptor_(descriptor) {}
-  ~Descriptor() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(descriptor_, other.descriptor_);
-    return *this;
-  }
-  int get() const noexcept { return descriptor_; }
-  explicit operator bool() const noexcept { return descriptor_ >= 0; }
-
- private:
-  int descriptor_;
-};
 
 std::filesystem::path directory_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
@@ -100,21 +80,10 @@ std::filesystem::path temporary_beside(const std::filesystem::path& target) {
 }
 
 void synchronize(const std::filesystem::path& file, int flags, const std::filesystem::path& named) {
-  const Descriptor descriptor(::open(file.c_str(), flags | O_CLOEXEC));
+  const FileDescriptor descriptor(::open(file.c_str(), flags | O_CLOEXEC));
   if (!descriptor) fail(named, "cannot be written", errno);
   // Some file systems cannot synchronize a directory and return EINVAL, which is harmless.
   if (::fsync(descriptor.get()) != 0 && errno != EINVAL) fail(named, "cannot be written", errno);
-}
-
-void write_all(int descriptor, std::string_view text, const std::filesystem::path& named) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0) {
-      if (errno == EINTR) continue;
-      fail(named, "cannot be written", errno);
-    }
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
 }
 
 }  // namespace
@@ -132,9 +101,10 @@ OutputFile::OutputFile(const std::filesystem::path& target)
   constexpr mode_t kMode = 0666;  // minus the user's umask
   const std::lock_guard lock(unfinished().mutex);
   const auto create = [this] {
-    return Descriptor(::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
+    return FileDescriptor(
+        ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
   };
-  Descriptor descriptor = create();
+  FileDescriptor descriptor = create();
   // A process of the same number, in another container or before a crash, may have left its file.
   while (!descriptor && errno == EEXIST) {
     temporary_ = temporary_beside(target_);
@@ -178,9 +148,8 @@ void remove_unfinished_files() {
 }
 
 void OutputFile::append(std::string_view text) {
-  const Descriptor descriptor(::open(temporary_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
-  if (!descriptor) fail(target_, "cannot be written", errno);
-  write_all(descriptor.get(), text, target_);
+  const FileDescriptor descriptor(::open(temporary_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  if (!descriptor || !write_whole(descriptor, text)) fail(target_, "cannot be written", errno);
 }
 
 void write_text_file(const std::filesystem::path& target, std::string_view text) {

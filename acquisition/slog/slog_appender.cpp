@@ -14,7 +14,6 @@
 #include <random>
 #include <stdexcept>
 #include <system_error>
-#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
@@ -38,7 +37,7 @@ void lock(const FileDescriptor& file, const std::filesystem::path& path) {
 void synchronize_directory(const std::filesystem::path& file) {
   const std::filesystem::path parent = file.has_parent_path() ? file.parent_path() : ".";
   const FileDescriptor directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (directory.get() >= 0) static_cast<void>(::fsync(directory.get()));
+  if (directory) static_cast<void>(::fsync(directory.get()));
 }
 
 std::int64_t now_ns() {
@@ -48,28 +47,13 @@ std::int64_t now_ns() {
 
 }  // namespace
 
-FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
-  if (this != &other) {
-    reset();
-    number_ = other.release();
-  }
-  return *this;
-}
-
-void FileDescriptor::reset() noexcept {
-  if (number_ >= 0) ::close(number_);
-  number_ = -1;
-}
-
-int FileDescriptor::release() noexcept { return std::exchange(number_, -1); }
-
 SlogAppender::SlogAppender(std::filesystem::path path, FileDescriptor file, std::uint32_t log_id)
     : path_(std::move(path)), file_(std::move(file)), log_id_(log_id) {}
 
 SlogAppender SlogAppender::create(const std::filesystem::path& file) {
   FileDescriptor descriptor(
       ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644));
-  if (descriptor.get() < 0) {
+  if (!descriptor) {
     const int error = errno;
     throw FileError(
         error == EEXIST
@@ -85,10 +69,9 @@ SlogAppender SlogAppender::create(const std::filesystem::path& file) {
 
 SlogAppender SlogAppender::open_existing(const std::filesystem::path& file) {
   FileDescriptor descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
-  if (descriptor.get() < 0) {
+  if (!descriptor)
     throw FileError(
         fmt::format("{}: cannot be opened for writing: {}", file.string(), system_reason(errno)));
-  }
   lock(descriptor, file);
   return {file, std::move(descriptor), 0};
 }
@@ -117,7 +100,7 @@ void SlogAppender::append(SlogBlockHeader header, std::span<const std::byte> pay
   header.payload_crc = crc32c(std::span(kZeros).first(padding), crc32c(payload));
   if (header.time_ns == 0) header.time_ns = now_ns();
   header.header_crc = slog_header_crc(header);
-  write_whole(header, payload, padding);
+  write_block(header, payload, padding);
   bytes_ += slog_block_bytes(header);
   ++next_sequence_;
   start_writeback();
@@ -137,7 +120,7 @@ void SlogAppender::append(const SlogBlockHeader& header, std::string_view json) 
   append(header, std::as_bytes(std::span(json)));
 }
 
-void SlogAppender::write_whole(const SlogBlockHeader& header, std::span<const std::byte> payload,
+void SlogAppender::write_block(const SlogBlockHeader& header, std::span<const std::byte> payload,
                                std::size_t padding) {
   if (error_ != 0 || !is_open()) fail(error_ != 0 ? error_ : EBADF);
   const auto part = [](const void* data, std::size_t size) {

@@ -6,25 +6,10 @@
 #include <span>
 #include <string_view>
 
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/slog/slog_format.hpp"
 
 namespace stageid {
-
-/// An open file descriptor that closes itself.
-class FileDescriptor {
- public:
-  FileDescriptor() = default;
-  explicit FileDescriptor(int number) noexcept : number_(number) {}
-  ~FileDescriptor() { reset(); }
-  FileDescriptor(FileDescriptor&& other) noexcept : number_(other.release()) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
-  int get() const noexcept { return number_; }
-  void reset() noexcept;
-
- private:
-  int release() noexcept;
-  int number_ = -1;
-};
 
 /// Appends blocks to a native log: numbers them, computes both CRCs, writes each with one call.
 ///
@@ -55,14 +40,14 @@ class SlogAppender {
   /// @throws FileError if the operating system reports an error of an earlier write.
   void close();
 
-  bool is_open() const noexcept { return file_.get() >= 0; }
+  bool is_open() const noexcept { return static_cast<bool>(file_); }
   std::uint64_t bytes() const noexcept { return bytes_; }
   std::uint64_t blocks() const noexcept { return next_sequence_; }
   const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
   SlogAppender(std::filesystem::path path, FileDescriptor file, std::uint32_t log_id);
-  void write_whole(const SlogBlockHeader& header, std::span<const std::byte> payload,
+  void write_block(const SlogBlockHeader& header, std::span<const std::byte> payload,
                    std::size_t padding);
   void start_writeback() noexcept;
   void require_name();

@@ -1,59 +1,7 @@
 #pragma once
 
-// The native log, FILE.slog: an append-only sequence of blocks.
-//
-// All numbers are little-endian. Every block starts at a multiple of 64 bytes with this header:
-//
-//   offset  type     field
-//        0  8 bytes  magic          89 53 4C 4F 47 0D 0A 1A  ("\x89SLOG\r\n\x1a")
-//        8  uint16   type           1 log, 2 run_begin, 3 excitation, 4 samples, 5 run_end, 6 end
-//       10  uint16   version        1
-//       12  uint32   log_id         random, the same in every block of one file
-//       12  uint32   log_id         random, the same in every block of a file
-//       24  uint32   run            index of the run, 0, 1, 2, ... (0 in log and end blocks)
-//       24  uint32   run            index of the run, 0, 1, 2, ... (0 in log and end blocks)
-//       28  uint32   cols           8-byte words per row (samples), columns (excitation), otherwise 0
-//       32  uint64   first_row      samples: index within the run of the block's first row, otherwise 0
-//       40  uint32   rows           samples, excitation: rows, otherwise 0
-//       48  int64    time_ns        when it was written, since 1970-01-01T00:00:00Z
-//       48  int64    time_ns        time of writing, since 1970-01-01T00:00:00Z
-//       60  uint32   header_crc     CRC-32C of bytes 0 .. 59
-//
-// The payload follows, padded with zero bytes to a multiple of 64. Payloads by type:
-//
-//   log         JSON: {"sample_rate_hz", "period_samples", "transient_periods", "excitation",
-//               "actuators", "sensors": each {"names": [], "units": []}, "stamps": true if rows
-//               have them, "metadata": {...}}.
-//               The first block of a file; repeated before every run_begin, so that losing one is
-//               harmless.
-//   run_begin   JSON: {"realization", "experiment", "started_utc", "excitation_columns": [...]}.
-//   excitation  float64, one period of the excitation, column by column, only the nonzero columns, which
-//               run_begin lists. Absent if there are none.
-//   samples     rows of `cols` words: actuators, sensors (float64, SI), then one uint64 status word:
-//               bits 0-7 hal's Outcome, bit 8 marked (do not use), bit 9 irregular (jitter beyond
-//               the limit), bits 32-63 lateness in ns. With "stamps", a uint64 stamp word stands before
-//               it: bits 0-31 ns from the instant of the setpoint to the arrival of the measurement
-//               (0: unknown), bit 32: bits 48-63 are the node's time in us, modulo 2^16.
-//   run_end     JSON: {"realization", "experiment", "samples", "complete", "health": {"cycles",
-//               "late", "missing", "marked", "irregular", "largest_lateness_ns", "seconds"}}. A run without run_end
-//               was interrupted: incomplete.
-//   end         JSON: {"exit_code", "message"}. The last block of a log that was closed properly; a
-//               resumed log has several.
-//
-// Reader in numpy:
-//
-//   import numpy as np
-//   head = np.dtype([('magic', 'S8'), ('type', '<u2'), ('version', '<u2'), ('log_id', '<u4'),
-//       ('sequence', '<u8'), ('run', '<u4'), ('cols', '<u4'), ('first_row', '<u8'), ('rows', '<u4'),
-//       ('bytes', '<u4'), ('time_ns', '<i8'), ('payload_crc', '<u4'), ('header_crc', '<u4')])
-//   raw, at, runs = np.memmap('run.slog', np.uint8, 'r'), 0, {}
-//   while at < raw.size:
-//       h = raw[at:at + 64].view(head)[0]
-//       payload = raw[at + 64:at + 64 + int(h['bytes'])]
-//       if h['type'] == 4:
-//           runs.setdefault(int(h['run']), []).append(payload.view('<f8').reshape(h['rows'], -1))
-//       at += 64 + -(-int(h['bytes']) // 64) * 64
-//   samples = {run: np.vstack(blocks) for run, blocks in runs.items()}  # last column: status word
+// The native log, FILE.slog: an append-only sequence of blocks, each a SlogBlockHeader and a payload. docs/formats.md
+// describes fields and payloads, and has a reader in numpy.
 
 #include <array>
 #include <bit>
@@ -102,6 +50,13 @@ struct SlogBlockHeader {
   }
 };
 static_assert(sizeof(SlogBlockHeader) == kSlogAlignment);
+
+constexpr SlogBlockHeader slog_header(SlogBlockType type, std::uint32_t run) noexcept {
+  SlogBlockHeader header;
+  header.type = static_cast<std::uint16_t>(type);
+  header.run = run;
+  return header;
+}
 
 constexpr std::uint64_t slog_padded(std::uint64_t payload_bytes) noexcept {
   return (payload_bytes + kSlogAlignment - 1) / kSlogAlignment * kSlogAlignment;

@@ -49,7 +49,7 @@ class Indexer {
     for (const SlogBlock& block : scan_.blocks) {
       if (!block.header.is(SlogBlockType::log) || !payload_intact(source_, block)) continue;
       try {
-        index_.info = parse_log_info(json(block));
+        index_.info = parse_log_info(read_text(source_, block));
         return;
       } catch (const std::invalid_argument& error) {
         throw FormatError(source_.path(), "", error.what());
@@ -60,11 +60,6 @@ class Indexer {
                       "the log cannot be read");
   }
 
-  std::string json(const SlogBlock& block) const {
-    const std::vector<std::byte> payload = read_payload(source_, block);
-    return {reinterpret_cast<const char*>(payload.data()), payload.size()};
-  }
-
   void book_damage(const SlogBlock& block, const std::string& wrong) {
     index_.damage.push_back(
         {block.offset, slog_block_bytes(block.header), describe(block) + ": " + wrong});
@@ -73,12 +68,10 @@ class Indexer {
 
   /// True if there is damage between the last block and this one.
   bool passes_damage(const SlogBlock& block) {
-    bool passed = false;
-    for (; next_damage_ != scan_.damage.end() && next_damage_->offset <= block.offset;
-         ++next_damage_) {
-      passed = true;
-    }
-    return passed;
+    const auto last = next_damage_;
+    while (next_damage_ != scan_.damage.end() && next_damage_->offset <= block.offset)
+      ++next_damage_;
+    return next_damage_ != last;
   }
 
   void take(const SlogBlock& block) {
@@ -89,10 +82,9 @@ class Indexer {
     if (within_run && !open_ && !index_.damage.empty()) return;  // reported already
     switch (static_cast<SlogBlockType>(block.header.type)) {
       case SlogBlockType::log:
-        if (!same_measurement(parse_log_info(json(block)), index_.info)) {
+        if (!same_measurement(parse_log_info(read_text(source_, block)), index_.info))
           throw std::invalid_argument(
               "describes a different measurement than the first description");
-        }
         return;
       case SlogBlockType::run_begin:
         return begin_run(block);
@@ -104,7 +96,7 @@ class Indexer {
         return end_run(block);
       case SlogBlockType::end:
         close_run();
-        index_.end = parse_end(json(block));
+        index_.end = parse_end(read_text(source_, block));
         return;
     }
     throw std::invalid_argument(fmt::format("has the unknown type {}", block.header.type));
@@ -112,7 +104,7 @@ class Indexer {
 
   void begin_run(const SlogBlock& block) {
     close_run();
-    SlogRunBegin begin = parse_run_begin(json(block));
+    SlogRunBegin begin = parse_run_begin(read_text(source_, block));
     check_run_begin(begin, index_.info);
     if (block.header.run < index_.runs.size()) {
       throw std::invalid_argument(
@@ -165,7 +157,7 @@ class Indexer {
 
   void end_run(const SlogBlock& block) {
     SlogRunIndex& run = open_run(block);
-    const SlogRunEnd end = parse_run_end(json(block));
+    const SlogRunEnd end = parse_run_end(read_text(source_, block));
     if (end.samples != run.run.samples || end.realization != run.run.realization ||
         end.experiment != run.run.experiment) {
       throw std::invalid_argument(

@@ -90,7 +90,7 @@ class Recovery {
       case SlogBlockType::log:
         return;  // written before every run
       case SlogBlockType::run_begin:
-        return begin_run(block.header.run, parse_run_begin(json(block)), block);
+        return begin_run(block.header.run, parse_run_begin(read_text(source_, block)), block);
       case SlogBlockType::excitation:
         return copy_excitation(block);
       case SlogBlockType::samples:
@@ -99,22 +99,17 @@ class Recovery {
         return end_run(block);
       case SlogBlockType::end:
         close_run();
-        append_json(SlogBlockType::end, to_json(parse_end(json(block))), block.header.time_ns);
+        append_json(SlogBlockType::end, to_json(parse_end(read_text(source_, block))),
+                    block.header.time_ns);
         ended_ = true;
         return;
     }
     --report_.blocks_kept;
   }
 
-  std::string json(const SlogBlock& block) const {
-    const std::vector<std::byte> payload = read_payload(source_, block);
-    return {reinterpret_cast<const char*>(payload.data()), payload.size()};
-  }
-
   SlogBlockHeader header(SlogBlockType type, std::int64_t time_ns) const {
-    SlogBlockHeader made;
-    made.type = static_cast<std::uint16_t>(type);
-    made.run = run_ ? static_cast<std::uint32_t>(report_.runs - 1) : 0U;
+    SlogBlockHeader made =
+        slog_header(type, run_ ? static_cast<std::uint32_t>(report_.runs - 1) : 0);
     made.time_ns = time_ns;
     return made;
   }
@@ -167,7 +162,7 @@ class Recovery {
   }
 
   void end_run(const SlogBlock& block) {
-    const SlogRunEnd end = parse_run_end(json(block));
+    const SlogRunEnd end = parse_run_end(read_text(source_, block));
     open_orphan(block);
     const bool whole = end.samples >= run_->rows && fill(end.samples);
     run_->health = end.health;

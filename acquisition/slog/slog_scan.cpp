@@ -182,7 +182,7 @@ SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
   note_input(path_);
   file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) {
+  if (!file_ || ::fstat(file_.get(), &status) != 0) {
     throw FileError(fmt::format("{}: cannot be opened: {}; check the path", path_.string(),
                                 std::error_code(errno, std::generic_category()).message()));
   }
@@ -209,33 +209,33 @@ void SlogSource::read(std::uint64_t offset, void* to, std::size_t size) const {
   }
 }
 
-void SlogSource::expect_headers_only() const noexcept {
-  static_cast<void>(::posix_fadvise(file_.get(), 0, 0, POSIX_FADV_RANDOM));
+void SlogSource::read_pieces(std::uint64_t from, std::uint64_t end, const Take& take) const {
+  std::vector<std::byte> piece(
+      static_cast<std::size_t>(std::min<std::uint64_t>(end - from, kScanBytes)));
+  while (from < end) {
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(end - from, piece.size()));
+    read(from, piece.data(), size);
+    take(std::span(piece).first(size));
+    from += size;
+  }
 }
 
-void SlogSource::expect_everything() const noexcept {
-  static_cast<void>(::posix_fadvise(file_.get(), 0, 0, POSIX_FADV_SEQUENTIAL));
+void SlogSource::advise(int advice) const noexcept {
+  static_cast<void>(::posix_fadvise(file_.get(), 0, 0, advice));
 }
 
 SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
-  if (depth == SlogScanDepth::headers) source.expect_headers_only();
+  // One header every few hundred kB; then everything in order.
+  if (depth == SlogScanDepth::headers) source.advise(POSIX_FADV_RANDOM);
   SlogScan scan = Scanner(source, depth).run();
-  source.expect_everything();
+  source.advise(POSIX_FADV_SEQUENTIAL);
   return scan;
 }
 
 bool payload_intact(const SlogSource& source, const SlogBlock& block) {
-  std::uint64_t left = slog_padded(block.header.payload_bytes);
-  std::vector<std::byte> piece(static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes)));
-  std::uint64_t offset = block.payload_offset();
   std::uint32_t crc = 0;
-  while (left > 0) {
-    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes));
-    source.read(offset, piece.data(), size);
-    crc = crc32c(std::span(piece).first(size), crc);
-    offset += size;
-    left -= size;
-  }
+  source.read_pieces(block.payload_offset(), block.end(),
+                     [&crc](std::span<const std::byte> piece) { crc = crc32c(piece, crc); });
   return crc == block.header.payload_crc;
 }
 
@@ -249,6 +249,11 @@ std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& b
   }
   payload.resize(block.header.payload_bytes);
   return payload;
+}
+
+std::string read_text(const SlogSource& source, const SlogBlock& block) {
+  const std::vector<std::byte> payload = read_payload(source, block);
+  return {reinterpret_cast<const char*>(payload.data()), payload.size()};
 }
 
 std::string describe(const SlogBlock& block) {

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,9 +26,12 @@ class SlogSource {
   /// @throws FileError if the device fails or the file has become shorter.
   void read(std::uint64_t offset, void* to, std::size_t size) const;
 
-  /// Read-ahead hint to the kernel: one header every few hundred kB, or everything in order.
-  void expect_headers_only() const noexcept;
-  void expect_everything() const noexcept;
+  /// Reads the bytes [from, end) in pieces of bounded size.
+  using Take = std::function<void(std::span<const std::byte>)>;
+  void read_pieces(std::uint64_t from, std::uint64_t end, const Take& take) const;
+
+  /// posix_fadvise(): how the file will be read.
+  void advise(int advice) const noexcept;
 
  private:
   std::filesystem::path path_;
@@ -68,6 +73,7 @@ SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth);
 
 /// The payload of a block, checked. @throws FormatError naming the block.
 std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block);
+std::string read_text(const SlogSource& source, const SlogBlock& block);  ///< the same, of JSON
 
 /// True if payload and padding match the CRC in the header. Reads in pieces.
 bool payload_intact(const SlogSource& source, const SlogBlock& block);

@@ -21,36 +21,26 @@ namespace stageid {
 
 namespace {
 
-std::uint16_t number(SlogBlockType type) { return static_cast<std::uint16_t>(type); }
-
 /// Copies everything after `offset` to a new file FILE.damaged (.2, .3 ... if it exists).
 std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) {
   std::filesystem::path saved;
   FileDescriptor out;
-  for (int attempt = 1; out.get() < 0; ++attempt) {
+  for (int attempt = 1; !out; ++attempt) {
     saved = source.path();
     saved += attempt == 1 ? std::string(".damaged") : fmt::format(".damaged.{}", attempt);
     out = FileDescriptor(::open(saved.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
-    if (out.get() < 0 && errno != EEXIST) {
+    if (!out && errno != EEXIST)
       throw FileError(
           fmt::format("{}: cannot be created to keep the damaged end of the log; make "
                       "the directory writable",
                       saved.string()));
-    }
   }
-  std::vector<std::byte> piece(std::size_t{1} << 18);
-  while (offset < source.bytes()) {
-    const auto size =
-        static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), source.bytes() - offset));
-    source.read(offset, piece.data(), size);
-    if (::write(out.get(), piece.data(), size) != static_cast<ssize_t>(size)) {
+  source.read_pieces(offset, source.bytes(), [&](std::span<const std::byte> piece) {
+    if (!write_whole(out, {reinterpret_cast<const char*>(piece.data()), piece.size()}))
       throw FileError(fmt::format("{}: cannot be written; free some space", saved.string()));
-    }
-    offset += size;
-  }
-  if (::fsync(out.get()) != 0) {
+  });
+  if (::fsync(out.get()) != 0)
     throw FileError(fmt::format("{}: cannot be flushed to disk; check the disk", saved.string()));
-  }
   return saved;
 }
 
@@ -77,10 +67,7 @@ struct SlogWriter::State {
 
   std::uint32_t row_words() const noexcept { return slog_row_words(info); }
   SlogBlockHeader header(SlogBlockType type) const {
-    SlogBlockHeader made;
-    made.type = number(type);
-    made.run = open_run ? runs - 1 : 0;
-    return made;
+    return slog_header(type, open_run ? runs - 1 : 0);
   }
   LogRun& run(const char* caller) {
     if (open_run) return *open_run;

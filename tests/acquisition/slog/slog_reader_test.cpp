@@ -218,22 +218,19 @@ TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
   }
 }
 
-// The numpy code in slog_format.hpp is meant to be copied.
-TEST(SlogFormat, TheNumpyLinesOfTheHeaderReadALog) {
+// The numpy code in docs/formats.md is meant to be copied.
+TEST(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0) {
     GTEST_SKIP() << "needs python3 with numpy";
   }
   const TemporaryDirectory directory;
   test::write_small_log(directory / "run.slog", 2, 10);
-  std::ifstream header(std::string(STAGEID_SOURCE_DIR) + "/acquisition/slog/slog_format.hpp");
+  std::ifstream document(std::string(STAGEID_SOURCE_DIR) + "/docs/formats.md");
   std::ofstream script(directory / "read.py");
-  for (std::string line; std::getline(header, line);) {
-    if (line.rfind("//   import numpy", 0) == 0) {
-      do script << line.substr(5) << '\n';
-      while (std::getline(header, line) && line.rfind("//", 0) == 0);
-      break;
-    }
+  std::string line;
+  while (std::getline(document, line) && line != "import numpy as np") {
   }
+  for (; document && line != "```"; std::getline(document, line)) script << line << '\n';
   script << "for run in (0, 1):\n"
             "  n = np.arange(36)\n"
             "  assert samples[run].shape == (36, 6)\n"
