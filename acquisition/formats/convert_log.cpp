@@ -41,6 +41,19 @@ namespace {
 
 constexpr std::uint64_t kPieceRows = 8192;
 
+/// Reads a run piece by piece: take(first row, number of rows, samples).
+template <typename Take>
+void read_pieces(const LogReader& reader, std::size_t run, ConvertProgress& progress, Take take) {
+  LogSamples samples;
+  const std::uint64_t rows = reader.runs()[run].samples;
+  for (std::uint64_t first = 0; first < rows; first += kPieceRows) {
+    const std::uint64_t count = std::min(kPieceRows, rows - first);
+    reader.read(run, first, count, samples);
+    take(first, count, samples);
+    progress.add(count);
+  }
+}
+
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // HDF5 ---------------------------------------------------------------------------------------
@@ -79,27 +92,6 @@ void write_run_attributes(Hdf5File& file, const std::string& group, const LogRun
   count("irregular_samples", run.health.irregular);
 }
 
-/// Appends the rows of one run to growing datasets, piece by piece.
-void copy_rows_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
-                       const std::string& group, ConvertProgress& progress) {
-  LogSamples samples;
-  RowMajor rows;
-  const std::uint64_t total = reader.runs()[run].samples;
-  for (std::uint64_t first = 0; first < total; first += kPieceRows) {
-    const std::uint64_t count = std::min(kPieceRows, total - first);
-    reader.read(run, first, count, samples);  // takes the lock itself if necessary
-    {
-      const std::lock_guard lock(hdf5_mutex());
-      rows = samples.actuators;
-      file.append_rows(group + "/actuators", count, rows.data());
-      rows = samples.sensors;
-      file.append_rows(group + "/sensors", count, rows.data());
-      file.append_rows(group + "/marked", count, samples.marked.data());
-    }
-    progress.add(count);
-  }
-}
-
 void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& file,
                          ConvertProgress& progress) {
   const LogInfo& info = reader.info();
@@ -114,7 +106,17 @@ void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& fil
     file.create_growing(group + "/sensors", info.sensors.size(), H5T_IEEE_F64LE, kPieceRows);
     file.create_growing(group + "/marked", 0, H5T_STD_U8LE, kPieceRows);
   }
-  copy_rows_to_hdf5(reader, run, file, group, progress);
+  RowMajor rows;
+  // The reader takes the lock itself if necessary.
+  read_pieces(reader, run, progress,
+              [&](std::uint64_t, std::uint64_t count, const LogSamples& samples) {
+                const std::lock_guard lock(hdf5_mutex());
+                rows = samples.actuators;
+                file.append_rows(group + "/actuators", count, rows.data());
+                rows = samples.sensors;
+                file.append_rows(group + "/sensors", count, rows.data());
+                file.append_rows(group + "/marked", count, samples.marked.data());
+              });
 }
 
 void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& temporary,
@@ -215,10 +217,7 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
   const LogRun& which = reader.runs()[run];
   const RowMajor excitation = reader.excitation(run);
   const std::string head = fmt::format("{},{},{},", run, which.realization, which.experiment);
-  LogSamples samples;
-  for (std::uint64_t first = 0; first < which.samples; first += kPieceRows) {
-    const std::uint64_t count = std::min(kPieceRows, which.samples - first);
-    reader.read(run, first, count, samples);
+  const auto write = [&](std::uint64_t first, std::uint64_t count, const LogSamples& samples) {
     for (Eigen::Index r = 0; r < static_cast<Eigen::Index>(count); ++r) {
       const std::uint64_t row = first + static_cast<std::uint64_t>(r);
       csv.text(head);
@@ -230,8 +229,8 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
       write_cells(csv, samples.sensors.row(r));
       csv.end_line();
     }
-    progress.add(count);
-  }
+  };
+  read_pieces(reader, run, progress, write);
 }
 
 void convert_to_csv(const LogReader& reader, const std::filesystem::path& to,
@@ -251,13 +250,9 @@ void convert_run_to_slog(const LogReader& reader, std::size_t run, SlogWriter& w
                          ConvertProgress& progress) {
   const LogRun& which = reader.runs()[run];
   writer.begin_run(which, reader.excitation(run));
-  LogSamples samples;
-  for (std::uint64_t first = 0; first < which.samples; first += kPieceRows) {
-    const std::uint64_t count = std::min(kPieceRows, which.samples - first);
-    reader.read(run, first, count, samples);
+  read_pieces(reader, run, progress, [&](std::uint64_t, std::uint64_t, const LogSamples& samples) {
     write_samples(writer, samples);
-    progress.add(count);
-  }
+  });
   writer.end_run(which);
 }
 

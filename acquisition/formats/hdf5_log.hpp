@@ -15,20 +15,7 @@ namespace stageid {
 /// Debian's HDF5 is not thread-safe: log reader and writer hold this mutex while they call it.
 std::mutex& hdf5_mutex() noexcept;
 
-/// Reads logs of the layout in docs/formats.md, written by other programs or convert_log():
-///
-///   /                attributes: format = "stageid-log", format_version = 1, sample_rate_hz,
-///                    period_samples, transient_periods
-///   /channels/excitation, actuators, sensors   strings [n]; attribute unit: one string or one each
-///   /runs/NAME       attributes: realization, experiment; optional: complete (true), started_utc
-///       excitation   [S x n_r] or one period, [period_samples x n_r]
-///       actuators    [S x n_u]
-///       sensors      [S x n_y]       S = (transient_periods + periods) period_samples
-///       marked       [S], optional: nonzero = do not use
-///
-/// Numbers are float64, float32 or integers. A value is  scale * stored + offset  with the optional attributes
-/// scale and offset of its dataset, one number or one per column.
-/// Runs are ordered by name. A run with complete = 0 may have any length.
+/// Reads logs of the layout in docs/formats.md, written by other programs or convert_log().
 class Hdf5LogReader final : public LogReader {
  public:
   /// Checks attributes, shapes and run lengths; values are checked when they are read.

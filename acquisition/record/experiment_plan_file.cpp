@@ -1,24 +1,4 @@
-// excitation.h5, an HDF5 file with which any program can play the experiment:
-//
-//   /   attributes: format = "stageid-excitation", format_version = 1, sample_rate_hz,
-//       period_samples, scheme = "single_axis" | "orthogonal_dft" | "orthogonal_hadamard" |
-//       "zippered", scaling = "rms" | "peak", realizations, periods, transient_periods, crest_iterations,
-//       seed (text, decimal, because an unsigned 64-bit number fits neither a signed integer nor a double)
-//   /lines         [L] int64    excited lines of the DFT of one period
-//   /frequency_hz  [L]          their frequencies, redundant
-//   /axes          [n] text     excited channels, in the order of the following datasets
-//   /level         [n]          rms or peak of each axis (see scaling), unit of the channel
-//   /shape         [n x L]      optional: requested relative amplitudes; a row of zeros is flat
-//   /amplitude     [n x L]      A: amplitude of each line of each axis, unit of the channel
-//   /mixing        [n x E] complex   T: factor of axis (row) in experiment (column); E = n,
-//                                    zippered: 1
-//   /realizations/0000, 0001, ...
-//     phase_rad    [n x L]           phi
-//     spectrum     [n x L] complex   X = A / 2 exp(j phi)
-//
-// In realization m and experiment e, axis p plays, period by period of N = period_samples,
-//   x(n) = 2 Re sum_k T(p, e) X_m(p, k) exp(2 pi j lines(k) n / N),
-// transient_periods times to settle and then `periods` times to measure.
+// docs/formats.md describes the file, excitation.h5.
 
 #include <fmt/format.h>
 
