@@ -9,21 +9,20 @@ namespace stageid {
 
 namespace {
 
-std::vector<EventField> place(const LogRun& run) {
-  return {{"realization", std::int64_t{run.realization}},
-          {"experiment", std::int64_t{run.experiment}}};
-}
-
 std::int64_t whole(std::uint64_t number) { return static_cast<std::int64_t>(number); }
 
 }  // namespace
+
+std::vector<EventField> event_place(int realization, int experiment) {
+  return {{"realization", std::int64_t{realization}}, {"experiment", std::int64_t{experiment}}};
+}
 
 void EventRecorder::begin_run(const LogRun& run) noexcept {
   run_ = run;
   cycle_ = 0;
   misses_ = 0;
   open_.reset();
-  events_.write("run_begin", place(run));
+  events_.write("run_begin", event_place(run.realization, run.experiment));
 }
 
 void EventRecorder::rows(std::span<const double> rows, std::size_t words) noexcept {
@@ -46,7 +45,7 @@ void EventRecorder::tell_miss() noexcept {
   const Miss miss = *open_;
   open_.reset();
   if (++misses_ > kMissesTold) return;
-  std::vector<EventField> fields = place(run_);
+  std::vector<EventField> fields = event_place(run_.realization, run_.experiment);
   fields.push_back({"cycle", whole(miss.cycle)});
   fields.push_back({"cycles", whole(miss.cycles)});
   const auto outcome = static_cast<Outcome>(miss.outcome);
@@ -58,7 +57,7 @@ void EventRecorder::tell_miss() noexcept {
 
 void EventRecorder::end_run(const LogRun& run) noexcept {
   if (open_) tell_miss();
-  std::vector<EventField> fields = place(run);
+  std::vector<EventField> fields = event_place(run.realization, run.experiment);
   fields.push_back({"complete", run.complete});
   fields.push_back({"cycles", whole(run.health.cycles)});
   fields.push_back({"late", whole(run.health.late)});

@@ -2,12 +2,16 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "acquisition/loop/run_observer.hpp"
 #include "acquisition/record/event_log.hpp"
 #include "acquisition/slog/slog_format.hpp"
 
 namespace stageid {
+
+/// The fields that name the run of an event.
+std::vector<EventField> event_place(int realization, int experiment);
 
 /// Writes events derived from the rows of a run: begin, end, and every sequence of bad cycles ("miss"). After
 /// kMissesTold sequences of one run, only their number is written at the end of the run, so that a failing stage

@@ -8,6 +8,8 @@
 #include <exception>
 #include <utility>
 
+#include "hal/stage/pacer.hpp"
+
 namespace stageid {
 
 namespace {
@@ -17,18 +19,13 @@ constexpr std::int64_t kLongestDelay_ns = 500'000'000;  // until a partial block
 constexpr std::int64_t kSynchronizeEvery_ns = 1'000'000'000;
 constexpr std::chrono::microseconds kPause{500};
 
-std::int64_t now_ns() {
-  using namespace std::chrono;
-  return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
-}
-
 }  // namespace
 
 LogThread::LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*> observers)
     : log_(log),
       ring_(ring),
       observers_(std::move(observers)),
-      last_write_ns_(now_ns()),
+      last_write_ns_(monotonic_ns()),
       last_synchronize_ns_(last_write_ns_) {
   thread_ = std::thread([this] { run(); });
 }
@@ -110,10 +107,10 @@ bool LogThread::work() {
     commands_.pop_front();
     return true;
   }
-  const std::int64_t now = now_ns();
+  const std::int64_t now = monotonic_ns();
   if (now - last_synchronize_ns_ > kSynchronizeEvery_ns) {
     guarded([this] { log_.synchronize(); });
-    last_synchronize_ns_ = now_ns();
+    last_synchronize_ns_ = monotonic_ns();
   }
   bool all = now - last_write_ns_ > kLongestDelay_ns;
   {
@@ -130,7 +127,7 @@ bool LogThread::write_rows(std::uint64_t available, bool all) {
   guarded([&] { log_.write(rows); });
   for (RunObserver* observer : observers_) observer->rows(rows, ring_.row_words());
   ring_.pop(rows.size() / ring_.row_words());
-  last_write_ns_ = now_ns();
+  last_write_ns_ = monotonic_ns();
   return true;
 }
 
@@ -144,7 +141,7 @@ void LogThread::execute(const Command& command) {
       complete_runs_.fetch_add(command.run.complete ? 1 : 0, std::memory_order_relaxed);
     }
   });
-  last_synchronize_ns_ = now_ns();
+  last_synchronize_ns_ = monotonic_ns();
   for (RunObserver* observer : observers_) {
     if (command.excitation) {
       observer->begin_run(command.run);

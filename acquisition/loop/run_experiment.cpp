@@ -124,14 +124,12 @@ class Experiment {
       if (options_.events == nullptr) continue;
       const RunId run = runs_[static_cast<std::size_t>(event->run)];
       const bool state = event->kind == LoopEvent::Kind::state;
-      options_.events->write(
-          state ? "state" : "stop",
-          {{"realization", std::int64_t{run.realization}},
-           {"experiment", std::int64_t{run.experiment}},
-           {"cycle", static_cast<std::int64_t>(event->cycle)},
-           state ? EventField{"state", std::string(to_string(static_cast<NodeState>(event->code)))}
-                 : EventField{"reason",
-                              std::string(to_string(static_cast<StopReason>(event->code)))}});
+      const std::string code = state ? to_string(static_cast<NodeState>(event->code))
+                                     : to_string(static_cast<StopReason>(event->code));
+      std::vector<EventField> fields = event_place(run.realization, run.experiment);
+      fields.push_back({"cycle", static_cast<std::int64_t>(event->cycle)});
+      fields.push_back({state ? "state" : "reason", code});
+      options_.events->write(state ? "state" : "stop", fields);
     }
   }
 
@@ -163,18 +161,17 @@ class Experiment {
           finish(StopReason::interrupt);
           break;
         }
-        result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}': {}", stage_.info().name, error.what());
+        end_with(ExperimentEnd::fault,
+                 fmt::format("stage '{}': {}", stage_.info().name, error.what()));
       }
       break;
     }
     loop_.release();
     if (result_.end == ExperimentEnd::complete)
       finish(loop_.reason());  // stopped after the last run
-    if (result_.end == ExperimentEnd::complete) {
+    if (result_.end == ExperimentEnd::complete)
       result_.message = fmt::format("{}{}{} measured", enough, enough.empty() ? "" : "; ",
                                     counted(result_.runs_done, "run"));
-    }
   }
 
   bool stopped_between_runs() {
@@ -235,9 +232,9 @@ class Experiment {
   /// Between the runs nothing is recorded.
   void tell_hold(RunId next, std::int64_t cycles) {
     if (options_.events == nullptr) return;
-    options_.events->write("hold", {{"realization", std::int64_t{next.realization}},
-                                    {"experiment", std::int64_t{next.experiment}},
-                                    {"cycles_not_recorded", cycles}});
+    std::vector<EventField> fields = event_place(next.realization, next.experiment);
+    fields.push_back({"cycles_not_recorded", cycles});
+    options_.events->write("hold", fields);
   }
 
   /// Does what is to be done between runs. If the stage is held on the wall clock, the loop keeps cycling.
@@ -292,39 +289,33 @@ class Experiment {
     return abandoned_.load(std::memory_order_relaxed) || options_.interrupted();
   }
 
+  void end_with(ExperimentEnd end, std::string message) {
+    result_.end = end;
+    result_.message = std::move(message);
+  }
+
   void finish(StopReason reason) {
-    const StageInfo& info = stage_.info();
+    const std::string& stage = stage_.info().name;
     switch (reason) {
       case StopReason::none:
         return;
       case StopReason::limit:
-        result_.end = ExperimentEnd::limit;
-        result_.message = describe_stop(stage_);
-        return;
+        return end_with(ExperimentEnd::limit, describe_stop(stage_));
       case StopReason::fault:
-        result_.end = ExperimentEnd::fault;
-        result_.message =
-            fmt::format("stage '{}' reports: {}", info.name, to_string(loop_.last_trouble()));
-        return;
+        return end_with(ExperimentEnd::fault, fmt::format("stage '{}' reports: {}", stage,
+                                                          to_string(loop_.last_trouble())));
       case StopReason::misses:
-        result_.end = ExperimentEnd::fault;
-        result_.message = fmt::format("stage '{}': too many bad cycles; the last one: {}",
-                                      info.name, to_string(loop_.last_trouble()));
-        return;
+        return end_with(ExperimentEnd::fault,
+                        fmt::format("stage '{}': too many bad cycles; the last one: {}", stage,
+                                    to_string(loop_.last_trouble())));
       case StopReason::plant:
-        result_.end = ExperimentEnd::fault;
-        result_.message = options_.trip_reason();
-        return;
+        return end_with(ExperimentEnd::fault, options_.trip_reason());
       case StopReason::interrupt:
-        result_.end = ExperimentEnd::interrupted;
-        result_.message = "interrupted; the measured data are kept";
-        return;
+        return end_with(ExperimentEnd::interrupted, "interrupted; the measured data are kept");
       case StopReason::log:
-        result_.end = ExperimentEnd::log_failed;
-        result_.message =
-            "the log could not be written fast enough; write to a faster disk or lower the sample "
-            "rate";
-        return;
+        return end_with(ExperimentEnd::log_failed,
+                        "the log could not be written fast enough; write to a faster disk or lower "
+                        "the sample rate");
     }
   }
 
@@ -350,9 +341,9 @@ class Experiment {
     progress.runs_total = static_cast<int>(runs_.size());
     progress.health = progress_.health();
     if (wall_) progress.timing = progress_.timing();
+    const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
     const double rate_hz = plan_.grid().sample_rate_hz();
     const double run_s = static_cast<double>(plan_.samples_per_run()) / rate_hz;
-    const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
     progress.seconds_total = run_s * progress.runs_total;
     progress.seconds_done =
         std::min(progress.seconds_total,
