@@ -6,6 +6,7 @@
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
@@ -43,14 +44,8 @@ TEST(Fingerprint, OfAFileIsThatOfItsBytes) {
 
 TEST(Fingerprint, SaysWhichFileCannotBeRead) {
   const test::TemporaryDirectory directory;
-  for (const auto& file : {directory / "absent", directory.path()}) {
-    try {
-      fingerprint_of_file(file);
-      FAIL() << file;
-    } catch (const FileError& e) {
-      EXPECT_NE(std::string(e.what()).find(file.string()), std::string::npos) << e.what();
-    }
-  }
+  for (const auto& file : {directory / "absent", directory.path()})
+    test::expect_error<FileError>([&] { fingerprint_of_file(file); }, file, "cannot be read");
 }
 
 }  // namespace test_fingerprint

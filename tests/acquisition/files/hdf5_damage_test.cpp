@@ -6,12 +6,12 @@
 #include <cstring>
 #include <fstream>
 #include <numeric>
-#include <sstream>
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
@@ -20,16 +20,7 @@ namespace test_hdf5_damage {
 namespace fs = std::filesystem;
 using test::expect_error;
 using test::TemporaryDirectory;
-
-std::string content(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
-void write_bytes(const fs::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary) << bytes;
-}
+using test::write_bytes;
 
 std::string healthy_file(const TemporaryDirectory& directory) {
   Hdf5File file = Hdf5File::create(directory / "healthy.h5");
@@ -41,7 +32,7 @@ std::string healthy_file(const TemporaryDirectory& directory) {
   file.create_growing("/rows", 2, H5T_IEEE_F64LE, 100);
   file.append_rows("/rows", 500, values.data());
   file.close();
-  return content(directory / "healthy.h5");
+  return test::bytes_of(directory / "healthy.h5");
 }
 
 struct Everything {

@@ -10,12 +10,12 @@
 #include <fstream>
 #include <limits>
 #include <numeric>
-#include <sstream>
 #include <string>
 #include <thread>
 
 #include "acquisition/files/file_error.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
@@ -26,12 +26,6 @@ namespace fs = std::filesystem;
 using test::expect_error;
 using test::TemporaryDirectory;
 using Complex = std::complex<double>;
-
-std::string content(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 /// A file with objects of every kind.
 void write_everything(const fs::path& path) {
@@ -158,7 +152,7 @@ TEST(Hdf5File, WritesTheSameBytesAtAnotherTime) {
   write_everything(directory / "first.h5");
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // HDF5 stores whole seconds
   write_everything(directory / "second.h5");
-  EXPECT_EQ(content(directory / "first.h5"), content(directory / "second.h5"));
+  EXPECT_EQ(test::bytes_of(directory / "first.h5"), test::bytes_of(directory / "second.h5"));
 }
 
 TEST(Hdf5File, WritesEmptyThings) {

@@ -43,7 +43,7 @@ TEST(ConvertLog, HDF5HoldsTheSame) {
   EXPECT_TRUE(same_measurement(hdf5->info(), native->info()));
   EXPECT_EQ(hdf5->info().metadata_json, test::small_info().metadata_json);
   ASSERT_EQ(hdf5->runs().size(), 3U);
-  LogSamples samples;
+  EXPECT_EQ(test::good_rows(*hdf5), 77U);
   for (std::size_t run = 0; run < 3; ++run) {
     const LogRun& read = hdf5->runs()[run];
     EXPECT_EQ(read.complete, run != 2);
@@ -51,8 +51,6 @@ TEST(ConvertLog, HDF5HoldsTheSame) {
     EXPECT_EQ(read.experiment, native->runs()[run].experiment);
     EXPECT_EQ(read.started_utc, native->runs()[run].started_utc);
     EXPECT_EQ(hdf5->excitation(run), test::excitation_of(run));
-    hdf5->read(run, 0, read.samples, samples);
-    EXPECT_TRUE(test::holds_rows(samples, run, 0));
   }
   EXPECT_TRUE(verify_log(directory / "a.h5").intact());
   EXPECT_EQ(verify_log(directory / "a.h5").rows, 77U);

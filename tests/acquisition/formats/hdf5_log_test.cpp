@@ -53,9 +53,7 @@ class Hdf5Log : public testing::Test {
     file.create_group("/runs");
     for (std::size_t run = 0; run < foreign.ids.size(); ++run) {
       const std::string group = "/runs/000" + std::to_string(run);
-      file.create_group(group);
-      file.write_attribute(group, "realization", foreign.ids[run].first);
-      file.write_attribute(group, "experiment", foreign.ids[run].second);
+      add_run(file, group, foreign.ids[run].first, foreign.ids[run].second);
       const std::uint64_t rows = foreign.whole_excitation ? kRows : kPeriod;
       if (foreign.left_out != "excitation") {
         file.write_reals(group + "/excitation", Shape{rows, 3}, excitation(run, rows).data());
@@ -69,11 +67,21 @@ class Hdf5Log : public testing::Test {
     }
   }
 
-  /// Adds a third run with the caller's datasets.
-  static void add_run(Hdf5File& file, const std::string& group, long long realization) {
+  /// Adds a run without its datasets.
+  static void add_run(Hdf5File& file, const std::string& group, long long realization,
+                      long long experiment = 0) {
     file.create_group(group);
     file.write_attribute(group, "realization", realization);
-    file.write_attribute(group, "experiment", 0LL);
+    file.write_attribute(group, "experiment", experiment);
+  }
+
+  using Values = std::vector<double>;
+  static void add_run(Hdf5File& file, const std::string& group, long long realization,
+                      const Values& r, const Values& u, const Values& y) {
+    add_run(file, group, realization);
+    file.write_reals(group + "/excitation", Shape{r.size() / 3, 3}, r.data());
+    file.write_reals(group + "/actuators", Shape{u.size() / 3, 3}, u.data());
+    file.write_reals(group + "/sensors", Shape{y.size() / 2, 2}, y.data());
   }
 
   void expect_refused(const Foreign& foreign, const std::string& place, const std::string& reason) {
@@ -120,14 +128,11 @@ TEST_F(Hdf5Log, TakesOneUnitOrOneAChannel) {
 // If all signals lose samples, the following periods are only displaced.
 TEST_F(Hdf5Log, AWholeExcitationMayLackARow) {
   write({.change = [](Hdf5File& file) {
-    add_run(file, "/runs/0002", 1);
     std::vector<double> values = excitation(2, kRows);
     const auto lost = values.begin() + 3 * (kPeriod + 2);
     values.erase(lost, lost + 3);
     values.insert(values.end(), {0.0, 0.0, 0.0});
-    file.write_reals("/runs/0002/excitation", Shape{kRows, 3}, values.data());
-    file.write_reals("/runs/0002/actuators", Shape{kRows, 3}, actuators(2).data());
-    file.write_reals("/runs/0002/sensors", Shape{kRows, 2}, sensors(2).data());
+    add_run(file, "/runs/0002", 1, values, actuators(2), sensors(2));
   }});
   EXPECT_EQ(open_log(path_)->excitation(2), test::excitation_of(2));
 }
@@ -138,12 +143,9 @@ TEST_F(Hdf5Log, AWholeExcitationMustRepeat) {
 
   const auto with_error = [&](double error) {
     write({.change = [error](Hdf5File& file) {
-      add_run(file, "/runs/0002", 1);
       std::vector<double> values = excitation(2, kRows);
       values[3 * 30 + 2] += error;
-      file.write_reals("/runs/0002/excitation", Shape{kRows, 3}, values.data());
-      file.write_reals("/runs/0002/actuators", Shape{kRows, 3}, actuators(2).data());
-      file.write_reals("/runs/0002/sensors", Shape{kRows, 2}, sensors(2).data());
+      add_run(file, "/runs/0002", 1, values, actuators(2), sensors(2));
     }});
     return open_log(path_)->excitation(2);
   };
@@ -284,12 +286,10 @@ TEST_F(Hdf5Log, RefusesRunsThatCannotBe) {
 TEST_F(Hdf5Log, ARunThatWasBrokenOffMayHaveAnyLength) {
   Foreign foreign;
   foreign.change = [](Hdf5File& file) {
-    add_run(file, "/runs/0002", 0);  // the same as run 0000, which is complete
+    // The same as run 0000, which is complete.
+    add_run(file, "/runs/0002", 0, excitation(2, kPeriod), actuators(2, 5), sensors(2, 5));
     file.write_attribute("/runs/0002", "complete", 0LL);
     file.write_attribute("/runs/0002", "started_utc", std::string("2024-01-01T00:00:00Z"));
-    file.write_reals("/runs/0002/excitation", Shape{kPeriod, 3}, excitation(2, kPeriod).data());
-    file.write_reals("/runs/0002/actuators", Shape{5, 3}, actuators(2, 5).data());
-    file.write_reals("/runs/0002/sensors", Shape{5, 2}, sensors(2, 5).data());
   };
   write(foreign);
   const auto reader = open_log(path_);
@@ -303,13 +303,10 @@ TEST_F(Hdf5Log, NamesTheValueThatIsNotFinite) {
     Foreign foreign;
     foreign.ids = {};
     foreign.change = [&](Hdf5File& file) {
-      add_run(file, "/runs/0000", 0);
       std::vector<double> u = actuators(0);
       std::vector<double> y = sensors(0);
       (actuator ? u[3 * 17 + 1] : y[2 * 17 + 1]) = std::numeric_limits<double>::infinity();
-      file.write_reals("/runs/0000/excitation", Shape{kPeriod, 3}, excitation(0, kPeriod).data());
-      file.write_reals("/runs/0000/actuators", Shape{kRows, 3}, u.data());
-      file.write_reals("/runs/0000/sensors", Shape{kRows, 2}, y.data());
+      add_run(file, "/runs/0000", 0, excitation(0, kPeriod), u, y);
     };
     write(foreign);
     const auto reader = open_log(path_);

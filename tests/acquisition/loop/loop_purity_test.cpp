@@ -22,6 +22,7 @@
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
+#include "tests/acquisition/loop/small_plan.hpp"
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/process/lock_counter.hpp"
 #include "tests/support/process/temporary_directory.hpp"
@@ -148,11 +149,7 @@ TEST(LoopPurityBegin, NothingIsAllocatedOrLockedOnceTheStageMoves) {
   if (!test::AllocationCounter::works() || !test::LockCounter::works())
     GTEST_SKIP() << "malloc or the locks are not ours in this build";
   const test::TemporaryDirectory directory;
-  ExperimentSpec spec;
-  spec.axes = {{"u1", 1.0, {}}};
-  spec.realizations = 3;
-  const ExperimentPlan plan(FrequencyGrid::band(1000.0, 100, {.low_hz = 10.0, .high_hz = 400.0}),
-                            spec);
+  const ExperimentPlan plan = test::small_plan(3, 2, {{"u1", 1.0, {}}});
   auto counting = std::make_unique<CountingStage>();
   const CountingStage& counts = *counting;
   StageLimits limits;

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -39,6 +40,15 @@ class MeasurementLoopTest : public ::testing::Test {
 
   MeasurementLoop make_loop(const LoopOptions& options = {.ramp_s = 0.01}) {
     return MeasurementLoop(stage_, controller_, ring_, options);
+  }
+
+  /// One run of a new loop to the end; rows() has only its rows.
+  MeasurementLoop& perform(const LoopOptions& options = {.ramp_s = 0.01}) {
+    ring_.pop(static_cast<std::size_t>(ring_.pushed() - ring_.popped()));
+    loop_.emplace(stage_, controller_, ring_, options);
+    loop_->start(1, excitation_);
+    run(*loop_);
+    return *loop_;
   }
 
   /// Runs to the end; the ring is large enough.
@@ -93,6 +103,7 @@ class MeasurementLoopTest : public ::testing::Test {
   MotionController controller_;
   SampleRing ring_{kActuators + kSensors + 1, 1024};
   LoopExcitation excitation_;
+  std::optional<MeasurementLoop> loop_;
 };
 
 }  // namespace stageid::test::measurement_loop

@@ -51,9 +51,7 @@ TEST_F(MeasurementLoopTest, RecordsTheEquationsOfTheLoop) {
 }
 
 TEST_F(MeasurementLoopTest, AGoodRunRampsDownBehindItsRecord) {
-  MeasurementLoop loop = make_loop({.ramp_s = 0.01});  // 10 samples
-  loop.start(1, excitation_);
-  run(loop);
+  perform({.ramp_s = 0.01});  // 10 samples
   ASSERT_EQ(stage_.exchanges(), kSamples + 10);
   EXPECT_EQ(rows().size(), kSamples);
   // Actuator 2 has the ramp of the period, offset 1, times the gain; its control part is small.
@@ -100,9 +98,7 @@ TEST_F(MeasurementLoopTest, AStepDoesNotAllocate) {
 
 TEST_F(MeasurementLoopTest, ALimitRampsDownInClosedLoopAndMarksTheRamp) {
   for (std::uint64_t n = 25; n < 200; ++n) stage_.outcomes[n] = Outcome::limit;
-  MeasurementLoop loop = make_loop({.ramp_s = 0.01});
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   EXPECT_EQ(loop.reason(), StopReason::limit);
   EXPECT_FALSE(loop.complete());
   EXPECT_EQ(stage_.stops(), 1);
@@ -123,9 +119,7 @@ TEST_F(MeasurementLoopTest, AFaultEndsTheRunAtOnce) {
   for (const Outcome outcome : {Outcome::fault, Outcome::bus_off, Outcome::link_down}) {
     stage_.outcomes = {{25, outcome}};
     const int stops = stage_.stops();
-    MeasurementLoop loop = make_loop();
-    loop.start(1, excitation_);
-    run(loop);
+    MeasurementLoop& loop = perform();
     EXPECT_EQ(loop.reason(), StopReason::fault);
     EXPECT_EQ(loop.last_trouble(), outcome);
     EXPECT_FALSE(loop.complete());
@@ -133,16 +127,13 @@ TEST_F(MeasurementLoopTest, AFaultEndsTheRunAtOnce) {
     EXPECT_EQ(stage_.stops(), stops + 1);
     EXPECT_EQ(marked(rows()), std::set<std::size_t>{25});
     EXPECT_EQ(loop.step(), LoopStatus::ended);
-    ring_.pop(rows().size());
   }
 }
 
 TEST_F(MeasurementLoopTest, AMissingMeasurementIsHeldAndMarked) {
   for (const Outcome outcome : {Outcome::stale, Outcome::corrupt}) {
     stage_.outcomes = {{25, outcome}};
-    MeasurementLoop loop = make_loop();
-    loop.start(1, excitation_);
-    run(loop);
+    MeasurementLoop& loop = perform();
     EXPECT_TRUE(loop.complete());
     const std::vector<Row> all = rows();
     // Command 25 may not have arrived, and measurement 26 did not.
@@ -151,16 +142,13 @@ TEST_F(MeasurementLoopTest, AMissingMeasurementIsHeldAndMarked) {
     EXPECT_EQ(all[26].status.outcome, static_cast<std::uint8_t>(outcome));
     EXPECT_EQ(loop.health().missing, 1U);
     EXPECT_EQ(loop.health().marked, 2U);
-    ring_.pop(all.size());
   }
 }
 
 TEST_F(MeasurementLoopTest, OnlyTheMissingSensorIsHeld) {
   stage_.outcomes = {{25, Outcome::incomplete}};
   stage_.valid = {{25, 0b10}};
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  perform();
   const std::vector<Row> all = rows();
   EXPECT_EQ(all[26].y[0], all[25].y[0]);
   EXPECT_NE(all[26].y[1], all[25].y[1]);
@@ -170,9 +158,7 @@ TEST_F(MeasurementLoopTest, OnlyTheMissingSensorIsHeld) {
 TEST_F(MeasurementLoopTest, AValueThatIsNoNumberNeitherReachesControllerNorLog) {
   stage_.first_sensor = {{25, std::numeric_limits<double>::quiet_NaN()},
                          {40, std::numeric_limits<double>::infinity()}};
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   const std::vector<Row> all = rows();
   ASSERT_EQ(all.size(), kSamples);
   for (const Row& row : all) ASSERT_TRUE(row.u.allFinite() && row.y.allFinite());
@@ -185,9 +171,7 @@ TEST_F(MeasurementLoopTest, AValueThatIsNoNumberNeitherReachesControllerNorLog) 
 TEST_F(MeasurementLoopTest, ACommandThatIsNoNumberIsSentToBeRefusedButNotLogged) {
   stage_.first_sensor = {{25, 1e308}};
   controller_ = MotionController(test::analytic_controller(stage_.info(), 1e6));
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  perform();
   EXPECT_FALSE(std::isfinite(stage_.sent()[26 * kActuators]));
   for (const Row& row : rows()) ASSERT_TRUE(row.u.allFinite());
   EXPECT_TRUE(rows()[26].status.marked);
@@ -196,9 +180,7 @@ TEST_F(MeasurementLoopTest, ACommandThatIsNoNumberIsSentToBeRefusedButNotLogged)
 TEST_F(MeasurementLoopTest, ALateSampleIsValidAndMarked) {
   stage_.outcomes = {{25, Outcome::late}, {30, Outcome::late}};
   stage_.lateness_ns = 12345;
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   const std::vector<Row> all = rows();
   EXPECT_EQ(marked(all), (std::set<std::size_t>{26, 31}));
   EXPECT_NE(all[26].y, all[25].y);
@@ -210,9 +192,7 @@ TEST_F(MeasurementLoopTest, ALateSampleIsValidAndMarked) {
 
 TEST_F(MeasurementLoopTest, ASampleOfAnErrorPassiveBusIsValidAndMarked) {
   stage_.outcomes = {{25, Outcome::bus_passive}};
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   const std::vector<Row> all = rows();
   EXPECT_EQ(marked(all), std::set<std::size_t>{26});
   EXPECT_NE(all[26].y, all[25].y);
@@ -225,13 +205,10 @@ TEST_F(MeasurementLoopTest, TheBucketForgivesFiveMissesInARowAndNotSix) {
   for (const std::uint64_t misses : {5U, 6U}) {
     stage_.outcomes.clear();
     for (std::uint64_t n = 0; n < misses; ++n) stage_.outcomes[20 + n] = Outcome::stale;
-    MeasurementLoop loop = make_loop({.ramp_s = 0.01, .misses_allowed = 10});
-    loop.start(1, excitation_);
-    run(loop);
+    MeasurementLoop& loop = perform({.ramp_s = 0.01, .misses_allowed = 10});
     EXPECT_EQ(loop.complete(), misses == 5);
     EXPECT_EQ(loop.reason(), misses == 5 ? StopReason::none : StopReason::misses);
     EXPECT_EQ(rows().size(), misses == 5 ? kSamples : 26 + 10);
-    ring_.pop(rows().size());
   }
 }
 
@@ -240,19 +217,14 @@ TEST_F(MeasurementLoopTest, TheBucketLeaks) {
   for (const std::uint64_t every : {3U, 2U}) {
     stage_.outcomes.clear();
     for (std::uint64_t n = 0; n < kSamples; n += every) stage_.outcomes[n] = Outcome::stale;
-    MeasurementLoop loop = make_loop();
-    loop.start(1, excitation_);
-    run(loop);
+    MeasurementLoop& loop = perform();
     EXPECT_EQ(loop.complete(), every == 3);
-    ring_.pop(rows().size());
   }
 }
 
 TEST_F(MeasurementLoopTest, AStageThatDoesNotAnswerInTheRampIsStoppedAtOnce) {
   for (std::uint64_t n = 20; n < 1000; ++n) stage_.outcomes[n] = Outcome::stale;
-  MeasurementLoop loop = make_loop({.ramp_s = 0.1});  // 100 samples
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform({.ramp_s = 0.1});  // 100 samples
   EXPECT_EQ(loop.reason(), StopReason::misses);
   EXPECT_EQ(stage_.exchanges(), 20U + 6 + 6);
   EXPECT_EQ(stage_.stops(), 1);
@@ -292,9 +264,7 @@ TEST_F(MeasurementLoopTest, AFullRingStopsNothingHalfWay) {
 
 TEST_F(MeasurementLoopTest, ALimitInTheRampBehindAGoodRunIsTold) {
   for (std::uint64_t n = kSamples + 3; n < 200; ++n) stage_.outcomes[n] = Outcome::limit;
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   EXPECT_TRUE(loop.complete());
   EXPECT_EQ(loop.reason(), StopReason::limit);
   EXPECT_TRUE(marked(rows()).empty());
@@ -302,9 +272,7 @@ TEST_F(MeasurementLoopTest, ALimitInTheRampBehindAGoodRunIsTold) {
 
 TEST_F(MeasurementLoopTest, AFaultInTheRampBehindAGoodRunIsTold) {
   stage_.outcomes = {{kSamples + 3, Outcome::fault}};
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   EXPECT_TRUE(loop.complete());
   EXPECT_EQ(loop.reason(), StopReason::fault);
   EXPECT_EQ(loop.last_trouble(), Outcome::fault);
@@ -314,9 +282,7 @@ TEST_F(MeasurementLoopTest, AFaultInTheRampBehindAGoodRunIsTold) {
 TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {
   for (std::uint64_t n = 25; n < 60; ++n) stage_.outcomes[n] = Outcome::braking;
   stage_.outcomes[60] = Outcome::opened;
-  MeasurementLoop loop = make_loop({.ramp_s = 0.01});  // 10 samples: the brake takes longer
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform({.ramp_s = 0.01});  // 10 samples: the brake takes longer
   EXPECT_EQ(loop.reason(), StopReason::limit);
   EXPECT_EQ(stage_.exchanges(), 61U);
   EXPECT_EQ(stage_.stops(), 1);
@@ -328,9 +294,7 @@ TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {
 // A replay ends with its record.
 TEST_F(MeasurementLoopTest, AStageThatIsGoneBehindAGoodRunSpoilsNothing) {
   stage_.outcomes = {{kSamples, Outcome::link_down}};
-  MeasurementLoop loop = make_loop();
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform();
   EXPECT_TRUE(loop.complete());
   EXPECT_EQ(loop.reason(), StopReason::none);
   EXPECT_EQ(loop.health().missing, 0U);
@@ -367,9 +331,7 @@ Eigen::VectorXd sent_at(const test::AnalyticStage& stage, std::size_t n) {
 constexpr LoopOptions kHold = {.ramp_s = 0.01, .between_runs = BetweenRuns::hold};
 
 TEST_F(MeasurementLoopTest, HeldBetweenRunsTheLoopIsNeverOpened) {
-  MeasurementLoop loop = make_loop(kHold);
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform(kHold);
   EXPECT_TRUE(loop.holding());
   EXPECT_TRUE(loop.complete());
   for (int n = 0; n < 7; ++n) EXPECT_EQ(loop.step(), LoopStatus::held);
@@ -401,9 +363,7 @@ TEST_F(MeasurementLoopTest, HeldBetweenRunsTheLoopIsNeverOpened) {
 TEST_F(MeasurementLoopTest, AHeldStageIsHandedOverWithoutAStep) {
   excitation_.period.setZero();
   excitation_.period.col(0).setOnes();  // so that any step is one of the gain
-  MeasurementLoop loop = make_loop(kHold);
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform(kHold);
   for (int n = 0; n < 5; ++n) static_cast<void>(loop.step());
   PreparedExcitation prepared = loop.prepare(excitation_);
   loop.next(prepared);
@@ -434,9 +394,7 @@ TEST_F(MeasurementLoopTest, TheSameReasonsStopAHeldStage) {
         std::pair(Outcome::link_down, StopReason::fault)}) {
     const int stops = stage_.stops();
     stage_.outcomes = {{100, outcome}};
-    MeasurementLoop loop = make_loop(kHold);
-    loop.start(1, excitation_);
-    run(loop);
+    MeasurementLoop& loop = perform(kHold);
     ASSERT_TRUE(loop.holding());
     LoopStatus status = LoopStatus::held;
     for (int n = 0; n < 40 && status != LoopStatus::ended; ++n) status = loop.step();
@@ -445,15 +403,12 @@ TEST_F(MeasurementLoopTest, TheSameReasonsStopAHeldStage) {
     EXPECT_TRUE(loop.complete());
     EXPECT_EQ(stage_.stops(), stops + 1);
     EXPECT_EQ(stage_.exchanges(), 101U);
-    ring_.pop(rows().size());
   }
 }
 
 TEST_F(MeasurementLoopTest, MissesAndAnInterruptStopAHeldStage) {
   for (std::uint64_t n = 90; n < 1000; ++n) stage_.outcomes[n] = Outcome::stale;
-  MeasurementLoop loop = make_loop(kHold);
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform(kHold);
   while (loop.step() != LoopStatus::ended) {
   }
   EXPECT_EQ(loop.reason(), StopReason::misses);
@@ -484,9 +439,7 @@ TEST_F(MeasurementLoopTest, AStopBeforeTheFirstSampleRecordsNothing) {
 
 TEST_F(MeasurementLoopTest, HoldingAndTheNextRunDoNotAllocate) {
   if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
-  MeasurementLoop loop = make_loop(kHold);
-  loop.start(1, excitation_);
-  run(loop);
+  MeasurementLoop& loop = perform(kHold);
   PreparedExcitation prepared = loop.prepare(excitation_);
   std::uint64_t allocations = 0;
   {

@@ -7,6 +7,8 @@
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
+#include "tests/acquisition/loop/small_plan.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
@@ -16,17 +18,7 @@ namespace test_run_experiment_events {
 using test::AnalyticStage;
 using testing::HasSubstr;
 
-constexpr int kPeriod = 100;
-constexpr std::uint64_t kSamples = 3 * kPeriod;
-
-ExperimentPlan plan_of() {
-  ExperimentSpec spec;
-  spec.axes = {{"u1", 1.0, {}}};
-  spec.realizations = 2;
-  spec.periods = 2;
-  spec.transient_periods = 1;
-  return {FrequencyGrid::band(1000.0, kPeriod, {.low_hz = 10.0, .high_hz = 400.0}), spec};
-}
+constexpr std::uint64_t kSamples = 3 * test::kPlanPeriod;
 
 /// Counts the calls that it receives.
 class Counter final : public RunObserver {
@@ -70,7 +62,7 @@ class RunExperimentEvents : public testing::Test {
   test::TemporaryDirectory directory_;
   std::filesystem::path log_ = directory_ / "a.slog";
   EventLog events_{event_log_of(log_)};
-  ExperimentPlan plan_ = plan_of();
+  ExperimentPlan plan_ = test::small_plan(2, 2, {{"u1", 1.0, {}}});
   AnalyticStage* inner_ = nullptr;
   std::unique_ptr<LimitedStage> stage_;
   std::unique_ptr<MotionController> controller_;
@@ -134,22 +126,16 @@ TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstR
   RunExperimentOptions options;
   options.real_time = {RealTimePolicy::require, 80, -1, false};
   // Refused by the same rules as in an earlier query: a kernel without PREEMPT_RT, or missing permissions.
-  bool refused = false;
-  try {
-    missing_for_real_time(options.real_time);
-  } catch (const StageError&) {
-    refused = true;
-  }
-  if (!refused) GTEST_SKIP() << "this machine has all that is required";
+  const auto query = [&] { missing_for_real_time(options.real_time); };
+  if (test::error_message<StageError>(query) == "no error")
+    GTEST_SKIP() << "this machine has all that is required";
   EXPECT_THROW(measure(options), StageError);
   EXPECT_TRUE(inner_->seeds().empty());
 }
 
 TEST_F(RunExperimentEvents, HoldingIsToldAsNotRecorded) {
   make_stage(Clock::wall);
-  RunExperimentOptions options;
-  options.between_runs = BetweenRuns::hold;
-  measure(options);
+  measure({.between_runs = BetweenRuns::hold});
   EXPECT_EQ(told("run_end").size(), 2U);
   const std::vector<std::string> holds = told("hold");
   ASSERT_EQ(holds.size(), 1U);  // between two runs

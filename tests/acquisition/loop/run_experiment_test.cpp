@@ -11,7 +11,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "tests/acquisition/record/small_log.hpp"
+#include "tests/acquisition/loop/small_plan.hpp"
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
@@ -25,19 +25,8 @@ using testing::ThrowsMessage;
 
 constexpr int kActuators = 3;
 constexpr int kSensors = 2;
-constexpr int kPeriod = 100;
+constexpr int kPeriod = test::kPlanPeriod;
 constexpr std::uint64_t kSamples = 3 * kPeriod;
-
-/// The axes have another order than the actuators.
-ExperimentPlan plan_of(int realizations = 2, int periods = 2) {
-  ExperimentSpec spec;
-  spec.axes = {{"u3", 1.0, {}}, {"u1", 0.5, {}}};
-  spec.realizations = realizations;
-  spec.periods = periods;
-  spec.transient_periods = 1;
-  spec.seed = 17;
-  return {FrequencyGrid::band(1000.0, kPeriod, {.low_hz = 10.0, .high_hz = 400.0}), spec};
-}
 
 class RunExperiment : public testing::Test {
  protected:
@@ -60,12 +49,18 @@ class RunExperiment : public testing::Test {
     return run_experiment(plan_, *stage_, *controller_, log, options);
   }
 
-  /// Measures everything into a closed log.
-  ExperimentResult measure_whole(const std::string& name) {
+  /// Measures into a closed log.
+  ExperimentResult measure_into(const std::string& name, const RunExperimentOptions& options = {}) {
     SlogWriter log = create(name);
-    const ExperimentResult result = measure(log);
-    log.close(0, "done");
+    const ExperimentResult result = measure(log, options);
+    log.close(0, result.message.c_str());
     return result;
+  }
+
+  void use_wall_clock(const StageLimits& limits) {
+    auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
+    inner_ = stage.get();
+    stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
   }
 
   static LogSamples all_samples(const LogReader& reader, std::size_t run) {
@@ -79,14 +74,14 @@ class RunExperiment : public testing::Test {
   }
 
   test::TemporaryDirectory directory_;
-  ExperimentPlan plan_ = plan_of();
+  ExperimentPlan plan_ = test::small_plan();
   AnalyticStage* inner_ = nullptr;
   std::unique_ptr<LimitedStage> stage_;
   std::unique_ptr<MotionController> controller_;
 };
 
 TEST_F(RunExperiment, LogsEveryRunOfThePlan) {
-  const ExperimentResult result = measure_whole("a.slog");
+  const ExperimentResult result = measure_into("a.slog");
   EXPECT_EQ(result.end, ExperimentEnd::complete);
   EXPECT_EQ(result.runs_done, 4);
   EXPECT_EQ(result.health.cycles, 4 * kSamples);
@@ -111,7 +106,7 @@ TEST_F(RunExperiment, LogsEveryRunOfThePlan) {
 
 // The controller starts from rest in every run, so the recorded y gives the recorded u again.
 TEST_F(RunExperiment, TheRecordIsControllerPlusExcitationOnTheRightActuators) {
-  measure_whole("a.slog");
+  measure_into("a.slog");
   const SlogReader reader(directory_ / "a.slog");
   for (std::size_t run = 0; run < reader.runs().size(); ++run) {
     const LogSamples samples = all_samples(reader, run);
@@ -129,7 +124,7 @@ TEST_F(RunExperiment, TheRecordIsControllerPlusExcitationOnTheRightActuators) {
 }
 
 TEST_F(RunExperiment, InterruptedAndResumedItGivesTheSameBits) {
-  measure_whole("whole.slog");
+  measure_into("whole.slog");
   std::atomic<bool> interrupt = false;
   ExperimentResult result;
   {
@@ -180,8 +175,7 @@ TEST_F(RunExperiment, InterruptedAndResumedItGivesTheSameBits) {
 
 TEST_F(RunExperiment, AnInterruptBeforeTheFirstRunMeasuresNothing) {
   const std::atomic<bool> interrupt = true;
-  SlogWriter log = create("a.slog");
-  const ExperimentResult result = measure(log, {.interrupt = &interrupt});
+  const ExperimentResult result = measure_into("a.slog", {.interrupt = &interrupt});
   EXPECT_EQ(result.end, ExperimentEnd::interrupted);
   EXPECT_TRUE(inner_->seeds().empty());
 }
@@ -189,11 +183,9 @@ TEST_F(RunExperiment, AnInterruptBeforeTheFirstRunMeasuresNothing) {
 TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
   std::atomic<bool> tripped = false;
   inner_->raise = {{150, &tripped}};
-  SlogWriter log = create("a.slog");
   const RunExperimentOptions options{
       .plant_tripped = &tripped, .plant_reason = [] { return "too hot"; }, .ramp_s = 0.02};
-  const ExperimentResult result = measure(log, options);
-  log.close(1, result.message.c_str());
+  const ExperimentResult result = measure_into("a.slog", options);
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_EQ(result.message, "too hot");
   EXPECT_EQ(inner_->stops(), 1);
@@ -203,16 +195,13 @@ TEST_F(RunExperiment, APlantThatTripsEndsInAControlledStopWithItsReason) {
   EXPECT_EQ(reader.runs()[0].samples, 151U + 1 + 20);
   const LogSamples samples = all_samples(reader, 0);
   EXPECT_TRUE((samples.marked.head(151) == 0).all() && (samples.marked.tail(21) == 1).all());
-  SlogWriter next = create("b.slog");
-  EXPECT_EQ(measure(next, options).end, ExperimentEnd::fault) << "before a run";
+  EXPECT_EQ(measure_into("b.slog", options).end, ExperimentEnd::fault) << "before a run";
   EXPECT_EQ(inner_->seeds().size(), 1U);
 }
 
 TEST_F(RunExperiment, ALimitEndsInAControlledStopAndKeepsTheLog) {
   inner_->first_sensor = {{140, 1e9}};  // far off, so the controller commands more than 50 N
-  SlogWriter log = create("a.slog");
-  const ExperimentResult result = measure(log, {.ramp_s = 0.03});
-  log.close(4, result.message.c_str());
+  const ExperimentResult result = measure_into("a.slog", {.ramp_s = 0.03});
   EXPECT_EQ(result.end, ExperimentEnd::limit);
   EXPECT_EQ(result.message, describe(stage_->violation(), stage_->info()));
   EXPECT_THAT(result.message, HasSubstr("50"));
@@ -246,7 +235,8 @@ TEST_F(RunExperiment, AFaultAndTooManyMissesAreTold) {
 }
 
 TEST_F(RunExperiment, AFullDiskEndsInAControlledStop) {
-  plan_ = plan_of(2, 900);  // 90 000 rows of 48 bytes per run: more than the ring's capacity
+  plan_ =
+      test::small_plan(2, 900);  // 90 000 rows of 48 bytes per run: more than the ring's capacity
   const auto file = directory_ / "a.slog";
   SlogWriter log = create("a.slog");
   ExperimentResult result;
@@ -275,12 +265,10 @@ TEST_F(RunExperiment, ALogThatIsRemovedEndsInAControlledStop) {
 
 TEST_F(RunExperiment, AStageThatDoesNotStartIsAFaultAndTheLogIsKept) {
   inner_->refuse_run = 2;
-  SlogWriter log = create("a.slog");
-  const ExperimentResult result = measure(log);
+  const ExperimentResult result = measure_into("a.slog");
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_THAT(result.message, HasSubstr("refuses"));
   EXPECT_EQ(result.runs_done, 2);
-  log.close(1, "");
   const SlogReader reader(directory_ / "a.slog");
   ASSERT_EQ(reader.runs().size(), 2U);
   EXPECT_TRUE(reader.runs()[0].complete && reader.runs()[1].complete);
@@ -290,21 +278,19 @@ TEST_F(RunExperiment, AnInterruptWhileAStageDoesNotStartIsAnInterrupt) {
   std::atomic<bool> interrupt = false;
   inner_->refuse_run = 1;
   inner_->raise_at_refusal = &interrupt;
-  SlogWriter log = create("a.slog");
-  const ExperimentResult result = measure(log, {.interrupt = &interrupt});
+  const ExperimentResult result = measure_into("a.slog", {.interrupt = &interrupt});
   EXPECT_EQ(result.end, ExperimentEnd::interrupted);
   EXPECT_EQ(result.runs_done, 1);
 }
 
 TEST_F(RunExperiment, ReportsProgressFromTheCallingThread) {
-  plan_ = plan_of(1, 9);
+  plan_ = test::small_plan(1, 9);
   std::vector<ExperimentProgress> seen;
   const auto caller = std::this_thread::get_id();
-  SlogWriter log = create("a.slog");
-  measure(log, {.skip = {{0, 0}}, .progress = [&](const ExperimentProgress& progress) {
-                  EXPECT_TRUE(std::this_thread::get_id() == caller);
-                  seen.push_back(progress);
-                }});
+  measure_into("a.slog", {.skip = {{0, 0}}, .progress = [&](const ExperimentProgress& progress) {
+                            EXPECT_TRUE(std::this_thread::get_id() == caller);
+                            seen.push_back(progress);
+                          }});
   ASSERT_FALSE(seen.empty());
   const ExperimentProgress& last = seen.back();
   EXPECT_EQ(last.run, (RunId{0, 1}));
@@ -315,10 +301,10 @@ TEST_F(RunExperiment, ReportsProgressFromTheCallingThread) {
 }
 
 TEST_F(RunExperiment, AnExceptionOfTheProgressFunctionStopsTheStage) {
-  SlogWriter log = create("a.slog");
   RunExperimentOptions options;
   options.progress = [](const ExperimentProgress&) { throw std::runtime_error("enough"); };
-  EXPECT_THAT([&] { measure(log, options); }, ThrowsMessage<std::runtime_error>("enough"));
+  EXPECT_THAT([&] { measure_into("a.slog", options); },
+              ThrowsMessage<std::runtime_error>("enough"));
   EXPECT_EQ(inner_->stops(), static_cast<int>(inner_->seeds().size()));
 }
 
@@ -356,16 +342,14 @@ TEST(RunSeed, IsTheDocumentedMix) {
 
 // Called before every realization, with all previous ones in the log.
 TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
-  plan_ = plan_of(3);
-  SlogWriter log = create("enough.slog");
+  plan_ = test::small_plan(3);
   std::vector<std::size_t> seen;
   RunExperimentOptions options;
   options.enough = [&]() -> std::string {
     seen.push_back(SlogReader(directory_ / "enough.slog", false).runs().size());  // not closed yet
     return seen.size() == 3 ? "good enough" : "";
   };
-  const ExperimentResult result = measure(log, options);
-  log.close(0, result.message.c_str());
+  const ExperimentResult result = measure_into("enough.slog", options);
   EXPECT_EQ(result.end, ExperimentEnd::complete);
   EXPECT_EQ(result.message, "good enough; 4 runs measured");
   EXPECT_EQ(seen, (std::vector<std::size_t>{0, 2, 4}));
@@ -373,11 +357,7 @@ TEST_F(RunExperiment, EndsCompleteBetweenRealizationsWhenItIsEnough) {
 }
 
 TEST_F(RunExperiment, AHeldStageIsStartedAndStoppedOnce) {
-  SlogWriter log = create("held.slog");
-  RunExperimentOptions options;
-  options.between_runs = BetweenRuns::hold;
-  const ExperimentResult result = measure(log, options);
-  log.close(0, "");
+  const ExperimentResult result = measure_into("held.slog", {.between_runs = BetweenRuns::hold});
   EXPECT_EQ(result.end, ExperimentEnd::complete);
   EXPECT_EQ(result.runs_done, 4);
   EXPECT_EQ(inner_->seeds().size(), 1U);
@@ -393,14 +373,11 @@ TEST_F(RunExperiment, AHeldStageIsStartedAndStoppedOnce) {
 
 // Deciding whether it is enough may take long: the loop must not wait for it.
 TEST_F(RunExperiment, AHeldStageIsControlledWhileTheResultIsEvaluated) {
-  auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
-  AnalyticStage& inner = *stage;
-  stage_ = std::make_unique<LimitedStage>(std::move(stage), StageLimits{});
-  SlogWriter log = create("evaluated.slog");
+  use_wall_clock({});
   RunExperimentOptions options;
   options.between_runs = BetweenRuns::hold;
   std::atomic<bool> cycled = false;
-  inner.raise[100'000] = &cycled;  // far beyond the 1000 exchanges of the first realization
+  inner_->raise[100'000] = &cycled;  // far beyond the 1000 exchanges of the first realization
   int asked = 0;
   options.enough = [&]() -> std::string {
     if (asked++ == 0) return "";  // before the loop is closed
@@ -408,23 +385,19 @@ TEST_F(RunExperiment, AHeldStageIsControlledWhileTheResultIsEvaluated) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     return "";
   };
-  const ExperimentResult result = measure(log, options);
-  EXPECT_EQ(result.end, ExperimentEnd::complete);
-  EXPECT_EQ(inner.stops(), 1);
+  EXPECT_EQ(measure_into("evaluated.slog", options).end, ExperimentEnd::complete);
+  EXPECT_EQ(inner_->stops(), 1);
   EXPECT_EQ(asked, 2);
   EXPECT_TRUE(cycled);
 }
 
 TEST_F(RunExperiment, ALimitBetweenRunsStopsAHeldStageAndKeepsTheRun) {
-  auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
-  AnalyticStage& inner = *stage;
-  // After the leading ramp (100), the run (300) and its landing (100).
-  for (std::uint64_t n = 510; n < 2000; ++n) inner.first_sensor[n] = 1.0;
   StageLimits limits;
   limits.position_window_m = Eigen::VectorXd::Constant(kSensors, 0.5);
   limits.hard_window_m = Eigen::VectorXd::Constant(kSensors, 2.0);
-  stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
-  SlogWriter log = create("between.slog");
+  use_wall_clock(limits);
+  // After the leading ramp (100), the run (300) and its landing (100).
+  for (std::uint64_t n = 510; n < 2000; ++n) inner_->first_sensor[n] = 1.0;
   RunExperimentOptions options;
   options.between_runs = BetweenRuns::hold;
   int asked = 0;
@@ -432,12 +405,10 @@ TEST_F(RunExperiment, ALimitBetweenRunsStopsAHeldStageAndKeepsTheRun) {
     if (asked++ > 0) std::this_thread::sleep_for(std::chrono::milliseconds(50));
     return "";
   };
-  plan_ = plan_of(2);
-  const ExperimentResult result = measure(log, options);
-  log.close(4, "");
+  const ExperimentResult result = measure_into("between.slog", options);
   EXPECT_EQ(result.end, ExperimentEnd::limit);
   EXPECT_THAT(result.message, HasSubstr("sensor y1: |y| is 1 m, limit 0.5 m"));
-  EXPECT_EQ(inner.stops(), 1);
+  EXPECT_EQ(inner_->stops(), 1);
   EXPECT_GE(result.runs_done, 1);
 }
 

@@ -10,6 +10,7 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "tests/acquisition/loop/playing_stage.hpp"
+#include "tests/acquisition/loop/small_plan.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
@@ -20,16 +21,6 @@ using testing::HasSubstr;
 constexpr int kActuators = 3;
 constexpr int kSensors = 2;
 constexpr std::uint64_t kSamples = 300;
-
-ExperimentPlan plan_of(int realizations = 2) {
-  ExperimentSpec spec;
-  spec.axes = {{"u3", 1.0, {}}, {"u1", 0.5, {}}};
-  spec.realizations = realizations;
-  spec.periods = 2;
-  spec.transient_periods = 1;
-  spec.seed = 17;
-  return {FrequencyGrid::band(1000.0, 100, {.low_hz = 10.0, .high_hz = 400.0}), spec};
-}
 
 class RunResident : public testing::Test {
  protected:
@@ -51,7 +42,7 @@ class RunResident : public testing::Test {
 
   test::TemporaryDirectory directory_;
   std::filesystem::path file_ = directory_ / "a.slog";
-  ExperimentPlan plan_ = plan_of();
+  ExperimentPlan plan_ = test::small_plan();
   test::PlayingStage stage_{kActuators, kSensors};
 };
 
@@ -172,8 +163,7 @@ TEST_F(RunResident, ALogOfAnotherPlanIsRefused) {
   ExperimentSpec spec = plan_.spec();
   spec.periods = 3;
   spec.transient_periods = 0;
-  const ExperimentPlan another{FrequencyGrid::band(1000.0, 100, {.low_hz = 10.0, .high_hz = 400.0}),
-                               spec};
+  const ExperimentPlan another{plan_.grid(), spec};
   EXPECT_THROW(run_resident_experiment(another, stage_, log, {}), std::invalid_argument);
 }
 

@@ -5,13 +5,13 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
-#include <sstream>
 #include <string>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
@@ -54,12 +54,6 @@ TEST(ExperimentPlanFile, GivesAZipperedPlanBack) {
   for (const RunId run : plan.runs()) EXPECT_EQ(back.excitation(run), plan.excitation(run));
 }
 
-std::string content(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
 TEST(ExperimentPlanFile, GivesTheSamePlanBack) {
   const TemporaryDirectory directory;
   for (const int crest_iterations : {0, 15}) {
@@ -92,7 +86,7 @@ TEST(ExperimentPlanFile, WritesTheSameBytesTwiceAndLeavesNothingElse) {
   const ExperimentPlan plan(grid(), spec());
   write_experiment_plan(directory / "a.h5", plan);
   write_experiment_plan(directory / "b.h5", plan);
-  EXPECT_EQ(content(directory / "a.h5"), content(directory / "b.h5"));
+  EXPECT_EQ(test::bytes_of(directory / "a.h5"), test::bytes_of(directory / "b.h5"));
   EXPECT_EQ(std::distance(fs::directory_iterator(directory.path()), fs::directory_iterator()), 2);
 }
 

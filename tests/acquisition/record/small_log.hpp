@@ -1,16 +1,16 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <bit>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
+#include "tests/support/process/file_bytes.hpp"
 
 namespace stageid::test {
 
@@ -86,13 +86,6 @@ inline void write_run(SlogWriter& log, std::size_t run, std::uint64_t rows = 3 *
   log.end_run(run_of(run));
 }
 
-inline void write_small_log(const std::filesystem::path& file, std::size_t runs = 2,
-                            std::uint64_t block_rows = 10) {
-  SlogWriter log = SlogWriter::create(file, small_info());
-  for (std::size_t run = 0; run < runs; ++run) write_run(log, run, 3 * kPeriod, block_rows);
-  log.close(0, "done");
-}
-
 /// True if rows [first, first + count) are correct, including the marked ones.
 inline bool holds_rows(const LogSamples& samples, std::size_t run, std::uint64_t first) {
   for (Eigen::Index r = 0; r < samples.marked.size(); ++r) {
@@ -108,14 +101,23 @@ inline bool holds_rows(const LogSamples& samples, std::size_t run, std::uint64_t
   return true;
 }
 
-inline std::string bytes_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+/// The number of rows in a log of small runs, all of which must be correct.
+inline std::uint64_t good_rows(const LogReader& reader) {
+  LogSamples samples;
+  std::uint64_t rows = 0;
+  for (std::size_t run = 0; run < reader.runs().size(); ++run) {
+    reader.read(run, 0, reader.runs()[run].samples, samples);
+    EXPECT_TRUE(holds_rows(samples, run, 0)) << run;
+    rows += reader.runs()[run].samples;
+  }
+  return rows;
 }
 
-inline void write_bytes(const std::filesystem::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+inline void write_small_log(const std::filesystem::path& file, std::size_t runs = 2,
+                            std::uint64_t block_rows = 10) {
+  SlogWriter log = SlogWriter::create(file, small_info());
+  for (std::size_t run = 0; run < runs; ++run) write_run(log, run, 3 * kPeriod, block_rows);
+  log.close(0, "done");
 }
 
 }  // namespace stageid::test

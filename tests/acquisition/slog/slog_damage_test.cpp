@@ -82,14 +82,7 @@ TEST(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
       ASSERT_EQ(rows_before, 0U) << "byte " << size << ": what was there is gone";
       continue;
     }
-    std::uint64_t rows = 0;
-    LogSamples samples;
-    for (std::size_t run = 0; run < reader->runs().size(); ++run) {
-      const std::uint64_t count = reader->runs()[run].samples;
-      reader->read(run, 0, count, samples);
-      ASSERT_TRUE(test::holds_rows(samples, run, 0));
-      rows += count;
-    }
+    const std::uint64_t rows = test::good_rows(*reader);
     ASSERT_GE(rows, rows_before);
     rows_before = rows;
   }
