@@ -260,7 +260,10 @@ void Identification::write_outputs() {
   report.model = model_;
   report.model_variance = std::move(model_variance_);
   report.chosen_modes = std::move(chosen_modes_);
-  complete_report(report, {path("run.slog"), {}, path("summary.json"), summary_});
+  ReportInput input;
+  input.log = path("run.slog");
+  input.summary = path("summary.json");
+  complete_report(report, input, summary_);
   report.title = config_.stage.spec.info.name;
   write_report(path("report.html"), report);
 }

@@ -61,18 +61,25 @@ void put(std::filesystem::path& place, const std::filesystem::path& file) {
   place = file;
 }
 
-void put_if_there(std::filesystem::path& place, const std::filesystem::path& file) {
-  if (std::filesystem::exists(file)) put(place, file);
-}
+/// What a file is by its format, and its name in a directory of `identify`.
+struct ReportPart {
+  const char* kind;
+  std::filesystem::path ReportInput::*place;
+  const char* name;  ///< null: not in a directory
+};
+constexpr ReportPart kParts[] = {{"stageid-frf", &ReportInput::frf, "frf.h5"},
+                                 {"stageid-frf", &ReportInput::validation_frf, "frf_validation.h5"},
+                                 {"stageid-model", &ReportInput::model, "model.json"},
+                                 {"stageid-model-h5", &ReportInput::model_h5, "model.h5"},
+                                 {"stageid-modes", &ReportInput::modes, "modes.json"},
+                                 {"stageid-log", &ReportInput::log, "run.slog"},
+                                 {"stageid-summary", &ReportInput::summary, "summary.json"},
+                                 {"stageid-stage", &ReportInput::stage, nullptr}};
 
 void add_directory(ReportInput& input, const std::filesystem::path& directory) {
-  put_if_there(input.frf, directory / "frf.h5");
-  put_if_there(input.validation_frf, directory / "frf_validation.h5");
-  put_if_there(input.model, directory / "model.json");
-  put_if_there(input.model_h5, directory / "model.h5");
-  put_if_there(input.modes, directory / "modes.json");
-  put_if_there(input.log, directory / "run.slog");
-  put_if_there(input.summary, directory / "summary.json");
+  for (const ReportPart& part : kParts)
+    if (part.name != nullptr && std::filesystem::exists(directory / part.name))
+      put(input.*part.place, directory / part.name);
   if (input.frf.empty() && input.model.empty() && input.log.empty())
     throw std::invalid_argument(
         fmt::format("{}: contains no frf.h5, model.json or run.slog; use the output directory of "
@@ -80,28 +87,18 @@ void add_directory(ReportInput& input, const std::filesystem::path& directory) {
                     directory.string()));
 }
 
+/// The second response is the held-back one.
 void add_file(ReportInput& input, const std::filesystem::path& file) {
-  const std::string kind = kind_of(file);
-  if (kind == "stageid-frf") {
-    put(input.frf.empty() ? input.frf : input.validation_frf, file);
-  } else if (kind == "stageid-model") {
-    put(input.model, file);
-  } else if (kind == "stageid-model-h5") {
-    put(input.model_h5, file);
-  } else if (kind == "stageid-modes") {
-    put(input.modes, file);
-  } else if (kind == "stageid-log") {
-    put(input.log, file);
-  } else if (kind == "stageid-summary") {
-    put(input.summary, file);
-  } else if (kind == "stageid-stage") {
-    put(input.stage, file);
-  } else {
+  const auto of_kind = [&, kind = kind_of(file)](const ReportPart& part) {
+    return part.kind == kind && (part.place != &ReportInput::frf || input.frf.empty());
+  };
+  const auto* const part = std::ranges::find_if(kParts, of_kind);
+  if (part == std::end(kParts))
     throw std::invalid_argument(
         fmt::format("{}: cannot be shown in a report; remove it, or use a log, FRF, model, modes, "
                     "summary or stage file of stageid",
                     file.string()));
-  }
+  put(input.*part->place, file);
 }
 
 /// Only the lines that the model was fitted to are shown.
@@ -231,7 +228,8 @@ void complete_response(ReportData& data) {
   data.cmif_curves = cmif(*data.frf, data.cmif_kind);
 }
 
-void complete_report(ReportData& data, const ReportSources& sources) {
+void complete_report(ReportData& data, const ReportInput& input,
+                     const nlohmann::ordered_json& summary) {
   complete_response(data);
   data.version = version();
   data.title = "stageid";
@@ -243,11 +241,11 @@ void complete_report(ReportData& data, const ReportSources& sources) {
     add_checks(data);
     add_stabilization(data);
   }
-  if (!sources.log.empty()) add_log(data, sources.log);
-  if (!sources.stage.empty())
-    data.geometry = stage_geometry(sources.stage, read_whole_file(sources.stage));
+  if (!input.log.empty()) add_log(data, input.log);
+  if (!input.stage.empty())
+    data.geometry = stage_geometry(input.stage, read_whole_file(input.stage));
   if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
-  if (!sources.summary.is_null()) add_summary(data, sources.summary_file, sources.summary);
+  if (!summary.is_null()) add_summary(data, input.summary, summary);
 }
 
 ReportData read_response_data(const ReportInput& input) {
@@ -258,10 +256,9 @@ ReportData read_response_data(const ReportInput& input) {
 
 ReportData read_report_data(const ReportInput& input) {
   ReportData data = read_response(input);
-  ReportSources sources{input.log, input.stage, input.summary, {}};
-  if (!input.summary.empty())
-    sources.summary = JsonFile(input.summary, "stageid-summary").root().raw();
-  complete_report(data, sources);
+  nlohmann::ordered_json summary;
+  if (!input.summary.empty()) summary = JsonFile(input.summary, "stageid-summary").root().raw();
+  complete_report(data, input, summary);
   return data;
 }
 

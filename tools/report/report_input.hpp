@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <vector>
 
 #include "tools/report/report_page.hpp"
@@ -25,14 +24,6 @@ struct ReportInput {
 /// @throws std::invalid_argument for an unsupported file, or two of the same kind.
 ReportInput report_input(const std::vector<std::filesystem::path>& files);
 
-/// What a page shows beside the response data.
-struct ReportSources {
-  std::filesystem::path log;
-  std::filesystem::path stage;         ///< for the positions; default: the one in the log
-  std::filesystem::path summary_file;  ///< named in errors
-  nlohmann::ordered_json summary;      ///< of `identify`; null: none
-};
-
 /// Completes the response data of pages and pictures: FRFs within the band of the model, response and error of the
 /// model on their lines, validation, CMIF curves.
 /// @param data with FRFs, model, its variance and the chosen modes, as far as they exist
@@ -40,9 +31,12 @@ struct ReportSources {
 void complete_response(ReportData& data);
 
 /// Completes a page: the response, the verdicts on linearity and the health findings in the FRF (computed if it has
-/// none), poles over orders, log and summary.
+/// none), poles over orders, log, stage and summary.
+/// @param input log and stage are read; the file of the summary is only named in errors
+/// @param summary of `identify`; null: none
 /// @throws FileError, FormatError, std::invalid_argument
-void complete_report(ReportData& data, const ReportSources& sources);
+void complete_report(ReportData& data, const ReportInput& input,
+                     const nlohmann::ordered_json& summary);
 
 /// The response data of files. @throws FileError, FormatError, std::invalid_argument
 ReportData read_response_data(const ReportInput& input);
