@@ -9,10 +9,9 @@
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/commands/command_line.hpp"
-#include "tools/manual/bash_completion.hpp"
 #include "tools/manual/command_tree.hpp"
 #include "tools/manual/manual_pages.hpp"
-#include "tools/manual/zsh_completion.hpp"
+#include "tools/manual/shell_completion.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {

@@ -2,9 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tools/manual/bash_completion.hpp"
 #include "tools/manual/manual_pages.hpp"
-#include "tools/manual/zsh_completion.hpp"
+#include "tools/manual/shell_completion.hpp"
 
 namespace stageid {
 namespace test_manual {
