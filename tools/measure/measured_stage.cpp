@@ -7,12 +7,16 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/loop/run_resident.hpp"
 #include "acquisition/record/log_reader.hpp"
+#include "hal/can/can_bus_load.hpp"
+#include "hal/can/can_resident_stage.hpp"
+#include "hal/can/can_socket.hpp"
+#include "hal/can/can_stage.hpp"
+#include "hal/can/can_zeromq.hpp"
+#include "hal/modbus/modbus_stage.hpp"
 #include "hal/plugin/plugin_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/replay_stage.hpp"
-#include "tools/measure/can_backend.hpp"
-#include "tools/measure/modbus_backend.hpp"
-#include "tools/measure/replay_log.hpp"
+#include "tools/config/stage_config.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
 
@@ -84,6 +88,78 @@ class PlayingStage final : public MeasuredStage {
   const ExperimentPlan& plan_;
   std::unique_ptr<ResidentStage> stage_;
 };
+
+/// The stage at the SocketCAN interfaces of its file, with a node that answers.
+std::unique_ptr<CanTransport> open_buses(const CanSpec& spec, const CanLayout& layout) {
+  if (is_zeromq(spec.buses.front().interface))
+    return std::make_unique<ZeroMqCan>(spec.buses.front().interface);
+  std::vector<std::string> interfaces;
+  for (const CanBusSpec& bus : spec.buses) interfaces.push_back(bus.interface);
+  return std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout));
+}
+
+std::unique_ptr<CyclicStage> make_can_stage(const StageConfig& config,
+                                            const CanHostOptions& options) {
+  const CanSpec& spec = config.can.spec;
+  const StageInfo& info = config.spec.info;
+  const CanLayout layout = can_layout(spec, info);
+  require_bus_carries(spec, layout, info.sample_rate_hz);  // before an interface is opened
+  auto stage = std::make_unique<CanStage>(info, spec, open_buses(spec, layout), options);
+  stage->connect();
+  return stage;
+}
+
+std::unique_ptr<ResidentStage> make_can_resident_stage(const StageConfig& config,
+                                                       const CanHostOptions& options) {
+  const CanSpec& spec = config.can.spec;
+  const StageInfo& info = config.spec.info;
+  auto stage = std::make_unique<CanResidentStage>(
+      info, spec, open_buses(spec, can_layout(spec, info)), options);
+  stage->connect();
+  return stage;
+}
+
+/// Provides the runs of a log to the replay stage, in the order of a plan's runs.
+class ReplayLog final : public ReplaySource {
+ public:
+  /// @throws std::invalid_argument if the log lacks a complete run of the list.
+  ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& runs);
+
+  int runs() const override { return static_cast<int>(order_.size()); }
+  void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override;
+
+ private:
+  std::unique_ptr<LogReader> log_;
+  std::vector<std::size_t> order_;
+};
+
+ReplayLog::ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& runs)
+    : log_(std::move(log)) {
+  const std::vector<LogRun>& recorded = log_->runs();
+  for (const RunId wanted : runs) {
+    // Of several complete runs the last one is used, as in the estimate.
+    std::size_t found = recorded.size();
+    for (std::size_t i = 0; i < recorded.size(); ++i)
+      if (recorded[i].complete && recorded[i].realization == wanted.realization &&
+          recorded[i].experiment == wanted.experiment)
+        found = i;
+    if (found == recorded.size())
+      throw std::invalid_argument(
+          fmt::format("{}: no complete run of realization {}, experiment {}; replay the log of the "
+                      "same experiment",
+                      log_->path().string(), wanted.realization + 1, wanted.experiment + 1));
+    order_.push_back(found);
+  }
+}
+
+void ReplayLog::load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) {
+  const std::size_t index = order_.at(static_cast<std::size_t>(run));
+  LogSamples samples;
+  log_->read(index, 0, log_->runs()[index].samples, samples);
+  u = samples.actuators.transpose();
+  y = samples.sensors.transpose();
+  marked = samples.marked.cast<int>();
+}
 
 std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
                                             const ExperimentPlan& plan,
@@ -160,7 +236,9 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
       return streamed(make_can_stage(config.stage, options));
     }
     case Backend::modbus:
-      return streamed(make_modbus_stage(config.stage, {spec.pace, request.reset_fault}));
+      return streamed(std::make_unique<ModbusStage>(
+          config.stage.spec.info, config.stage.modbus->address, config.stage.modbus->timing,
+          ModbusHostOptions{spec.pace, request.reset_fault}));
     case Backend::plugin:
       return streamed(std::make_unique<PluginStage>(spec.info, *config.stage.plugin, spec.pace));
     case Backend::replay:

@@ -10,13 +10,14 @@
 #include "acquisition/loop/event_recorder.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
+#include "hal/modbus/modbus_supervisor.hpp"
+#include "hal/stage/plant_watch.hpp"
 #include "hal/stage/real_time.hpp"
 #include "hal/stage/real_time_checks.hpp"
 #include "hal/stage/sample_clock.hpp"
 #include "tools/dashboard/dashboard.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/measure/measured_stage.hpp"
-#include "tools/measure/modbus_backend.hpp"
 #include "tools/measure/until_variance.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -81,6 +82,21 @@ void conclude(const MeasuredStage& stage, const RunExperimentOptions& options,
                                                         : "use a real-time kernel");
   stage.explain(result);
 }
+
+/// The plant around the stage, operated and monitored during the lifetime of this object.
+class SupervisedPlant {
+ public:
+  /// @throws StageError if it does not start.
+  SupervisedPlant(const SupervisorConfig& config, bool reset_fault)
+      : supervisor_(config.link.address, config.link.timing, config.options),
+        watch_(supervisor_, config.conditions, reset_fault) {}
+  const PlantWatch& watch() const noexcept { return watch_; }
+  PlantSnapshot snapshot() const { return supervisor_.snapshot(); }
+
+ private:
+  ModbusSupervisor supervisor_;
+  PlantWatch watch_;
+};
 
 /// Starts the plant around the stage, if the stage file describes one, and lets it end the experiment. In a replay
 /// there is no plant.
