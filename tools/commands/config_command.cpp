@@ -60,74 +60,54 @@ constexpr FileKind kFileKinds[] = {{"experiment", "An experiment", describe_expe
                                    {"controller", "A controller", describe_controller_keys}};
 
 /// stageid config schema | check FILE... | dbc STAGE -o FILE | header STAGE -o FILE
-class ConfigCommand {
- public:
-  ConfigCommand(CLI::App& app, Console& console);
-
- private:
-  void schema() const;
-  void check() const;
-  void check(const std::filesystem::path& file) const;
-  void dbc() const;
-  void header() const;
-  StageConfig can_stage() const;
-  void write(const std::string& text) const;
-
-  Console& console_;
-  std::string kind_;
-  std::vector<std::filesystem::path> files_;
-  std::filesystem::path stage_file_;
-  std::filesystem::path output_;
+struct ConfigFlags {
+  std::string kind;
+  std::vector<std::filesystem::path> files;
+  std::filesystem::path stage_file;
+  std::filesystem::path output;
 };
 
-ConfigCommand::ConfigCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* config =
-      add_command(app, "config", "List the configuration keys; check configuration files");
-  config->require_subcommand(1);
-  CLI::App* schema_command =
-      add_command(*config, "schema", "List every key with type, unit, range and default");
-  schema_command->add_option("kind", kind_, "experiment | stage | controller; default: all")
-      ->check(CLI::IsMember({"experiment", "stage", "controller"}));
-  schema_command->final_callback([this] { schema(); });
-  CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
-  check_command->add_option("files", files_, "YAML files")->required();
-  check_command->final_callback([this] { check(); });
-  CLI::App* dbc_command =
-      add_command(*config, "dbc",
-                  "Write the CAN frames of a stage file as a DBC database (can-utils, SavvyCAN)");
-  dbc_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
-  dbc_command->add_option("-o,--output", output_, "file to write (.dbc)")->required();
-  dbc_command->final_callback([this] { dbc(); });
-  CLI::App* header_command = add_command(
-      *config, "header",
-      "Write the messages of a stage file as C structures for its node (firmware, Simulink)");
-  header_command->add_option("stage", stage_file_, "stage file with a group 'can'")->required();
-  header_command->add_option("-o,--output", output_, "file to write (.h)")->required();
-  header_command->final_callback([this] { header(); });
-}
-
-void ConfigCommand::schema() const {
+void print_schema(const ConfigFlags& flags, Console& console) {
   nlohmann::ordered_json json;
   for (const FileKind& kind : kFileKinds) {
-    if (!kind_.empty() && kind_ != kind.name) continue;
+    if (!flags.kind.empty() && flags.kind != kind.name) continue;
     const std::vector<SchemaEntry> entries = config_schema(kind.describe);
-    console_.result(fmt::format("# {} file. Units are SI and part of the key names.\n{}",
-                                kind.title, schema_text(entries)));
+    console.result(fmt::format("# {} file. Units are SI and part of the key names.\n{}", kind.title,
+                               schema_text(entries)));
     json[kind.name] = schema_json(entries);
   }
-  console_.result(json);
+  console.result(json);
 }
 
-void ConfigCommand::check() const {
+void check_file(const std::filesystem::path& file, Console& console) {
+  if (format_of(file) == "stageid-stage") {
+    const StageConfig stage = load_stage_config(file);
+    require_stable_loop(stage, console);
+    console.result(fmt::format("{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
+                               counted(stage.spec.info.actuators.size(), "actuator"),
+                               counted(stage.spec.info.sensors.size(), "sensor"),
+                               stage.spec.info.sample_rate_hz));
+    return;
+  }
+  const ExperimentConfig experiment = load_experiment_config(file);
+  const ExperimentPlan plan = outline_plan(experiment);
+  if (!experiment.limits || std::filesystem::exists(experiment.limits->prior))
+    require_stable_loop(experiment, console);
+  console.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
+                             counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                             counted(plan.grid().size(), "line")));
+}
+
+void check_config(const ConfigFlags& flags, Console& console) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const std::filesystem::path& file : files_) {
+  for (const std::filesystem::path& file : flags.files) {
     nlohmann::ordered_json messages = nlohmann::ordered_json::array();
     const auto tell = [&](const std::string& what) {
-      console_.warning(what);
+      console.warning(what);
       messages.push_back(what);
     };
     try {
-      check(file);
+      check_file(file, console);
     } catch (const FormatErrors& errors) {
       for (const FormatError& error : errors.all()) tell(error.what());
     } catch (const FormatError& error) {
@@ -136,60 +116,54 @@ void ConfigCommand::check() const {
     json.push_back({{"file", file.string()}, {"valid", messages.empty()}});
     if (messages.empty()) continue;
     json.back()["errors"] = messages;
-    console_.exit_code = kRequestWrong;
+    console.exit_code = kRequestWrong;
   }
-  console_.result({{"files", json}});
+  console.result({{"files", json}});
 }
 
-void ConfigCommand::check(const std::filesystem::path& file) const {
-  if (format_of(file) == "stageid-stage") {
-    const StageConfig stage = load_stage_config(file);
-    require_stable_loop(stage, console_);
-    console_.result(fmt::format(
-        "{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
-        counted(stage.spec.info.actuators.size(), "actuator"),
-        counted(stage.spec.info.sensors.size(), "sensor"), stage.spec.info.sample_rate_hz));
-    return;
-  }
-  const ExperimentConfig experiment = load_experiment_config(file);
-  const ExperimentPlan plan = outline_plan(experiment);
-  if (!experiment.limits || std::filesystem::exists(experiment.limits->prior))
-    require_stable_loop(experiment, console_);
-  console_.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
-                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
-                              counted(plan.grid().size(), "line")));
-}
-
-StageConfig ConfigCommand::can_stage() const {
-  StageConfig stage = load_stage_config(stage_file_);
+/// A file for the users of the CAN frames: a DBC database, or a header in C.
+void write_can_file(const ConfigFlags& flags, Console& console, bool header) {
+  const StageConfig stage = load_stage_config(flags.stage_file);
   if (!stage.can.present)
-    throw std::invalid_argument(
-        fmt::format("{}: has no group 'can'; see 'stageid config schema'", stage_file_.string()));
-  return stage;
-}
-
-void ConfigCommand::write(const std::string& text) const {
-  write_text_file(output_, text);
-  console_.result(fmt::format("wrote {}", output_.string()));
-  console_.result({{"file", output_.string()}});
-}
-
-void ConfigCommand::dbc() const {
-  const StageConfig stage = can_stage();
+    throw std::invalid_argument(fmt::format("{}: has no group 'can'; see 'stageid config schema'",
+                                            flags.stage_file.string()));
   const StageInfo& info = stage.spec.info;
-  write(can_dbc(can_layout(stage.can.spec, info), info));
-}
-
-void ConfigCommand::header() const {
-  const StageConfig stage = can_stage();
-  const StageInfo& info = stage.spec.info;
-  write(can_c_header(can_layout(stage.can.spec, info), info, stage.spec.limits));
+  const CanLayout layout = can_layout(stage.can.spec, info);
+  write_text_file(flags.output,
+                  header ? can_c_header(layout, info, stage.spec.limits) : can_dbc(layout, info));
+  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result({{"file", flags.output.string()}});
 }
 
 }  // namespace
 
-std::shared_ptr<void> config_command(CLI::App& app, Console& console) {
-  return std::make_shared<ConfigCommand>(app, console);
+void config_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<ConfigFlags>();
+  CLI::App* config =
+      add_command(app, "config", "List the configuration keys; check configuration files");
+  config->require_subcommand(1);
+  CLI::App* schema_command =
+      add_command(*config, "schema", "List every key with type, unit, range and default");
+  schema_command->add_option("kind", flags->kind, "experiment | stage | controller; default: all")
+      ->check(CLI::IsMember({"experiment", "stage", "controller"}));
+  schema_command->final_callback([flags, &console] { print_schema(*flags, console); });
+  CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
+  check_command->add_option("files", flags->files, "YAML files")->required();
+  check_command->final_callback([flags, &console] { check_config(*flags, console); });
+  const auto add_can_file = [&](const char* name, const char* help, const char* output,
+                                bool header) {
+    CLI::App* command = add_command(*config, name, help);
+    command->add_option("stage", flags->stage_file, "stage file with a group 'can'")->required();
+    command->add_option("-o,--output", flags->output, output)->required();
+    command->final_callback([flags, &console, header] { write_can_file(*flags, console, header); });
+  };
+  add_can_file("dbc",
+               "Write the CAN frames of a stage file as a DBC database (can-utils, SavvyCAN)",
+               "file to write (.dbc)", false);
+  add_can_file(
+      "header",
+      "Write the messages of a stage file as C structures for its node (firmware, Simulink)",
+      "file to write (.h)", true);
 }
 
 }  // namespace stageid

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
@@ -60,19 +59,11 @@ Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
 }
 
 /// stageid design CONFIG -o excitation.h5
-class DesignCommand {
- public:
-  DesignCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  void write_limited(const ExperimentConfig& config, const LimitedPlan& limited) const;
-
-  Console& console_;
-  std::filesystem::path config_;
-  std::filesystem::path output_;
-  double accuracy_ = 0.0;
-  bool force_ = false;
+struct DesignFlags {
+  std::filesystem::path config;
+  std::filesystem::path output;
+  double accuracy = 0.0;
+  bool force = false;
 };
 
 std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
@@ -111,68 +102,65 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   return lines;
 }
 
-DesignCommand::DesignCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(
-      app, "design",
-      "Design the multisines; check the predicted forces and motions against the limits");
-  command->add_option("config", config_, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
-  command
-      ->add_option("--accuracy", accuracy_,
-                   "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
-                   "the measuring time that it needs")
-      ->check(kPositive);
-  command->add_flag("--force", force_, "write even if a limit would be exceeded");
-  command->final_callback([this] { run(); });
+void write_limited(const DesignFlags& flags, Console& console, const ExperimentConfig& config,
+                   const LimitedPlan& limited) {
+  const ExperimentPlan& plan = limited.design.plan;
+  write_experiment_plan(flags.output, plan);
+  console.result(fmt::format("{}, {:.1f} min in total; {}; prior {}",
+                             counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
+                             counted(plan.grid().size(), "line"), config.limits->prior.string()));
+  for (const LinkLoad& link : link_loads(config.stage)) console.result(to_string(link));
+  for (const std::string& line : limited_table(limited, flags.accuracy)) console.result(line);
+  console.result(fmt::format("wrote {}", flags.output.string()));
+  Json json = {{"runs", plan.runs().size()},
+               {"duration_s", plan.duration_s()},
+               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
+               {"lines", plan.grid().size()}};
+  json.update(limited_json(limited, flags.accuracy));
+  console.result(json);
 }
 
-void DesignCommand::run() const {
-  const ExperimentConfig config = load_experiment_config(config_);
-  require_writable(output_, {config_});
-  require_stable_loop(config, console_);
+void design(const DesignFlags& flags, Console& console) {
+  const ExperimentConfig config = load_experiment_config(flags.config);
+  require_writable(flags.output, {flags.config});
+  require_stable_loop(config, console);
   if (config.limits) {
     const LimitedPlan limited = make_limited_plan(config);
-    write_limited(config, limited);
+    write_limited(flags, console, config, limited);
     return;
   }
-  if (accuracy_ > 0.0)
+  if (flags.accuracy > 0.0)
     throw FormatError(config.file, "",
                       "--accuracy: needs the noise of a prior; set 'level: {limits: {prior: "
                       "FILE}}' in the experiment file");
   const ExperimentPlan plan = make_plan(config);
   const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
-  warn_of_prediction(config, console_);
-  const bool written = force_ || prediction.violations().empty();
-  if (written) write_experiment_plan(output_, plan);
-  for (const std::string& line : design_table(config, plan, prediction)) console_.result(line);
+  warn_of_prediction(config, console);
+  const bool written = flags.force || prediction.violations().empty();
+  if (written) write_experiment_plan(flags.output, plan);
+  for (const std::string& line : design_table(config, plan, prediction)) console.result(line);
   if (!written) require_within_limits(config, prediction);
-  for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
-  console_.result(fmt::format("wrote {}", output_.string()));
-  console_.result(design_json(config, plan, prediction));
-}
-
-void DesignCommand::write_limited(const ExperimentConfig& config,
-                                  const LimitedPlan& limited) const {
-  const ExperimentPlan& plan = limited.design.plan;
-  write_experiment_plan(output_, plan);
-  console_.result(fmt::format("{}, {:.1f} min in total; {}; prior {}",
-                              counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
-                              counted(plan.grid().size(), "line"), config.limits->prior.string()));
-  for (const LinkLoad& link : link_loads(config.stage)) console_.result(to_string(link));
-  for (const std::string& line : limited_table(limited, accuracy_)) console_.result(line);
-  console_.result(fmt::format("wrote {}", output_.string()));
-  Json json = {{"runs", plan.runs().size()},
-               {"duration_s", plan.duration_s()},
-               {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
-               {"lines", plan.grid().size()}};
-  json.update(limited_json(limited, accuracy_));
-  console_.result(json);
+  for (const std::string& line : prediction.violations()) console.warning("forced: " + line);
+  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result(design_json(config, plan, prediction));
 }
 
 }  // namespace
 
-std::shared_ptr<void> design_command(CLI::App& app, Console& console) {
-  return std::make_shared<DesignCommand>(app, console);
+void design_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<DesignFlags>();
+  CLI::App* command = add_command(
+      app, "design",
+      "Design the multisines; check the predicted forces and motions against the limits");
+  command->add_option("config", flags->config, "experiment file (.yaml)")->required();
+  command->add_option("-o,--output", flags->output, "HDF5 file to write")->required();
+  command
+      ->add_option("--accuracy", flags->accuracy,
+                   "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
+                   "the measuring time that it needs")
+      ->check(kPositive);
+  command->add_flag("--force", flags->force, "write even if a limit would be exceeded");
+  command->final_callback([flags, &console] { design(*flags, console); });
 }
 
 }  // namespace stageid

@@ -41,95 +41,84 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
 }
 
 /// stageid export MODEL|FRF -o FILE.{json,h5,csv,mat,npz,unv,uff,py,m}
-class ExportCommand {
- public:
-  ExportCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  void export_from_model() const;
-  void export_from_frf() const;
-
-  Console& console_;
-  std::filesystem::path input_;
-  std::filesystem::path output_;
-  std::filesystem::path frf_;
-  std::vector<std::string> driving_point_;
-  MatVersion mat_version_ = MatVersion::v5;
+struct ExportFlags {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::filesystem::path frf;
+  std::vector<std::string> driving_point;
+  MatVersion mat_version = MatVersion::v5;
 };
 
-ExportCommand::ExportCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "export",
-                                  "Export a model or a frequency response to other programs: state "
-                                  "space, mode shapes, response");
-  command->add_option("input", input_, "model.json or frf.h5")->required();
-  command
-      ->add_option("-o,--output", output_,
-                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
-                   "a model also .json, .py, .m")
-      ->required();
-  command->add_option(
-      "--frf", frf_,
-      "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
-  command
-      ->add_option("--driving-point", driving_point_,
-                   "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
-                   "adds the modal mass of each mode there")
-      ->expected(2);
-  add_mat_version(*command, mat_version_);
-  command->final_callback([this] { run(); });
-}
-
-void ExportCommand::export_from_model() const {
-  require_export_format(output_);
-  require_no_input(output_, {input_, frf_});
-  const AdditiveModel model = read_model(input_);
+void export_from_model(const ExportFlags& flags) {
+  require_export_format(flags.output);
+  require_no_input(flags.output, {flags.input, flags.frf});
+  const AdditiveModel model = read_model(flags.input);
   ExportedResponse exported;
   exported.frequency_hz = default_lines(model);
-  if (!frf_.empty()) {
-    const FrfEstimate frf = read_frf(frf_);
+  if (!flags.frf.empty()) {
+    const FrfEstimate frf = read_frf(flags.frf);
     const bool fitted_band = model.fit.band_hz[1] > model.fit.band_hz[0];
     exported.frequency_hz =
         fitted_band ? select_band(frf, model.fit.band_hz[0], model.fit.band_hz[1]).frequency_hz
                     : frf.frequency_hz;
   }
   std::optional<DrivingPoint> driving_point;
-  if (!driving_point_.empty())
-    driving_point = {place_of(driving_point_[0], model.outputs, "output"),
-                     place_of(driving_point_[1], model.inputs, "input")};
-  export_model(output_, model, exported, driving_point, mat_version_);
+  if (!flags.driving_point.empty())
+    driving_point = {place_of(flags.driving_point[0], model.outputs, "output"),
+                     place_of(flags.driving_point[1], model.inputs, "input")};
+  export_model(flags.output, model, exported, driving_point, flags.mat_version);
 }
 
-void ExportCommand::export_from_frf() const {
-  if (!frf_.empty() || !driving_point_.empty())
+void export_from_frf(const ExportFlags& flags) {
+  if (!flags.frf.empty() || !flags.driving_point.empty())
     throw std::invalid_argument(
         fmt::format("{}: is an HDF5 file, not a model; --frf and --driving-point need a model.json",
-                    input_.string()));
-  require_no_input(output_, {input_});
-  const FrfEstimate frf = read_frf(input_);
+                    flags.input.string()));
+  require_no_input(flags.output, {flags.input});
+  const FrfEstimate frf = read_frf(flags.input);
   try {
-    require_frf_export_format(output_);
+    require_frf_export_format(flags.output);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(
-        fmt::format("{}: contains a frequency response; {}", input_.string(), error.what()));
+        fmt::format("{}: contains a frequency response; {}", flags.input.string(), error.what()));
   }
-  export_frf(output_, frf, mat_version_);
+  export_frf(flags.output, frf, flags.mat_version);
 }
 
-void ExportCommand::run() const {
-  if (is_hdf5(input_))
-    export_from_frf();
+void export_file(const ExportFlags& flags, Console& console) {
+  if (is_hdf5(flags.input))
+    export_from_frf(flags);
   else
-    export_from_model();
-  console_.result(
-      fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
-  console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+    export_from_model(flags);
+  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
+                             std::filesystem::file_size(flags.output)));
+  console.result(
+      {{"output", flags.output.string()}, {"bytes", std::filesystem::file_size(flags.output)}});
 }
 
 }  // namespace
 
-std::shared_ptr<void> export_command(CLI::App& app, Console& console) {
-  return std::make_shared<ExportCommand>(app, console);
+void export_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<ExportFlags>();
+  CLI::App* command = add_command(app, "export",
+                                  "Export a model or a frequency response to other programs: state "
+                                  "space, mode shapes, response");
+  command->add_option("input", flags->input, "model.json or frf.h5")->required();
+  command
+      ->add_option("-o,--output", flags->output,
+                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
+                   "a model also .json, .py, .m")
+      ->required();
+  command->add_option(
+      "--frf", flags->frf,
+      "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
+  command
+      ->add_option("--driving-point", flags->driving_point,
+                   "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
+                   "adds the modal mass of each mode there")
+      ->expected(2);
+  add_mat_version(*command, flags->mat_version);
+  command->final_callback([flags, &console] { export_file(*flags, console); });
 }
 
 }  // namespace stageid

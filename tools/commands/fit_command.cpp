@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -28,155 +26,143 @@ ExitCode fit_exit_code(const FitResult& result, bool whole) {
 }
 
 /// stageid fit FRF -o model.json
-class FitCommand {
- public:
-  FitCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  FitRequest checked_request() const;
-  void require_covariance_file() const;
-
-  Console& console_;
-  std::filesystem::path frf_;
-  std::filesystem::path output_;
-  std::filesystem::path covariance_;  ///< empty: not requested
-  FitFlags flags_;
-  FitRequest request_;  ///< only its numbers
-  std::vector<double> band_hz_;
+struct FitCommandFlags {
+  std::filesystem::path frf;
+  std::filesystem::path output;
+  std::filesystem::path covariance;  ///< empty: not requested
+  FitFlags words;
+  FitRequest request;  ///< only its numbers
+  std::vector<double> band_hz;
 };
 
-FitCommand::FitCommand(CLI::App& app, Console& console) : console_(console) {
+FitRequest checked_request(const FitCommandFlags& flags) {
+  FitRequest request = flags.request;
+  parse_fit_flags(flags.words, request);
+  if (!flags.band_hz.empty()) request.band_hz = {flags.band_hz[0], flags.band_hz[1]};
+  return request;
+}
+
+void require_covariance_file(const FitCommandFlags& flags) {
+  if (flags.covariance.empty()) return;
+  require_ending(flags.covariance, "a covariance", {".h5"});
+  require_writable(flags.covariance, {flags.frf, flags.output});
+}
+
+void fit(const FitCommandFlags& flags, Console& console) {
+  const FitRequest request = checked_request(flags);
+  require_writable(flags.output, {flags.frf});
+  require_model_ending(flags.output);
+  require_covariance_file(flags);
+  FitSetup setup = make_fit_setup(request, read_frf(flags.frf));
+  setup.options.response_variance = false;  // that of the covariance is exact for all weights
+  setup.options.covariance = !flags.covariance.empty();
+  for (const std::string& doubt :
+       health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
+    console.warning(fmt::format("{}: {}", flags.frf.string(), doubt));
+  for (const std::string& warning : setup.warnings)
+    console.warning(fmt::format("{}: {}", flags.frf.string(), warning));
+  const FitStep step = fit_with_progress(setup, flags.frf.filename().string(),
+                                         fingerprint_of_file(flags.frf), console);
+  const FitResult& result = step.result;
+  write_model(flags.output, result.model);
+  const bool told = result.covariance.sandwich.size() > 0;
+  if (told) write_covariance(flags.covariance, result, setup.frf.frequency_hz);
+
+  for (const std::string& line : result.decisions) console.result(line);
+  console.result(cost_line(result.cost));
+  for (const std::string& line : mode_table(result.model)) console.result(line);
+  for (const std::string& line : delay_lines(result.model)) console.result(line);
+  console.result(fmt::format("{}: {}, {} ({})", flags.output.string(),
+                             relative_error_text(result.model.fit), to_string(result.status),
+                             result.message));
+  const bool whole = told || flags.covariance.empty();
+  console.exit_code = fit_exit_code(result, whole);
+  console.result({{"output", flags.output.string()},
+                  {"status", to_string(result.status)},
+                  {"message", result.message},
+                  {"trustworthy", result.trustworthy()},
+                  {"relative_rms_error", result.model.fit.relative_rms_error},
+                  {"cost", result.cost},
+                  {"decisions", result.decisions},
+                  {"findings", result.findings},
+                  {"modes", modes_json(result.model)},
+                  {"delays", delays_json(result.model)},
+                  {"seconds", step.seconds}});
+  for (const std::string& finding : result.findings)
+    if (result.trustworthy() || result.message.find(finding) == std::string::npos)
+      console.warning(fmt::format("{}: {}", flags.output.string(), finding));
+  if (!whole)
+    console.warning(fmt::format("{}: not written: {}", flags.covariance.string(),
+                                result.decisions.empty() ? "" : result.decisions.back()));
+  if (!result.trustworthy())
+    console.warning(fmt::format(
+        "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
+        flags.output.string(), result.message));
+}
+
+}  // namespace
+
+void fit_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<FitCommandFlags>();
   CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
-  command->add_option("frf", frf_, "frf.h5")->required();
-  command->add_option("-o,--output", output_, "model.json to write")->required();
-  command->add_option("--covariance", covariance_,
+  command->add_option("frf", flags->frf, "frf.h5")->required();
+  command->add_option("-o,--output", flags->output, "model.json to write")->required();
+  command->add_option("--covariance", flags->covariance,
                       "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
                       "radius of the model response");
-  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: all lines")->expected(2);
-  command->add_option("--modes", flags_.modes,
+  command->add_option("--band", flags->band_hz, "LOW HIGH, Hz; default: all lines")->expected(2);
+  command->add_option("--modes", flags->words.modes,
                       "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
                       "auto, or none with --submodel");
   command->add_option(
-      "--weighting", flags_.weighting,
+      "--weighting", flags->words.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
-  command->add_option("--hold", flags_.hold,
+  command->add_option("--hold", flags->words.hold,
                       "none | phase: half a sample of delay | sinc: phase and magnitude | exact: "
                       "hold, delay and sampler, including aliasing. Default: from the FRF");
   command->add_option(
-      "--delay", flags_.delay,
+      "--delay", flags->words.delay,
       "SECONDS | estimate | per_channel. Default: estimate (per_channel if the data "
       "require it); the known delay of a compensated FRF; none without a hold");
-  command->add_option("--rigid-body", flags_.rigid_body,
+  command->add_option("--rigid-body", flags->words.rigid_body,
                       "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
                       "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
                       "known frequencies in Hz | auto: chosen from the data. Default: auto, or "
                       "none with --submodel or if the outputs are accelerations");
-  command->add_option("--direct-term", flags_.direct_term,
+  command->add_option("--direct-term", flags->words.direct_term,
                       "none | full: a constant, the compliance of modes above the band. Default: "
                       "chosen from the data; full if the outputs are accelerations");
   command
-      ->add_option("--residue-rank", flags_.residue_rank,
+      ->add_option("--residue-rank", flags->words.residue_rank,
                    "full | 1: residues phi psi^T of mechanical modes")
       ->capture_default_str();
   command
-      ->add_option("--submodel", flags_.submodels,
+      ->add_option("--submodel", flags->words.submodels,
                    "adds the term (B_0 + ... + B_m s^m) / (s^l A) with A of order n, such as "
                    "n=4,m=3,f=120:180,zeta=0.01; repeatable. m: n + l - 1 if omitted. f: starting "
                    "frequencies in Hz, one per pole pair, then the real pole of an odd n; found by "
                    "a search if omitted. n=auto: one denominator for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option("--damping", flags_.damping,
+  command->add_option("--damping", flags->words.damping,
                       "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
                       "the data; general if the outputs are accelerations");
   command
       ->add_option(
-          "--method", flags_.method,
+          "--method", flags->words.method,
           "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
       ->capture_default_str();
-  command->add_option("--max-iterations", request_.max_iterations, "iterations per fit")
+  command->add_option("--max-iterations", flags->request.max_iterations, "iterations per fit")
       ->capture_default_str();
   command
-      ->add_option("--search-seconds", request_.search_seconds,
+      ->add_option("--search-seconds", flags->request.search_seconds,
                    "budget of the mode search in seconds of a typical core, counted as work so "
                    "that the result does not depend on the machine. If it is used up, the best "
                    "model so far is written and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)
       ->capture_default_str();
-  add_threads(*command, request_.threads);
-  command->final_callback([this] { run(); });
-}
-
-FitRequest FitCommand::checked_request() const {
-  FitRequest request = request_;
-  parse_fit_flags(flags_, request);
-  if (!band_hz_.empty()) request.band_hz = {band_hz_[0], band_hz_[1]};
-  return request;
-}
-
-void FitCommand::require_covariance_file() const {
-  if (covariance_.empty()) return;
-  require_ending(covariance_, "a covariance", {".h5"});
-  require_writable(covariance_, {frf_, output_});
-}
-
-void FitCommand::run() const {
-  const FitRequest request = checked_request();
-  require_writable(output_, {frf_});
-  require_model_ending(output_);
-  require_covariance_file();
-  FitSetup setup = make_fit_setup(request, read_frf(frf_));
-  setup.options.response_variance = false;  // that of the covariance is exact for all weights
-  setup.options.covariance = !covariance_.empty();
-  for (const std::string& doubt :
-       health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
-    console_.warning(fmt::format("{}: {}", frf_.string(), doubt));
-  for (const std::string& warning : setup.warnings)
-    console_.warning(fmt::format("{}: {}", frf_.string(), warning));
-  const FitStep step =
-      fit_with_progress(setup, frf_.filename().string(), fingerprint_of_file(frf_), console_);
-  const FitResult& result = step.result;
-  write_model(output_, result.model);
-  const bool told = result.covariance.sandwich.size() > 0;
-  if (told) write_covariance(covariance_, result, setup.frf.frequency_hz);
-
-  for (const std::string& line : result.decisions) console_.result(line);
-  console_.result(cost_line(result.cost));
-  for (const std::string& line : mode_table(result.model)) console_.result(line);
-  for (const std::string& line : delay_lines(result.model)) console_.result(line);
-  console_.result(fmt::format("{}: {}, {} ({})", output_.string(),
-                              relative_error_text(result.model.fit), to_string(result.status),
-                              result.message));
-  const bool whole = told || covariance_.empty();
-  console_.exit_code = fit_exit_code(result, whole);
-  console_.result({{"output", output_.string()},
-                   {"status", to_string(result.status)},
-                   {"message", result.message},
-                   {"trustworthy", result.trustworthy()},
-                   {"relative_rms_error", result.model.fit.relative_rms_error},
-                   {"cost", result.cost},
-                   {"decisions", result.decisions},
-                   {"findings", result.findings},
-                   {"modes", modes_json(result.model)},
-                   {"delays", delays_json(result.model)},
-                   {"seconds", step.seconds}});
-  for (const std::string& finding : result.findings)
-    if (result.trustworthy() || result.message.find(finding) == std::string::npos)
-      console_.warning(fmt::format("{}: {}", output_.string(), finding));
-  if (!whole)
-    console_.warning(fmt::format("{}: not written: {}", covariance_.string(),
-                                 result.decisions.empty() ? "" : result.decisions.back()));
-  if (!result.trustworthy())
-    console_.warning(fmt::format(
-        "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
-        output_.string(), result.message));
-}
-
-}  // namespace
-
-std::shared_ptr<void> fit_command(CLI::App& app, Console& console) {
-  return std::make_shared<FitCommand>(app, console);
+  add_threads(*command, flags->request.threads);
+  command->final_callback([flags, &console] { fit(*flags, console); });
 }
 
 }  // namespace stageid

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -70,137 +69,128 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
 }
 
 /// stageid frf LOG... -o frf.h5
-class FrfCommand {
- public:
-  FrfCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  FrfStep estimate(const FrfOptions& options) const;
-
-  Console& console_;
-  std::vector<std::filesystem::path> logs_;
-  std::filesystem::path output_;
-  std::filesystem::path stage_;
-  std::filesystem::path fft_wisdom_;
-  bool no_health_ = false;
-  std::vector<std::string> inputs_;
-  std::vector<std::string> outputs_;
-  std::vector<int> realizations_;
-  std::optional<int> transient_periods_;
-  std::optional<double> delay_s_;
-  FrfMethod method_ = FrfMethod::periodic;
-  PeriodChoice periods_ = PeriodChoice::consistent;
-  int covariance_lines_ = 1;
-  CovarianceKind covariance_ = CovarianceKind::diagonal;
-  Compensation compensate_ = Compensation::none;
-  int threads_ = 0;
+struct FrfFlags {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path output;
+  std::filesystem::path stage;
+  std::filesystem::path fft_wisdom;
+  bool no_health = false;
+  std::vector<std::string> inputs;
+  std::vector<std::string> outputs;
+  std::vector<int> realizations;
+  std::optional<int> transient_periods;
+  std::optional<double> delay_s;
+  FrfMethod method = FrfMethod::periodic;
+  PeriodChoice periods = PeriodChoice::consistent;
+  int covariance_lines = 1;
+  CovarianceKind covariance = CovarianceKind::diagonal;
+  Compensation compensate = Compensation::none;
+  int threads = 0;
 };
 
-FrfCommand::FrfCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
-  command->add_option("logs", logs_, "logs (.slog or .h5)")->required();
-  command->add_option("-o,--output", output_, "HDF5 file to write")->required();
-  command->add_option("--inputs", inputs_, "actuators A,B,...; default: the excited ones")
-      ->delimiter(',');
-  command->add_option("--outputs", outputs_, "sensors C,D,...; default: all")->delimiter(',');
-  command->add_option("--realizations", realizations_, "counted from 1; default: all complete ones")
-      ->delimiter(',');
-  command->add_option(
-      "--transient-periods", transient_periods_,
-      "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
-  add_choice(*command, "--method", method_,
-             "periodic: means over periods | lpm: whole records, transient modelled");
-  add_choice(*command, "--periods", periods_,
-             "consistent: discard periods with glitches, bumps or transients (lpm: only "
-             "glitches) | unmarked: use all periods without marked samples");
-  command
-      ->add_option("--smooth-covariance", covariance_lines_,
-                   "odd number of neighbouring lines over which the noise covariance is averaged; "
-                   "more lines give it more degrees of freedom")
-      ->type_name("LINES")
-      ->check(kPositive)
-      ->capture_default_str();
-  add_choice(*command, "--covariance", covariance_,
-             "diagonal: variances | full: also the covariances between channels");
-  add_choice(*command, "--compensate", compensate_,
-             "remove from the response: none | delay | hold: hold and delay");
-  command->add_option("--delay", delay_s_,
-                      "delay to remove with --compensate, in s, without the half sample of the "
-                      "hold; default: as declared in the log");
-  command->add_option(
-      "--stage", stage_,
-      "stage or controller file for the health checks; default: the one stored in the log");
-  command->add_flag("--no-health", no_health_, "skip the health checks of the data");
-  command
-      ->add_option("--fft-wisdom", fft_wisdom_,
-                   "store FFT plans found by timing in FILE and reuse those already there")
-      ->type_name("FILE");
-  add_threads(*command, threads_);
-  command->final_callback([this] { run(); });
-}
-
-FrfStep FrfCommand::estimate(const FrfOptions& options) const {
-  const HealthRequest health{!no_health_, stage_};
-  if (fft_wisdom_.empty()) return estimate_frf(logs_, options, health, console_);
-  FftWisdomFile wisdom(fft_wisdom_);
-  FrfStep step = estimate_frf(logs_, options, health, console_);
+FrfStep estimate_with_plans(const FrfFlags& flags, Console& console, const FrfOptions& options) {
+  const HealthRequest health{!flags.no_health, flags.stage};
+  if (flags.fft_wisdom.empty()) return estimate_frf(flags.logs, options, health, console);
+  FftWisdomFile wisdom(flags.fft_wisdom);
+  FrfStep step = estimate_frf(flags.logs, options, health, console);
   note_fft_plans(step.frf, wisdom.save());
   return step;
 }
 
-void FrfCommand::run() const {
+void estimate_response(const FrfFlags& flags, Console& console) {
   FrfOptions options;
-  options.inputs = inputs_;
-  options.outputs = outputs_;
-  options.transient_periods = transient_periods_;
-  options.method = method_;
-  options.covariance = covariance_;
-  options.periods = periods_;
-  options.covariance_lines = covariance_lines_;
-  options.threads = threads_;
-  for (const int realization : realizations_) {
+  options.inputs = flags.inputs;
+  options.outputs = flags.outputs;
+  options.transient_periods = flags.transient_periods;
+  options.method = flags.method;
+  options.covariance = flags.covariance;
+  options.periods = flags.periods;
+  options.covariance_lines = flags.covariance_lines;
+  options.threads = flags.threads;
+  for (const int realization : flags.realizations) {
     if (realization < 1)
       throw std::invalid_argument(fmt::format(
           "--realizations: {} is out of range; realizations are counted from 1", realization));
     options.realizations.push_back(realization - 1);
   }
-  if (delay_s_ && compensate_ == Compensation::none)
+  if (flags.delay_s && flags.compensate == Compensation::none)
     throw std::invalid_argument(
         "--delay: has no effect without --compensate; add --compensate delay or hold, or omit "
         "--delay");
-  require_writable(output_, logs_);
-  require_frf_ending(output_);
-  FrfStep step = estimate(options);
+  require_writable(flags.output, flags.logs);
+  require_frf_ending(flags.output);
+  FrfStep step = estimate_with_plans(flags, console, options);
   std::vector<std::string> notes = dropped_lines(step.frf);
-  if (compensate_ != Compensation::none) {
-    const double delay_s = delay_s_ ? *delay_s_ : declared_delay_s(logs_.front());
-    if (!delay_s_)
+  if (flags.compensate != Compensation::none) {
+    const double delay_s = flags.delay_s ? *flags.delay_s : declared_delay_s(flags.logs.front());
+    if (!flags.delay_s)
       notes.push_back(fmt::format("--compensate: delay {} s, as declared in the log", delay_s));
-    step.frf = compensate(step.frf, compensate_, delay_s);
+    step.frf = compensate(step.frf, flags.compensate, delay_s);
   }
-  write_frf(output_, step.frf);
+  write_frf(flags.output, step.frf);
   const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
-  console_.result(fmt::format("{}: {}", output_.string(), describe(step.frf)));
-  console_.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
-                              step.seconds, rate));
+  console.result(fmt::format("{}: {}", flags.output.string(), describe(step.frf)));
+  console.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
+                             step.seconds, rate));
   if (step.frf.noise_variance.size() > 0)
-    console_.result(fmt::format("median relative standard deviation from noise: {:.2e}",
-                                median_relative_std(step.frf, step.frf.noise_variance)));
-  for (const std::string& line : linearity_lines(step.frf)) console_.message(line);
-  if (!no_health_)
-    for (const std::string& line : health_lines(step.findings)) console_.result(line);
-  if (any_fault(step.findings)) console_.exit_code = kNotTrustworthy;
-  for (const std::string& note : notes) console_.message("note: " + note);
-  nlohmann::ordered_json json = frf_json(step.frf, step, notes, output_);
-  if (!no_health_) json["health"] = health_json(step.findings);
-  console_.result(json);
+    console.result(fmt::format("median relative standard deviation from noise: {:.2e}",
+                               median_relative_std(step.frf, step.frf.noise_variance)));
+  for (const std::string& line : linearity_lines(step.frf)) console.message(line);
+  if (!flags.no_health)
+    for (const std::string& line : health_lines(step.findings)) console.result(line);
+  if (any_fault(step.findings)) console.exit_code = kNotTrustworthy;
+  for (const std::string& note : notes) console.message("note: " + note);
+  nlohmann::ordered_json json = frf_json(step.frf, step, notes, flags.output);
+  if (!flags.no_health) json["health"] = health_json(step.findings);
+  console.result(json);
 }
 
 }  // namespace
 
-std::shared_ptr<void> frf_command(CLI::App& app, Console& console) {
-  return std::make_shared<FrfCommand>(app, console);
+void frf_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<FrfFlags>();
+  CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
+  command->add_option("logs", flags->logs, "logs (.slog or .h5)")->required();
+  command->add_option("-o,--output", flags->output, "HDF5 file to write")->required();
+  command->add_option("--inputs", flags->inputs, "actuators A,B,...; default: the excited ones")
+      ->delimiter(',');
+  command->add_option("--outputs", flags->outputs, "sensors C,D,...; default: all")->delimiter(',');
+  command
+      ->add_option("--realizations", flags->realizations,
+                   "counted from 1; default: all complete ones")
+      ->delimiter(',');
+  command->add_option(
+      "--transient-periods", flags->transient_periods,
+      "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
+  add_choice(*command, "--method", flags->method,
+             "periodic: means over periods | lpm: whole records, transient modelled");
+  add_choice(*command, "--periods", flags->periods,
+             "consistent: discard periods with glitches, bumps or transients (lpm: only "
+             "glitches) | unmarked: use all periods without marked samples");
+  command
+      ->add_option("--smooth-covariance", flags->covariance_lines,
+                   "odd number of neighbouring lines over which the noise covariance is averaged; "
+                   "more lines give it more degrees of freedom")
+      ->type_name("LINES")
+      ->check(kPositive)
+      ->capture_default_str();
+  add_choice(*command, "--covariance", flags->covariance,
+             "diagonal: variances | full: also the covariances between channels");
+  add_choice(*command, "--compensate", flags->compensate,
+             "remove from the response: none | delay | hold: hold and delay");
+  command->add_option("--delay", flags->delay_s,
+                      "delay to remove with --compensate, in s, without the half sample of the "
+                      "hold; default: as declared in the log");
+  command->add_option(
+      "--stage", flags->stage,
+      "stage or controller file for the health checks; default: the one stored in the log");
+  command->add_flag("--no-health", flags->no_health, "skip the health checks of the data");
+  command
+      ->add_option("--fft-wisdom", flags->fft_wisdom,
+                   "store FFT plans found by timing in FILE and reuse those already there")
+      ->type_name("FILE");
+  add_threads(*command, flags->threads);
+  command->final_callback([flags, &console] { estimate_response(*flags, console); });
 }
 
 }  // namespace stageid

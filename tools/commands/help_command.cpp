@@ -16,32 +16,11 @@ namespace stageid {
 namespace {
 
 /// stageid help [COMMAND ...]: what `stageid COMMAND ... --help` prints.
-class HelpCommand {
- public:
-  /// Must be created after all other commands, because it completes their names.
-  HelpCommand(CLI::App& app, Console& console);
-
- private:
-  /// @throws std::invalid_argument for an unknown command, naming the nearest one
-  void run() const;
-
-  const CLI::App& app_;
-  std::vector<std::string> words_;
-};
-
-HelpCommand::HelpCommand(CLI::App& app, Console&) : app_(app) {
-  const std::vector<std::string> names = names_of(command_tree(app).commands);
-  CLI::App* command = add_command(app, "help", "Describe a command and its options");
-  command
-      ->add_option("command", words_, "name of the command: 'frf', 'log info'; default: list all")
-      ->type_name(fmt::format("TEXT:{{{}}}", fmt::join(names, ",")));
-  command->final_callback([this] { run(); });
-}
-
-void HelpCommand::run() const {
-  const CLI::App* command = &app_;
+/// @throws std::invalid_argument for an unknown command, naming the nearest one
+void print_help(const CLI::App& app, const std::vector<std::string>& words) {
+  const CLI::App* command = &app;
   std::string path;
-  for (const std::string& word : words_) {
+  for (const std::string& word : words) {
     const std::vector<std::string> names = names_of(command_tree(*command).commands);
     if (std::find(names.begin(), names.end(), word) == names.end())
       throw std::invalid_argument(fmt::format(
@@ -51,14 +30,21 @@ void HelpCommand::run() const {
     path += " " + word;
   }
   // Not help(): that of the program would print the help of the called command, which is this one.
-  fmt::print("{}", command->get_formatter()->make_help(command, app_.get_name() + path,
+  fmt::print("{}", command->get_formatter()->make_help(command, app.get_name() + path,
                                                        CLI::AppFormatMode::Normal));
 }
 
 }  // namespace
 
-std::shared_ptr<void> help_command(CLI::App& app, Console& console) {
-  return std::make_shared<HelpCommand>(app, console);
+void help_command(CLI::App& app, Console&) {
+  const auto words = std::make_shared<std::vector<std::string>>();
+  // Of all other commands, which were added before.
+  const std::vector<std::string> names = names_of(command_tree(app).commands);
+  CLI::App* command = add_command(app, "help", "Describe a command and its options");
+  command
+      ->add_option("command", *words, "name of the command: 'frf', 'log info'; default: list all")
+      ->type_name(fmt::format("TEXT:{{{}}}", fmt::join(names, ",")));
+  command->final_callback([words, &app] { print_help(app, *words); });
 }
 
 }  // namespace stageid

@@ -53,43 +53,17 @@ ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate fr
 
 /// stageid import FILE.{unv,uff,mat,csv,h5,npz,sNp} -o frf.h5|run.slog [--map MAP.yaml]; without -o it lists the
 /// content of the file.
-class ImportCommand {
- public:
-  ImportCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  void list() const;
-  void require_input() const;
-  ImportSummary import_with_map() const;
-
-  Console& console_;
-  std::filesystem::path input_;
-  std::filesystem::path output_;
-  std::filesystem::path map_;
+struct ImportFlags {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::filesystem::path map;
 };
 
-ImportCommand::ImportCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command =
-      add_command(app, "import", "Import a frequency response or a log written by another program");
-  command->add_option("file", input_,
-                      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); for a "
-                      "log also a pattern such as 'run_{realization}_{experiment}.mat'");
-  command->add_option(
-      "-o,--output", output_,
-      "file to write: frf.h5; run.slog or run.h5 for a log; modes.json for the mode shapes of a "
-      "universal file. Default: list the arrays of the file, to help you write a map");
-  command->add_option(
-      "--map", map_,
-      "YAML file with the meaning of the arrays; needed if the format does not define it");
-  command->final_callback([this] { run(); });
-}
-
-void ImportCommand::list() const {
-  if (!map_.empty()) throw std::invalid_argument("--map: needs an output file; add -o FILE");
+void list_arrays(const ImportFlags& flags, Console& console) {
+  if (!flags.map.empty()) throw std::invalid_argument("--map: needs an output file; add -o FILE");
   std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  const ArrayList arrays = read_foreign_arrays(input_);
+  const ArrayList arrays = read_foreign_arrays(flags.input);
   for (const NamedArray& array : arrays.arrays) {
     const char* holds = array.is_text() ? "text" : array.is_complex() ? "complex" : "real";
     rows.push_back({array.name, fmt::format("{}", fmt::join(array.shape, " x ")), holds});
@@ -102,62 +76,77 @@ void ImportCommand::list() const {
                     {"holds", variable.what},
                     {"remedy", variable.remedy}});
   }
-  for (const std::string& line : table_lines(rows)) console_.result(line);
+  for (const std::string& line : table_lines(rows)) console.result(line);
   for (const UnreadVariable& variable : arrays.unread)
-    console_.result(
+    console.result(
         fmt::format("{}: {} cannot be read. {}", variable.name, variable.what, variable.remedy));
-  console_.result({{"arrays", json}});
+  console.result({{"arrays", json}});
 }
 
-ImportSummary ImportCommand::import_with_map() const {
-  const ImportMap map = read_import_map(map_);
+void require_foreign_file(const ImportFlags& flags) {
+  if (flags.input.empty()) throw std::invalid_argument("FILE is missing; give the file to import");
+}
+
+ImportSummary import_with_map(const ImportFlags& flags) {
+  const ImportMap map = read_import_map(flags.map);
   if (map.kind == ImportMap::Kind::log) {
-    const std::vector<ForeignFile> files = foreign_files(input_, map);
-    for (const ForeignFile& file : files) require_no_input(output_, {file.path, map_});
-    return import_mapped_log(files, map, output_);
+    const std::vector<ForeignFile> files = foreign_files(flags.input, map);
+    for (const ForeignFile& file : files) require_no_input(flags.output, {file.path, flags.map});
+    return import_mapped_log(files, map, flags.output);
   }
   if (!map.files.empty())
-    throw FormatError(map_, "",
+    throw FormatError(flags.map, "",
                       "key 'files' is for kind: log only; give the file on the command line");
-  require_input();
-  require_frf_output(output_);
-  return write_imported(output_, mapped_frf(read_foreign_arrays(input_), map), input_, {});
+  require_foreign_file(flags);
+  require_frf_output(flags.output);
+  return write_imported(flags.output, mapped_frf(read_foreign_arrays(flags.input), map),
+                        flags.input, {});
 }
 
-void ImportCommand::require_input() const {
-  if (input_.empty()) throw std::invalid_argument("FILE is missing; give the file to import");
-}
-
-void ImportCommand::run() const {
-  if (output_.empty()) {
-    require_input();
-    return list();
+void import_file(const ImportFlags& flags, Console& console) {
+  if (flags.output.empty()) {
+    require_foreign_file(flags);
+    return list_arrays(flags, console);
   }
   ImportSummary summary;
-  if (!map_.empty()) {
-    summary = import_with_map();
-  } else if (require_input(); is_uff_name(input_) && output_.extension() == ".json") {
-    require_no_input(output_, {input_});
-    write_modes(output_, candidates_of(input_, read_uff(input_)));
+  if (!flags.map.empty()) {
+    summary = import_with_map(flags);
+  } else if (require_foreign_file(flags);
+             is_uff_name(flags.input) && flags.output.extension() == ".json") {
+    require_no_input(flags.output, {flags.input});
+    write_modes(flags.output, candidates_of(flags.input, read_uff(flags.input)));
   } else {
-    require_no_input(output_, {input_});
-    require_frf_output(output_);
+    require_no_input(flags.output, {flags.input});
+    require_frf_output(flags.output);
     std::vector<std::string> notes;
-    FrfEstimate frf = read_foreign_frf(input_, output_, notes);
-    summary = write_imported(output_, std::move(frf), input_, std::move(notes));
+    FrfEstimate frf = read_foreign_frf(flags.input, flags.output, notes);
+    summary = write_imported(flags.output, std::move(frf), flags.input, std::move(notes));
   }
-  const auto bytes = std::filesystem::file_size(output_);
-  for (const std::string& line : summary.lines) console_.result(line);
-  console_.result(fmt::format("wrote {}, {} bytes", output_.string(), bytes));
-  nlohmann::ordered_json json = {{"output", output_.string()}, {"bytes", bytes}};
+  const auto bytes = std::filesystem::file_size(flags.output);
+  for (const std::string& line : summary.lines) console.result(line);
+  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(), bytes));
+  nlohmann::ordered_json json = {{"output", flags.output.string()}, {"bytes", bytes}};
   json.update(summary.json);
-  console_.result(json);
+  console.result(json);
 }
 
 }  // namespace
 
-std::shared_ptr<void> import_command(CLI::App& app, Console& console) {
-  return std::make_shared<ImportCommand>(app, console);
+void import_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<ImportFlags>();
+  CLI::App* command =
+      add_command(app, "import", "Import a frequency response or a log written by another program");
+  command->add_option("file", flags->input,
+                      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); for a "
+                      "log also a pattern such as 'run_{realization}_{experiment}.mat'");
+  command->add_option(
+      "-o,--output", flags->output,
+      "file to write: frf.h5; run.slog or run.h5 for a log; modes.json for the mode shapes of a "
+      "universal file. Default: list the arrays of the file, to help you write a map");
+  command->add_option(
+      "--map", flags->map,
+      "YAML file with the meaning of the arrays; needed if the format does not define it");
+  command->final_callback([flags, &console] { import_file(*flags, console); });
 }
 
 }  // namespace stageid

@@ -91,68 +91,25 @@ Json info_json(const LogReader& log) {
 }
 
 /// stageid log info | verify | recover | convert FILE ...
-class LogCommand {
- public:
-  LogCommand(CLI::App& app, Console& console);
-
- private:
-  void info() const;
-  void verify() const;
-  void recover() const;
-  void convert() const;
-
-  Console& console_;
-  std::filesystem::path file_;
-  std::filesystem::path output_;
-  bool complete_only_ = false;
-  MatVersion mat_version_ = MatVersion::v5;
-  bool health_ = false;
-  std::filesystem::path stage_;
+struct LogFlags {
+  std::filesystem::path file;
+  std::filesystem::path output;
+  bool complete_only = false;
+  MatVersion mat_version = MatVersion::v5;
+  bool health = false;
+  std::filesystem::path stage;
 };
 
-LogCommand::LogCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* log = add_command(app, "log", "Inspect, verify, recover or convert a log");
-  log->require_subcommand(1);
-  CLI::App* info_command = add_command(*log, "info", "List the contents of a log, run by run");
-  info_command->add_option("file", file_, "log (.slog or .h5)")->required();
-  info_command->add_flag("--health", health_, "read all samples and report health findings");
-  info_command->add_option(
-      "--stage", stage_,
-      "with --health: stage or controller file for the checks; default: the one stored in the log");
-  info_command->final_callback([this] { info(); });
-
-  CLI::App* verify_command =
-      add_command(*log, "verify", "Read every byte and verify the checksums");
-  verify_command->add_option("file", file_, "log (.slog or .h5)")->required();
-  verify_command->final_callback([this] { verify(); });
-
-  CLI::App* recover_command = add_command(*log, "recover", "Save the intact part of a damaged log");
-  recover_command->add_option("file", file_, "damaged log (.slog)")->required();
-  recover_command->add_option("-o,--output", output_, "new log to write (.slog)")->required();
-  recover_command->final_callback([this] { recover(); });
-
-  CLI::App* convert_command =
-      add_command(*log, "convert", "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog");
-  convert_command->add_option("file", file_, "log (.slog or .h5)")->required();
-  convert_command
-      ->add_option("-o,--output", output_,
-                   "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
-      ->required();
-  convert_command->add_flag("--complete-only", complete_only_, "skip incomplete runs");
-  add_mat_version(*convert_command, mat_version_);
-  convert_command->final_callback([this] { convert(); });
-}
-
-void LogCommand::info() const {
-  const std::unique_ptr<LogReader> log = open_log(file_);
+void list_log(const LogFlags& flags, Console& console) {
+  const std::unique_ptr<LogReader> log = open_log(flags.file);
   const LogInfo& info = log->info();
-  console_.result(fmt::format("{}: {} Hz, period {} ({} s), {}", file_.string(),
-                              info.sample_rate_hz, counted(info.period_samples, "sample"),
-                              info.period_samples / info.sample_rate_hz,
-                              counted(info.transient_periods, "transient period")));
-  console_.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
-  console_.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
-  console_.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
+  console.result(fmt::format("{}: {} Hz, period {} ({} s), {}", flags.file.string(),
+                             info.sample_rate_hz, counted(info.period_samples, "sample"),
+                             info.period_samples / info.sample_rate_hz,
+                             counted(info.transient_periods, "transient period")));
+  console.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
+  console.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
+  console.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
   std::vector<std::vector<std::string>> rows = {
       {"run", "realization", "experiment", "samples", "late", "missing", "marked", "", "started"}};
   for (const LogRun& run : log->runs())
@@ -161,97 +118,128 @@ void LogCommand::info() const {
                     fmt::format("{}", run.health.late), fmt::format("{}", run.health.missing),
                     fmt::format("{}", run.health.marked), run.complete ? "complete" : "INCOMPLETE",
                     run.started_utc});
-  for (const std::string& line : table_lines(rows)) console_.result(line);
-  for (const std::string& line : timing_lines(*log)) console_.result(line);
+  for (const std::string& line : table_lines(rows)) console.result(line);
+  for (const std::string& line : timing_lines(*log)) console.result(line);
   Json json = info_json(*log);
-  if (health_) {
-    const std::vector<Finding> findings = examine_logs({file_}, {}, stage_, console_);
-    for (const std::string& line : health_lines(findings)) console_.result(line);
+  if (flags.health) {
+    const std::vector<Finding> findings = examine_logs({flags.file}, {}, flags.stage, console);
+    for (const std::string& line : health_lines(findings)) console.result(line);
     json["health"] = health_json(findings);
-    if (any_fault(findings)) console_.exit_code = kNotTrustworthy;
+    if (any_fault(findings)) console.exit_code = kNotTrustworthy;
   }
-  console_.result(json);
+  console.result(json);
 }
 
-void LogCommand::verify() const {
-  const VerifyReport report = verify_log(file_);
+void verify(const LogFlags& flags, Console& console) {
+  const VerifyReport report = verify_log(flags.file);
   throw_if_interrupted();
-  console_.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
-                              file_.string(), static_cast<double>(report.bytes) / 1e6,
-                              counted(report.blocks, "block"), counted(report.rows, "row"),
-                              report.marked_rows, report.complete_runs,
-                              counted(report.runs, "run")));
-  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
+  console.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
+                             flags.file.string(), static_cast<double>(report.bytes) / 1e6,
+                             counted(report.blocks, "block"), counted(report.rows, "row"),
+                             report.marked_rows, report.complete_runs,
+                             counted(report.runs, "run")));
+  for (const LogDamage& damage : report.damage) console.result(damage_line(damage));
   if (report.closed && !report.exit_message.empty())
-    console_.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
-  console_.result({{"file", file_.string()},
-                   {"intact", report.intact()},
-                   {"closed", report.closed},
-                   {"bytes", report.bytes},
-                   {"blocks", report.blocks},
-                   {"rows", report.rows},
-                   {"marked_rows", report.marked_rows},
-                   {"runs", report.runs},
-                   {"complete_runs", report.complete_runs},
-                   {"damage", damage_json(report.damage)}});
+    console.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
+  console.result({{"file", flags.file.string()},
+                  {"intact", report.intact()},
+                  {"closed", report.closed},
+                  {"bytes", report.bytes},
+                  {"blocks", report.blocks},
+                  {"rows", report.rows},
+                  {"marked_rows", report.marked_rows},
+                  {"runs", report.runs},
+                  {"complete_runs", report.complete_runs},
+                  {"damage", damage_json(report.damage)}});
   if (report.intact()) {
-    console_.result("intact");
+    console.result("intact");
     return;
   }
   const std::string what = !report.damage.empty()
                                ? "damaged at " + counted(report.damage.size(), "place")
                                : "was not closed: the experiment was interrupted";
-  throw FormatError(file_, "",
+  throw FormatError(flags.file, "",
                     fmt::format("{}; save the intact part with 'stageid log recover {} -o "
                                 "NEW.slog', or continue the experiment with --resume",
-                                what, file_.string()));
+                                what, flags.file.string()));
 }
 
-void LogCommand::recover() const {
-  if (std::filesystem::exists(output_))
+void recover(const LogFlags& flags, Console& console) {
+  if (std::filesystem::exists(flags.output))
     throw std::invalid_argument(
-        fmt::format("{}: already exists; choose another name with -o", output_.string()));
-  const RecoverReport report = recover_log(file_, output_);
-  for (const LogDamage& damage : report.damage) console_.result(damage_line(damage));
-  console_.result(fmt::format(
-      "{}: {}, {}, {} of {} complete; lost: {}, {}, {}", output_.string(),
-      counted(report.blocks_kept, "block"), counted(report.rows_kept, "row"), report.complete_runs,
-      counted(report.runs, "run"), counted(report.blocks_lost, "block"),
-      counted(report.rows_lost, "row"), counted(report.bytes_lost, "byte")));
-  console_.result({{"output", output_.string()},
-                   {"blocks_kept", report.blocks_kept},
-                   {"blocks_lost", report.blocks_lost},
-                   {"rows_kept", report.rows_kept},
-                   {"rows_lost", report.rows_lost},
-                   {"bytes_lost", report.bytes_lost},
-                   {"runs", report.runs},
-                   {"complete_runs", report.complete_runs},
-                   {"damage", damage_json(report.damage)}});
+        fmt::format("{}: already exists; choose another name with -o", flags.output.string()));
+  const RecoverReport report = recover_log(flags.file, flags.output);
+  for (const LogDamage& damage : report.damage) console.result(damage_line(damage));
+  console.result(fmt::format("{}: {}, {}, {} of {} complete; lost: {}, {}, {}",
+                             flags.output.string(), counted(report.blocks_kept, "block"),
+                             counted(report.rows_kept, "row"), report.complete_runs,
+                             counted(report.runs, "run"), counted(report.blocks_lost, "block"),
+                             counted(report.rows_lost, "row"), counted(report.bytes_lost, "byte")));
+  console.result({{"output", flags.output.string()},
+                  {"blocks_kept", report.blocks_kept},
+                  {"blocks_lost", report.blocks_lost},
+                  {"rows_kept", report.rows_kept},
+                  {"rows_lost", report.rows_lost},
+                  {"bytes_lost", report.bytes_lost},
+                  {"runs", report.runs},
+                  {"complete_runs", report.complete_runs},
+                  {"damage", damage_json(report.damage)}});
 }
 
-void LogCommand::convert() const {
-  require_no_input(output_, {file_});
-  const std::unique_ptr<LogReader> log = open_log(file_);
-  Progress progress(console_, "convert", "rows");
+void convert(const LogFlags& flags, Console& console) {
+  require_no_input(flags.output, {flags.file});
+  const std::unique_ptr<LogReader> log = open_log(flags.file);
+  Progress progress(console, "convert", "rows");
   ConvertOptions options;
-  options.incomplete_runs = !complete_only_;
+  options.incomplete_runs = !flags.complete_only;
   options.progress = [&](std::uint64_t done, std::uint64_t total) {
     throw_if_interrupted();
     progress.update(static_cast<double>(done), static_cast<double>(total));
   };
-  if (output_.extension() == ".mat")
-    write_mat_log(*log, output_, mat_version_, options);
+  if (flags.output.extension() == ".mat")
+    write_mat_log(*log, flags.output, flags.mat_version, options);
   else
-    convert_log(*log, output_, options);
-  console_.result(fmt::format("wrote {}, {:.1f} MB", output_.string(),
-                              static_cast<double>(std::filesystem::file_size(output_)) / 1e6));
-  console_.result({{"output", output_.string()}, {"bytes", std::filesystem::file_size(output_)}});
+    convert_log(*log, flags.output, options);
+  console.result(fmt::format("wrote {}, {:.1f} MB", flags.output.string(),
+                             static_cast<double>(std::filesystem::file_size(flags.output)) / 1e6));
+  console.result(
+      {{"output", flags.output.string()}, {"bytes", std::filesystem::file_size(flags.output)}});
 }
 
 }  // namespace
 
-std::shared_ptr<void> log_command(CLI::App& app, Console& console) {
-  return std::make_shared<LogCommand>(app, console);
+void log_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<LogFlags>();
+  CLI::App* log = add_command(app, "log", "Inspect, verify, recover or convert a log");
+  log->require_subcommand(1);
+  CLI::App* info_command = add_command(*log, "info", "List the contents of a log, run by run");
+  info_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
+  info_command->add_flag("--health", flags->health, "read all samples and report health findings");
+  info_command->add_option(
+      "--stage", flags->stage,
+      "with --health: stage or controller file for the checks; default: the one stored in the log");
+  info_command->final_callback([flags, &console] { list_log(*flags, console); });
+
+  CLI::App* verify_command =
+      add_command(*log, "verify", "Read every byte and verify the checksums");
+  verify_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
+  verify_command->final_callback([flags, &console] { verify(*flags, console); });
+
+  CLI::App* recover_command = add_command(*log, "recover", "Save the intact part of a damaged log");
+  recover_command->add_option("file", flags->file, "damaged log (.slog)")->required();
+  recover_command->add_option("-o,--output", flags->output, "new log to write (.slog)")->required();
+  recover_command->final_callback([flags, &console] { recover(*flags, console); });
+
+  CLI::App* convert_command =
+      add_command(*log, "convert", "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog");
+  convert_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
+  convert_command
+      ->add_option("-o,--output", flags->output,
+                   "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
+      ->required();
+  convert_command->add_flag("--complete-only", flags->complete_only, "skip incomplete runs");
+  add_mat_version(*convert_command, flags->mat_version);
+  convert_command->final_callback([flags, &console] { convert(*flags, console); });
 }
 
 }  // namespace stageid

@@ -17,37 +17,13 @@
 namespace stageid {
 namespace {
 
-/// stageid manual -o DIR
-class ManualCommand {
- public:
-  /// The commands of `app` are read when this command runs, because all of them exist by then.
-  ManualCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-
-  const CLI::App& app_;
-  Console& console_;
-  std::filesystem::path output_;
-};
-
-ManualCommand::ManualCommand(CLI::App& app, Console& console) : app_(app), console_(console) {
-  CLI::App* command =
-      add_command(app, "manual", "Write man pages and completions for bash and zsh");
-  command
-      ->add_option("-o,--output", output_,
-                   "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
-                   "bash-completion/completions and zsh/vendor-completions in it")
-      ->required();
-  command->final_callback([this] { run(); });
-}
-
-void ManualCommand::run() const {
-  const CommandTree program = command_tree(app_);
-  const std::filesystem::path pages = output_ / "man" / "man1";
-  const std::filesystem::path completions = output_ / "bash-completion" / "completions";
+/// stageid manual -o DIR, with the commands that exist when it runs
+void write_manual(const CLI::App& app, const std::filesystem::path& output, Console& console) {
+  const CommandTree program = command_tree(app);
+  const std::filesystem::path pages = output / "man" / "man1";
+  const std::filesystem::path completions = output / "bash-completion" / "completions";
   require_directory(pages);
-  const std::filesystem::path functions = output_ / "zsh" / "vendor-completions";
+  const std::filesystem::path functions = output / "zsh" / "vendor-completions";
   require_directory(completions);
   require_directory(functions);
   nlohmann::ordered_json written = nlohmann::ordered_json::array();
@@ -59,14 +35,22 @@ void ManualCommand::run() const {
     write(pages / page.file, page.text);
   write(completions / program.name, bash_completion(program));
   write(functions / ("_" + program.name), zsh_completion(program));
-  console_.result(fmt::format("wrote {} files below {}", written.size(), output_.string()));
-  console_.result(nlohmann::ordered_json{{"written", written}});
+  console.result(fmt::format("wrote {} files below {}", written.size(), output.string()));
+  console.result(nlohmann::ordered_json{{"written", written}});
 }
 
 }  // namespace
 
-std::shared_ptr<void> manual_command(CLI::App& app, Console& console) {
-  return std::make_shared<ManualCommand>(app, console);
+void manual_command(CLI::App& app, Console& console) {
+  const auto output = std::make_shared<std::filesystem::path>();
+  CLI::App* command =
+      add_command(app, "manual", "Write man pages and completions for bash and zsh");
+  command
+      ->add_option("-o,--output", *output,
+                   "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
+                   "bash-completion/completions and zsh/vendor-completions in it")
+      ->required();
+  command->final_callback([output, &app, &console] { write_manual(app, *output, console); });
 }
 
 }  // namespace stageid

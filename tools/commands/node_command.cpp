@@ -90,126 +90,51 @@ void come_to_rest(StageNode& node, Serve serve) {
 /// stageid node STAGE --can IF | --modbus-tcp PORT | --modbus-rtu DEVICE
 ///
 /// One StageNode with one front end per requested kind of connection.
-class NodeCommand {
- public:
-  NodeCommand(CLI::App& app, Console& console);
-
- private:
-  void run();
-  StageNode make_node(const StageConfig& config) const;
-  double watchdog_s(const StageConfig& config) const;
-  void serve_can(const StageConfig& config, StageNode& node) const;
-
-  Console& console_;
-  std::filesystem::path config_;
-  std::vector<std::string> can_interfaces_;
-  std::vector<std::string> can_faults_;
-  double pace_ = 0.0;
-  double hold_s_ = 0.1;
-  double watchdog_s_ = 0.0;
-  ModbusFront modbus_;
+struct NodeFlags {
+  std::filesystem::path config;
+  std::vector<std::string> can_interfaces;
+  std::vector<std::string> can_faults;
+  double pace = 0.0;
+  double hold_s = 0.1;
+  double watchdog_s = 0.0;
+  ModbusFront modbus;
 };
 
-NodeCommand::NodeCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(
-      app, "node",
-      "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
-  command->add_option("config", config_, "stage file (.yaml)")->required();
-  command
-      ->add_option(
-          "--can", can_interfaces_,
-          "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
-      ->delimiter(',');
-  command
-      ->add_option("--can-fault", can_faults_,
-                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
-                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
-                   "lost@100x3,late@500:0.004")
-      ->delimiter(',');
-  command
-      ->add_option("--pace", pace_,
-                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
-      ->check(kNotNegative)
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--hold", hold_s_,
-          "seconds for which the node holds the stage in its own loop before it cuts the power")
-      ->check(CLI::Range(0.0, 60.0))
-      ->capture_default_str();
-  modbus_.add_options(*command);
-  command
-      ->add_option(
-          "--watchdog", watchdog_s_,
-          "stop the stage if the host is silent for this many seconds. 0: over CAN, 'watchdog_s' "
-          "of the group 'can'; over Modbus, the time of a repeated request plus one sample")
-      ->check(CLI::Range(0.0, 3600.0));
-  command->final_callback([this] { run(); });
-}
-
-StageNode NodeCommand::make_node(const StageConfig& config) const {
-  WaferStageSpec spec = config.spec;
-  spec.pace = 0.0;  // the requests for samples set the pace
-  NodeOptions options;
-  options.watchdog_s = watchdog_s(config);
-  options.hold_s = hold_s_;
-  return {std::make_unique<SimulatedStage>(spec), spec.limits, spec.controller, panel_of(config),
-          options};
-}
-
-double NodeCommand::watchdog_s(const StageConfig& config) const {
+double node_watchdog_s(const NodeFlags& flags, const StageConfig& config) {
   const StageInfo& info = config.spec.info;
   double pause_s = 0.0;
   // Without the group 'modbus', the host has another stage file; its times are probably the defaults.
-  if (modbus_.wanted())
+  if (flags.modbus.wanted())
     pause_s = modbus_longest_pause_s(config.modbus ? config.modbus->timing : ModbusTiming{},
                                      info.sample_rate_hz);
-  if (!can_interfaces_.empty() && config.can.mode == CanMode::streaming)
+  if (!flags.can_interfaces.empty() && config.can.mode == CanMode::streaming)
     pause_s = std::max(pause_s, can_longest_pause_s(config.can.spec, info));
-  if (watchdog_s_ > 0.0 && watchdog_s_ < pause_s)
+  if (flags.watchdog_s > 0.0 && flags.watchdog_s < pause_s)
     throw std::invalid_argument(fmt::format(
         "--watchdog: {:.4g} s is too short: the node would stop the stage before a lost reply is "
         "repeated. Use more than {:.4g} s, or shorter reply times in the stage file",
-        watchdog_s_, pause_s));
-  if (watchdog_s_ > 0.0) return watchdog_s_;
+        flags.watchdog_s, pause_s));
+  if (flags.watchdog_s > 0.0) return flags.watchdog_s;
   const double can_s = config.can.present ? config.can.spec.watchdog_s : 0.0;
   return std::max(can_s, pause_s + 1.0 / info.sample_rate_hz);
 }
 
-void NodeCommand::run() {
-  if (can_interfaces_.empty() && !modbus_.wanted())
-    throw std::invalid_argument(
-        "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
-  const StageConfig config = load_stage_config(config_);
-  if (!config.spec.has_plant())
-    throw FormatError(config_, "",
-                      "the node simulates the stage, but there is no group 'plant'; add it");
-  if (config.spec.controller.by_peer)
-    throw FormatError(
-        config_, "",
-        "the node closes the loop, but its controller is 'peer'; write the controller");
-  const ControlledStop comes_to_rest;
-  StageNode node = make_node(config);
-  if (modbus_.wanted()) modbus_.start(node, config.spec.limits);
-  for (const std::string& place : modbus_.places())
-    console_.result(
-        fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
-  std::fflush(stdout);  // programs that wait for the node read these lines
-  if (can_interfaces_.empty()) {
-    while (!interrupt_flag()) wait_a_tick(node);
-    come_to_rest(node, [&] { wait_a_tick(node); });
-  } else {
-    serve_can(config, node);
-  }
-  modbus_.stop();
-  console_.result(fmt::format("at rest: {}", to_string(node.state())));
+StageNode make_node(const NodeFlags& flags, const StageConfig& config) {
+  WaferStageSpec spec = config.spec;
+  spec.pace = 0.0;  // the requests for samples set the pace
+  NodeOptions options;
+  options.watchdog_s = node_watchdog_s(flags, config);
+  options.hold_s = flags.hold_s;
+  return {std::make_unique<SimulatedStage>(spec), spec.limits, spec.controller, panel_of(config),
+          options};
 }
 
-void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
-  const CanLayout layout = can_layout(can_spec(config, can_interfaces_), node.info());
-  SocketCan socket(can_interfaces_, can_node_identifiers(layout));
+void serve_can(const NodeFlags& flags, Console& console, const StageConfig& config,
+               StageNode& node) {
+  const CanLayout layout = can_layout(can_spec(config, flags.can_interfaces), node.info());
+  SocketCan socket(flags.can_interfaces, can_node_identifiers(layout));
   std::vector<CanFault> faults;
-  for (const std::string& text : can_faults_) {
+  for (const std::string& text : flags.can_faults) {
     try {
       faults.push_back(parse_can_fault(text));
     } catch (const std::invalid_argument& error) {
@@ -217,19 +142,82 @@ void NodeCommand::serve_can(const StageConfig& config, StageNode& node) const {
     }
   }
   FaultyCan transport(socket, faults);
-  CanNode front(node, layout, transport, pace_, config.can.spec.node_clock);
-  console_.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
-                              fmt::join(can_interfaces_, ", ")));
+  CanNode front(node, layout, transport, flags.pace, config.can.spec.node_clock);
+  console.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
+                             fmt::join(flags.can_interfaces, ", ")));
   std::fflush(stdout);  // programs that wait for the node read this line
   while (!interrupt_flag()) front.serve(socket.now_ns() + kTick_ns);
 
   come_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
 }
 
+void serve(NodeFlags& flags, Console& console) {
+  if (flags.can_interfaces.empty() && !flags.modbus.wanted())
+    throw std::invalid_argument(
+        "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
+  const StageConfig config = load_stage_config(flags.config);
+  if (!config.spec.has_plant())
+    throw FormatError(flags.config, "",
+                      "the node simulates the stage, but there is no group 'plant'; add it");
+  if (config.spec.controller.by_peer)
+    throw FormatError(
+        flags.config, "",
+        "the node closes the loop, but its controller is 'peer'; write the controller");
+  const ControlledStop comes_to_rest;
+  StageNode node = make_node(flags, config);
+  if (flags.modbus.wanted()) flags.modbus.start(node, config.spec.limits);
+  for (const std::string& place : flags.modbus.places())
+    console.result(
+        fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
+  std::fflush(stdout);  // programs that wait for the node read these lines
+  if (flags.can_interfaces.empty()) {
+    while (!interrupt_flag()) wait_a_tick(node);
+    come_to_rest(node, [&] { wait_a_tick(node); });
+  } else {
+    serve_can(flags, console, config, node);
+  }
+  flags.modbus.stop();
+  console.result(fmt::format("at rest: {}", to_string(node.state())));
+}
+
 }  // namespace
 
-std::shared_ptr<void> node_command(CLI::App& app, Console& console) {
-  return std::make_shared<NodeCommand>(app, console);
+void node_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<NodeFlags>();
+  CLI::App* command = add_command(
+      app, "node",
+      "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
+  command->add_option("config", flags->config, "stage file (.yaml)")->required();
+  command
+      ->add_option(
+          "--can", flags->can_interfaces,
+          "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
+      ->delimiter(',');
+  command
+      ->add_option("--can-fault", flags->can_faults,
+                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
+                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
+                   "lost@100x3,late@500:0.004")
+      ->delimiter(',');
+  command
+      ->add_option("--pace", flags->pace,
+                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
+      ->check(kNotNegative)
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--hold", flags->hold_s,
+          "seconds for which the node holds the stage in its own loop before it cuts the power")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+  flags->modbus.add_options(*command);
+  command
+      ->add_option(
+          "--watchdog", flags->watchdog_s,
+          "stop the stage if the host is silent for this many seconds. 0: over CAN, 'watchdog_s' "
+          "of the group 'can'; over Modbus, the time of a repeated request plus one sample")
+      ->check(CLI::Range(0.0, 3600.0));
+  command->final_callback([flags, &console] { serve(*flags, console); });
 }
 
 }  // namespace stageid

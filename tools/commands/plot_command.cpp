@@ -50,53 +50,16 @@ Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
 }
 
 /// stageid plot {cmif|bode|entry} FRF [MODEL] -o FILE.{pdf,svg,png}
-class PlotCommand {
- public:
-  PlotCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  Picture picture(const ReportData& data) const;
-  Picture cmif(const ReportData& data) const;
-  Picture entry(const ReportData& data) const;
-
-  Console& console_;
-  std::string figure_;
-  std::vector<std::filesystem::path> inputs_;
-  std::vector<std::string> output_channels_;
-  std::vector<std::string> input_channels_;
-  std::filesystem::path output_;
+struct PlotFlags {
+  std::string figure;
+  std::vector<std::filesystem::path> inputs;
+  std::vector<std::string> output_channels;
+  std::vector<std::string> input_channels;
+  std::filesystem::path output;
 };
 
-PlotCommand::PlotCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command =
-      add_command(app, "plot", "Draw one figure of a response for print (needs gnuplot)");
-  command
-      ->add_option("figure", figure_,
-                   "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
-                   "entry: one element with residual and standard deviation")
-      ->required();
-  command
-      ->add_option("inputs", inputs_,
-                   "output directory of 'stageid identify', or files: FRF, model, modes "
-                   "(candidates in cmif)")
-      ->required();
-  command
-      ->add_option("--output-channel", output_channels_,
-                   "entry: the output; bode: outputs A,B,... (default: all)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  command
-      ->add_option("--input-channel", input_channels_,
-                   "entry: the input; bode: inputs A,B,... (default: all)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  command->add_option("-o,--output", output_, "picture to write: .pdf, .svg or .png")->required();
-  command->final_callback([this] { run(); });
-}
-
-Picture PlotCommand::cmif(const ReportData& data) const {
-  if (!output_channels_.empty() || !input_channels_.empty())
+Picture cmif_of(const PlotFlags& flags, const ReportData& data) {
+  if (!flags.output_channels.empty() || !flags.input_channels.empty())
     throw std::invalid_argument(
         "cmif: always uses all channels; --output-channel and --input-channel are for bode and "
         "entry");
@@ -107,40 +70,66 @@ Picture PlotCommand::cmif(const ReportData& data) const {
   return cmif_picture(with_modes);
 }
 
-Picture PlotCommand::entry(const ReportData& data) const {
-  const Eigen::Index output = one_place("--output-channel", output_channels_, data.frf->outputs);
+Picture entry_of(const PlotFlags& flags, const ReportData& data) {
+  const Eigen::Index output =
+      one_place("--output-channel", flags.output_channels, data.frf->outputs);
   return entry_picture(data, output,
-                       one_place("--input-channel", input_channels_, data.frf->inputs));
+                       one_place("--input-channel", flags.input_channels, data.frf->inputs));
 }
 
-Picture PlotCommand::picture(const ReportData& data) const {
-  if (figure_ == "cmif") return cmif(data);
-  if (figure_ == "entry") return entry(data);
-  return bode_picture(data, places("--output-channel", output_channels_, data.frf->outputs),
-                      places("--input-channel", input_channels_, data.frf->inputs));
+Picture requested_picture(const PlotFlags& flags, const ReportData& data) {
+  if (flags.figure == "cmif") return cmif_of(flags, data);
+  if (flags.figure == "entry") return entry_of(flags, data);
+  return bode_picture(data, places("--output-channel", flags.output_channels, data.frf->outputs),
+                      places("--input-channel", flags.input_channels, data.frf->inputs));
 }
 
-void PlotCommand::run() const {
-  if (std::ranges::find(kFigures, figure_) == kFigures.end())
-    refuse_word("figure", figure_, kFigures);
-  static_cast<void>(picture_format(output_));
-  require_writable(output_, inputs_);
-  const ReportInput input = report_input(inputs_);
+void plot(const PlotFlags& flags, Console& console) {
+  if (std::ranges::find(kFigures, flags.figure) == kFigures.end())
+    refuse_word("figure", flags.figure, kFigures);
+  static_cast<void>(picture_format(flags.output));
+  require_writable(flags.output, flags.inputs);
+  const ReportInput input = report_input(flags.inputs);
   if (input.frf.empty())
     throw std::invalid_argument(fmt::format("{}: contains no frequency response; add an FRF file",
-                                            inputs_.front().string()));
-  draw(picture(read_response_data(input)), output_);
-  console_.result(
-      fmt::format("wrote {}, {} bytes", output_.string(), std::filesystem::file_size(output_)));
-  console_.result({{"output", output_.string()},
-                   {"figure", figure_},
-                   {"bytes", std::filesystem::file_size(output_)}});
+                                            flags.inputs.front().string()));
+  draw(requested_picture(flags, read_response_data(input)), flags.output);
+  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
+                             std::filesystem::file_size(flags.output)));
+  console.result({{"output", flags.output.string()},
+                  {"figure", flags.figure},
+                  {"bytes", std::filesystem::file_size(flags.output)}});
 }
 
 }  // namespace
 
-std::shared_ptr<void> plot_command(CLI::App& app, Console& console) {
-  return std::make_shared<PlotCommand>(app, console);
+void plot_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<PlotFlags>();
+  CLI::App* command =
+      add_command(app, "plot", "Draw one figure of a response for print (needs gnuplot)");
+  command
+      ->add_option("figure", flags->figure,
+                   "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
+                   "entry: one element with residual and standard deviation")
+      ->required();
+  command
+      ->add_option("inputs", flags->inputs,
+                   "output directory of 'stageid identify', or files: FRF, model, modes "
+                   "(candidates in cmif)")
+      ->required();
+  command
+      ->add_option("--output-channel", flags->output_channels,
+                   "entry: the output; bode: outputs A,B,... (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--input-channel", flags->input_channels,
+                   "entry: the input; bode: inputs A,B,... (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", flags->output, "picture to write: .pdf, .svg or .png")
+      ->required();
+  command->final_callback([flags, &console] { plot(*flags, console); });
 }
 
 }  // namespace stageid

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -28,100 +26,59 @@ Backend backend_of(const std::string& name, Backend configured) {
 }
 
 /// stageid run CONFIG -o run.slog
-class RunCommand {
- public:
-  RunCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-
-  Console& console_;
-  std::filesystem::path config_;
-  std::filesystem::path output_;
-  std::string backend_;
-  std::filesystem::path replay_;
-  double replay_tolerance_n_ = 1e-9;
-  double pace_ = -1.0;
-  std::filesystem::path excitation_;
-  double until_ = 0.0;
-  std::string dashboard_;
-  bool resume_ = false;
-  bool reset_fault_ = false;
+struct RunFlags {
+  std::filesystem::path config;
+  std::filesystem::path output;
+  std::string backend;
+  std::filesystem::path replay;
+  double replay_tolerance_n = 1e-9;
+  double pace = -1.0;
+  std::filesystem::path excitation;
+  double until = 0.0;
+  std::string dashboard;
+  bool resume = false;
+  bool reset_fault = false;
 };
 
-RunCommand::RunCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
-  command->add_option("config", config_, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", output_, "log to write (.slog)")->required();
-  command->add_option("--backend", backend_,
-                      "sim | can | modbus | plugin | replay; default: from the stage file");
-  command->add_option("--replay", replay_, "log to replay with --backend replay");
-  command
-      ->add_option("--replay-tolerance", replay_tolerance_n_,
-                   "largest allowed difference between a command and the replayed one, in the unit "
-                   "of the actuator")
-      ->capture_default_str();
-  command
-      ->add_option("--pace", pace_,
-                   "0: as fast as possible; 1: wall clock; default: from the stage file")
-      ->check(kNotNegative);
-  command->add_option("--excitation", excitation_,
-                      "play this result of 'stageid design' instead of designing again");
-  command
-      ->add_option("--until", until_,
-                   "VARIANCE: stop after the realization that lowers the mean relative variance of "
-                   "the response to this value, e.g. 1e-6 for 0.1 %")
-      ->check(kPositive);
-  command->add_flag("--resume", resume_,
-                    "continue an interrupted log; complete runs are not repeated");
-  command->add_option("--dashboard", dashboard_,
-                      "live view in a browser. PORT: on this machine (0: any free port) | "
-                      "HOST:PORT: also on others. The printed address contains the token that "
-                      "other machines and the stop button need");
-  command->add_flag("--reset-fault", reset_fault_,
-                    "clear a fault of the node or plant before the first run");
-  command->final_callback([this] { run(); });
-}
-
-void RunCommand::run() const {
-  const std::string ending = output_.extension().string();
+void measure_and_log(const RunFlags& flags, Console& console) {
+  const std::string ending = flags.output.extension().string();
   if (ending == ".h5" || ending == ".hdf5" || ending == ".csv")
     throw std::invalid_argument(
         fmt::format("{}: a measurement is recorded as .slog, which survives a crash; use a name "
                     "ending in .slog and 'stageid log convert' to obtain {}",
-                    output_.string(), ending));
-  require_ending(output_, "a log", {".slog"});
-  const ExperimentConfig config = load_experiment_config(config_);
-  const Backend backend = backend_of(backend_, config.stage.backend);
-  if (backend != Backend::replay) require_stable_loop(config, console_);
+                    flags.output.string(), ending));
+  require_ending(flags.output, "a log", {".slog"});
+  const ExperimentConfig config = load_experiment_config(flags.config);
+  const Backend backend = backend_of(flags.backend, config.stage.backend);
+  if (backend != Backend::replay) require_stable_loop(config, console);
   const ExperimentPlan plan =
-      excitation_.empty() ? make_plan(config) : read_plan_of(config, excitation_);
+      flags.excitation.empty() ? make_plan(config) : read_plan_of(config, flags.excitation);
   MeasurementRequest request;
-  request.log = output_;
+  request.log = flags.output;
   request.backend = backend;
-  request.replay = replay_;
-  request.replay_tolerance_n = replay_tolerance_n_;
-  request.resume = resume_;
-  request.pace = pace_;
-  if (!dashboard_.empty()) request.dashboard = parse_dashboard_address(dashboard_);
-  request.reset_fault = reset_fault_;
-  if (until_ > 0.0) request.until = until_;
-  const MeasurementResult result = measure(config, plan, request, console_);
-  console_.exit_code = result.exit_code;
+  request.replay = flags.replay;
+  request.replay_tolerance_n = flags.replay_tolerance_n;
+  request.resume = flags.resume;
+  request.pace = flags.pace;
+  if (!flags.dashboard.empty()) request.dashboard = parse_dashboard_address(flags.dashboard);
+  request.reset_fault = flags.reset_fault;
+  if (flags.until > 0.0) request.until = flags.until;
+  const MeasurementResult result = measure(config, plan, request, console);
+  console.exit_code = result.exit_code;
 
   const RunHealth& health = result.experiment.health;
   const double stage_s = static_cast<double>(health.cycles) / plan.grid().sample_rate_hz();
   const int complete = result.runs_before + result.experiment.runs_done;
-  console_.result(fmt::format(
-      "{}: {} of {} complete{}", output_.string(), complete, counted(result.runs_total, "run"),
+  console.result(fmt::format(
+      "{}: {} of {} complete{}", flags.output.string(), complete, counted(result.runs_total, "run"),
       result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : ""));
-  console_.result(
+  console.result(
       fmt::format("{}, {} late, {} missing, {} marked; {:.1f} s of stage time in "
                   "{:.1f} s, {:.1f} MB",
                   counted(health.cycles, "cycle"), health.late, health.missing, health.marked,
                   stage_s, result.seconds, static_cast<double>(result.log_bytes) / 1e6));
-  if (result.variance) console_.result(result.message);
-  nlohmann::ordered_json json = {{"log", output_.string()},
+  if (result.variance) console.result(result.message);
+  nlohmann::ordered_json json = {{"log", flags.output.string()},
                                  {"exit_code", result.exit_code},
                                  {"message", result.message},
                                  {"runs_complete", complete},
@@ -134,16 +91,47 @@ void RunCommand::run() const {
                                  {"seconds", result.seconds},
                                  {"log_bytes", result.log_bytes}};
   if (result.variance) json["relative_variance"] = *result.variance;
-  console_.result(json);
+  console.result(json);
   if (result.exit_code != 0)
-    console_.warning(fmt::format("{}{}", named(output_, result.message),
-                                 complete < result.runs_total ? advice_behind(result) : ""));
+    console.warning(fmt::format("{}{}", named(flags.output, result.message),
+                                complete < result.runs_total ? advice_behind(result) : ""));
 }
 
 }  // namespace
 
-std::shared_ptr<void> run_command(CLI::App& app, Console& console) {
-  return std::make_shared<RunCommand>(app, console);
+void run_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<RunFlags>();
+  CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
+  command->add_option("config", flags->config, "experiment file (.yaml)")->required();
+  command->add_option("-o,--output", flags->output, "log to write (.slog)")->required();
+  command->add_option("--backend", flags->backend,
+                      "sim | can | modbus | plugin | replay; default: from the stage file");
+  command->add_option("--replay", flags->replay, "log to replay with --backend replay");
+  command
+      ->add_option("--replay-tolerance", flags->replay_tolerance_n,
+                   "largest allowed difference between a command and the replayed one, in the unit "
+                   "of the actuator")
+      ->capture_default_str();
+  command
+      ->add_option("--pace", flags->pace,
+                   "0: as fast as possible; 1: wall clock; default: from the stage file")
+      ->check(kNotNegative);
+  command->add_option("--excitation", flags->excitation,
+                      "play this result of 'stageid design' instead of designing again");
+  command
+      ->add_option("--until", flags->until,
+                   "VARIANCE: stop after the realization that lowers the mean relative variance of "
+                   "the response to this value, e.g. 1e-6 for 0.1 %")
+      ->check(kPositive);
+  command->add_flag("--resume", flags->resume,
+                    "continue an interrupted log; complete runs are not repeated");
+  command->add_option("--dashboard", flags->dashboard,
+                      "live view in a browser. PORT: on this machine (0: any free port) | "
+                      "HOST:PORT: also on others. The printed address contains the token that "
+                      "other machines and the stop button need");
+  command->add_flag("--reset-fault", flags->reset_fault,
+                    "clear a fault of the node or plant before the first run");
+  command->final_callback([flags, &console] { measure_and_log(*flags, console); });
 }
 
 }  // namespace stageid

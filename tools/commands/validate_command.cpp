@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -66,108 +65,94 @@ std::vector<std::string> prediction_lines(const PredictionError& error) {
 }
 
 /// stageid validate MODEL FRF|LOG|MODE_SHAPES
-class ValidateCommand {
- public:
-  ValidateCommand(CLI::App& app, Console& console);
-
- private:
-  void run() const;
-  /// @throws FormatError if the model has a channel that the data lack
-  void require_channels(const std::vector<std::string>& of_data,
-                        const std::vector<std::string>& of_model, const char* kind) const;
-
-  Console& console_;
-  std::filesystem::path model_;
-  std::filesystem::path data_;
-  std::filesystem::path stage_;
-  std::vector<double> band_hz_;
-  int threads_ = 0;
+struct ValidateFlags {
+  std::filesystem::path model;
+  std::filesystem::path data;
+  std::filesystem::path stage;
+  std::vector<double> band_hz;
+  int threads = 0;
 };
 
-ValidateCommand::ValidateCommand(CLI::App& app, Console& console) : console_(console) {
-  CLI::App* command =
-      add_command(app, "validate", "Validate a model on data that it was not fitted to");
-  command->add_option("model", model_, "model.json")->required();
-  command
-      ->add_option("data", data_,
-                   "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
-      ->required();
-  command->add_option("--band", band_hz_, "LOW HIGH, Hz; default: the band of the fit")
-      ->expected(2);
-  command->add_option(
-      "--stage", stage_,
-      "stage or controller file for the health checks of a log; default: the one stored in it");
-  add_threads(*command, threads_);
-  command->final_callback([this] { run(); });
-}
-
-void ValidateCommand::require_channels(const std::vector<std::string>& of_data,
-                                       const std::vector<std::string>& of_model,
-                                       const char* kind) const {
+void require_channels(const ValidateFlags& flags, const std::vector<std::string>& of_data,
+                      const std::vector<std::string>& of_model, const char* kind) {
   for (const std::string& name : of_model)
     if (std::find(of_data.begin(), of_data.end(), name) == of_data.end())
-      throw FormatError(data_, "",
+      throw FormatError(flags.data, "",
                         fmt::format("has no {0} '{1}', which {2} has; its {0}s are {3}. Use data "
                                     "and a model of the same stage",
-                                    kind, name, model_.string(), fmt::join(of_data, ", ")));
+                                    kind, name, flags.model.string(), fmt::join(of_data, ", ")));
 }
 
-void ValidateCommand::run() const {
-  const AdditiveModel model = read_model(model_);
-  if (is_uff_name(data_)) {
-    const ModeCorrelation correlation = correlate_modes(model, data_, read_uff(data_));
-    for (const std::string& line : correlation_lines(correlation)) console_.result(line);
-    console_.result({{"model", model_.string()},
-                     {"data", data_.string()},
-                     {"modes", correlation_json(correlation)}});
+void validate_model(const ValidateFlags& flags, Console& console) {
+  const AdditiveModel model = read_model(flags.model);
+  if (is_uff_name(flags.data)) {
+    const ModeCorrelation correlation = correlate_modes(model, flags.data, read_uff(flags.data));
+    for (const std::string& line : correlation_lines(correlation)) console.result(line);
+    console.result({{"model", flags.model.string()},
+                    {"data", flags.data.string()},
+                    {"modes", correlation_json(correlation)}});
     return;
   }
-  const bool from_frf = is_frf(data_);
+  const bool from_frf = is_frf(flags.data);
   FrfOptions options;
   options.inputs = model.inputs.names;
   options.outputs = model.outputs.names;
-  options.threads = threads_;
+  options.threads = flags.threads;
   FrfStep step;
   if (from_frf)
-    step.frf = read_frf(data_);
+    step.frf = read_frf(flags.data);
   else
-    step = estimate_frf({data_}, options, {true, stage_}, console_);
+    step = estimate_frf({flags.data}, options, {true, flags.stage}, console);
   const std::vector<Finding> health = health_of(step.frf.provenance_json);
-  require_channels(step.frf.outputs.names, model.outputs.names, "output");
-  require_channels(step.frf.inputs.names, model.inputs.names, "input");
+  require_channels(flags, step.frf.outputs.names, model.outputs.names, "output");
+  require_channels(flags, step.frf.inputs.names, model.inputs.names, "input");
   FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
   const bool fitted_band = model.fit.band_hz[1] > 0.0;
-  const double low_hz = !band_hz_.empty() ? band_hz_[0]
-                        : fitted_band     ? model.fit.band_hz[0]
-                                          : frf.frequency_hz[0];
-  const double high_hz = !band_hz_.empty() ? band_hz_[1]
-                         : fitted_band     ? model.fit.band_hz[1]
-                                           : frf.frequency_hz[frf.lines() - 1];
+  const double low_hz = !flags.band_hz.empty() ? flags.band_hz[0]
+                        : fitted_band          ? model.fit.band_hz[0]
+                                               : frf.frequency_hz[0];
+  const double high_hz = !flags.band_hz.empty() ? flags.band_hz[1]
+                         : fitted_band          ? model.fit.band_hz[1]
+                                                : frf.frequency_hz[frf.lines() - 1];
   const Validation validation =
       validate(model, select_band(std::move(frf), low_hz, high_hz), distortion_of(model));
-  for (const std::string& line : validation_lines(validation)) console_.result(line);
-  nlohmann::ordered_json json = {{"model", model_.string()},
-                                 {"data", data_.string()},
+  for (const std::string& line : validation_lines(validation)) console.result(line);
+  nlohmann::ordered_json json = {{"model", flags.model.string()},
+                                 {"data", flags.data.string()},
                                  {"band_hz", {low_hz, high_hz}},
                                  {"frequency_domain", validation_json(validation)}};
   if (!from_frf) {
-    for (const std::string& line : health_lines(health)) console_.result(line);
+    for (const std::string& line : health_lines(health)) console.result(line);
     json["health"] = health_json(health);
-    const PredictionError error = prediction_error(model, *open_log(data_), low_hz, high_hz);
-    for (const std::string& line : prediction_lines(error)) console_.result(line);
+    const PredictionError error = prediction_error(model, *open_log(flags.data), low_hz, high_hz);
+    for (const std::string& line : prediction_lines(error)) console.result(line);
     json["time_domain"] = prediction_json(error);
   }
   const ModelVerdict verdict = judge_model(model, health, validation);
-  console_.result(verdict_line(verdict));
+  console.result(verdict_line(verdict));
   json.update(verdict_json(verdict));
-  if (!verdict.trustworthy) console_.exit_code = kNotTrustworthy;
-  console_.result(json);
+  if (!verdict.trustworthy) console.exit_code = kNotTrustworthy;
+  console.result(json);
 }
 
 }  // namespace
 
-std::shared_ptr<void> validate_command(CLI::App& app, Console& console) {
-  return std::make_shared<ValidateCommand>(app, console);
+void validate_command(CLI::App& app, Console& console) {
+  const auto flags = std::make_shared<ValidateFlags>();
+  CLI::App* command =
+      add_command(app, "validate", "Validate a model on data that it was not fitted to");
+  command->add_option("model", flags->model, "model.json")->required();
+  command
+      ->add_option("data", flags->data,
+                   "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
+      ->required();
+  command->add_option("--band", flags->band_hz, "LOW HIGH, Hz; default: the band of the fit")
+      ->expected(2);
+  command->add_option(
+      "--stage", flags->stage,
+      "stage or controller file for the health checks of a log; default: the one stored in it");
+  add_threads(*command, flags->threads);
+  command->final_callback([flags, &console] { validate_model(*flags, console); });
 }
 
 }  // namespace stageid
