@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -17,11 +18,13 @@
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/faulty_can.hpp"
+#include "hal/modbus/modbus_fault.hpp"
+#include "hal/modbus/modbus_node.hpp"
+#include "hal/modbus/modbus_server.hpp"
 #include "hal/node/stage_node.hpp"
 #include "hal/stage/pacer.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/measure/modbus_front.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -29,6 +32,127 @@ namespace {
 
 constexpr std::int64_t kTick_ns = 1'000'000;
 constexpr std::int64_t kLongestStop_ns = 5'000'000'000;
+
+/// The Modbus side of `stageid node`: its options, and one server thread per connection (TCP, RTU) to the same
+/// StageNode. Every server has its own request count and faults.
+class ModbusFront {
+ public:
+  ModbusFront() = default;
+  ~ModbusFront() { stop(); }
+  ModbusFront(const ModbusFront&) = delete;
+  ModbusFront& operator=(const ModbusFront&) = delete;
+
+  void add_options(CLI::App& command);
+  bool wanted() const noexcept { return tcp_port_ >= 0 || !rtu_device_.empty(); }
+
+  /// Opens the requested connections and serves them. `node` must outlive the front.
+  /// @throws std::invalid_argument for unknown faults or invalid values.
+  /// @throws StageError if a port or device cannot be opened.
+  void start(StageNode& node, const StageLimits& limits);
+  /// Ends the threads and closes the connections.
+  void stop();
+  /// One line per connection, after start().
+  std::vector<std::string> places() const;
+
+ private:
+  struct Door {
+    Door(const ModbusAddress& address, StageNode& node, const StageLimits& limits,
+         std::uint32_t boot_id, std::vector<ModbusFault> list)
+        : faults(std::move(list)),
+          registers(node, limits, boot_id, &faults),
+          server(address, registers, &faults) {}
+    ModbusFaultScript faults;
+    ModbusNode registers;
+    ModbusServer server;
+    std::thread thread;
+  };
+
+  int tcp_port_ = -1;
+  std::string rtu_device_;
+  int baud_ = 115200;
+  std::string parity_ = "E";
+  int unit_ = 1;
+  std::vector<std::string> faults_;
+  std::vector<std::unique_ptr<Door>> doors_;
+  std::atomic<bool> stop_ = false;
+};
+
+template <typename Parse>
+auto parsed_faults(const char* option, const std::vector<std::string>& texts, Parse parse) {
+  std::vector<decltype(parse(texts.front()))> faults;
+  for (const std::string& text : texts) {
+    try {
+      faults.push_back(parse(text));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", option, error.what()));
+    }
+  }
+  return faults;
+}
+
+/// Different for every start, so that hosts detect a restarted node.
+std::uint32_t fresh_boot_id() {
+  const auto now_ns = static_cast<std::uint64_t>(
+      std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
+  const auto id = static_cast<std::uint32_t>((now_ns * 0x9E3779B97F4A7C15U) >> 32);
+  return id == 0 ? 1 : id;
+}
+
+void ModbusFront::stop() {
+  stop_ = true;
+  for (const std::unique_ptr<Door>& door : doors_)
+    if (door->thread.joinable()) door->thread.join();
+  doors_.clear();
+}
+
+void ModbusFront::add_options(CLI::App& command) {
+  command
+      .add_option("--modbus-tcp", tcp_port_,
+                  "Modbus TCP port on the loopback interface; 0: a free one")
+      ->check(CLI::Range(0, 65535));
+  command.add_option("--modbus-rtu", rtu_device_, "Modbus RTU on this serial line");
+  command.add_option("--modbus-baud", baud_, "baud rate of the serial line")->capture_default_str();
+  command.add_option("--modbus-parity", parity_, "N | E | O")
+      ->check(CLI::IsMember({"N", "E", "O"}))
+      ->capture_default_str();
+  command.add_option("--modbus-unit", unit_, "unit identifier of the node")
+      ->check(CLI::Range(1, 247))
+      ->capture_default_str();
+  command.add_option(
+      "--modbus-fault", faults_,
+      "KIND[@REQUEST][xCOUNT][:VALUE], counted from the first request: late_reply:SECONDS, "
+      "half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, interlock, "
+      "temperature:KELVIN, gravity:NEWTON");
+}
+
+void ModbusFront::start(StageNode& node, const StageLimits& limits) {
+  const auto faults = parsed_faults("--modbus-fault", faults_, parse_modbus_fault);
+  ModbusAddress address;
+  address.unit = unit_;
+  const std::uint32_t boot_id = fresh_boot_id();
+  const auto open = [&] {
+    doors_.push_back(std::make_unique<Door>(address, node, limits, boot_id, faults));
+  };
+  if (tcp_port_ >= 0) {
+    address.port = tcp_port_;
+    open();
+  }
+  if (!rtu_device_.empty()) {
+    address.device = rtu_device_;
+    address.baud = baud_;
+    address.parity = parity_.front();
+    open();
+  }
+  for (const std::unique_ptr<Door>& door : doors_)
+    door->thread = std::thread([this, server = &door->server] { server->run(stop_); });
+}
+
+std::vector<std::string> ModbusFront::places() const {
+  std::vector<std::string> places;
+  for (const std::unique_ptr<Door>& door : doors_)
+    places.push_back(to_string(door->server.address()));
+  return places;
+}
 
 bool forces_act(NodeState state) {
   return state == NodeState::operation_enabled || state == NodeState::measuring ||
@@ -133,14 +257,7 @@ void serve_can(const NodeFlags& flags, Console& console, const StageConfig& conf
                StageNode& node) {
   const CanLayout layout = can_layout(can_spec(config, flags.can_interfaces), node.info());
   SocketCan socket(flags.can_interfaces, can_node_identifiers(layout));
-  std::vector<CanFault> faults;
-  for (const std::string& text : flags.can_faults) {
-    try {
-      faults.push_back(parse_can_fault(text));
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("--can-fault: {}", error.what()));
-    }
-  }
+  const auto faults = parsed_faults("--can-fault", flags.can_faults, parse_can_fault);
   FaultyCan transport(socket, faults);
   CanNode front(node, layout, transport, flags.pace, config.can.spec.node_clock);
   console.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,

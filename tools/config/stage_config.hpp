@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,16 +12,23 @@
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
+#include "hal/stage/real_time.hpp"
 #include "tools/config/can_config.hpp"
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/modbus_config.hpp"
-#include "tools/config/real_time_keys.hpp"
 
 namespace stageid {
 
 enum class Backend : std::uint8_t { sim, can, modbus, plugin, replay };
 template <>
 inline constexpr std::array kWords<Backend> = {"sim", "can", "modbus", "plugin", "replay"};
+
+/// The group `realtime` of a stage file.
+struct RealTimeKeys {
+  RealTimeOptions options;
+  double jitter_s = 0.0;    ///< 0: tolerable_jitter_s()
+  int misses_allowed = 10;  ///< see LoopOptions
+};
 
 /// Content of a stage file and the WaferStageSpec derived from it.
 struct StageConfig {

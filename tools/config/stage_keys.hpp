@@ -7,14 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "hal/plugin/plugin_stage.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/simulator/simulated_stage.hpp"
-#include "tools/config/can_config.hpp"
-#include "tools/config/config_visitor.hpp"
 #include "tools/config/controller_keys.hpp"
-#include "tools/config/modbus_config.hpp"
-#include "tools/config/real_time_keys.hpp"
+#include "tools/config/stage_config.hpp"
 
 namespace stageid {
 

@@ -10,7 +10,7 @@ namespace stageid::report {
 /// A block of encoded numbers and the name of the element that holds it.
 struct Block {
   std::string id;      ///< "response", ...: [a-z_]+
-  std::string base64;  ///< see report_encoding.hpp and report_packing.hpp
+  std::string base64;  ///< see report_encoding.hpp
 };
 
 /// Data for the script of the page.

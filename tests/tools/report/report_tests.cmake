@@ -5,7 +5,6 @@ target_sources(tools_tests PRIVATE
   report/report_encoding_test.cpp
   report/report_input_test.cpp
   report/report_modes_test.cpp
-  report/report_packing_test.cpp
   report/report_page_test.cpp
   report/report_shapes_test.cpp
   report/report_verdict_test.cpp

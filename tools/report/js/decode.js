@@ -1,4 +1,4 @@
-// Decodes packed numbers written by tools/report/report_packing.hpp and report_encoding.hpp.
+// Decodes packed numbers written by tools/report/report_encoding.hpp.
 
 function bytesOf(base64) {
   const text = atob(base64);
