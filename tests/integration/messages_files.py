@@ -7,7 +7,6 @@ import subprocess
 
 import h5py
 import numpy as np
-import scipy.io
 
 # name -> the command that writes it
 WRITTEN = {
@@ -125,11 +124,6 @@ def objects(_, path):
     np.savez(path, G=np.array([{"a": 1}, None], dtype=object))
 
 
-@damaged("table.mat")
-def table(_, path):
-    scipy.io.savemat(path, {"f": np.arange(1.0, 4.0), "G": np.ones((3, 2))})
-
-
 @damaged("shapes.unv")
 def shapes(files, path):
     """The mode shapes alone: datasets 55, which begin and end with a line -1."""
@@ -142,22 +136,6 @@ def folder(_, path):
     path.mkdir()
 
 
-def h5_edit(*names_of, of):
-    """A copy of `of`, which the function edits."""
-
-    def register(function):
-        def write(files, path):
-            shutil.copyfile(files.path(of), path)
-            with h5py.File(path, "r+") as f:
-                function(f)
-
-        for name in names_of:
-            DAMAGED[name] = write
-        return function
-
-    return register
-
-
 def replace(f, name, values):
     attributes = dict(f[name].attrs)
     del f[name]
@@ -165,197 +143,98 @@ def replace(f, name, values):
     f[name].attrs.update(attributes)
 
 
-@h5_edit("frf_nan.h5", of="frf.h5")
-def _(f):
-    values = f["response"][:]
-    values[5, 1, 2] = np.nan
-    f["response"][:] = values
+# Changes of an HDF5 file.
+def assign(name, place, value):
+    return lambda f: f[name].__setitem__(place, value)
 
 
-@h5_edit("frf_falling.h5", of="frf.h5")
-def _(f):
-    f["frequency_hz"][:] = f["frequency_hz"][:][::-1]
+def remake(name, change):
+    return lambda f: replace(f, name, change(f[name][:]))
 
 
-@h5_edit("frf_transposed.h5", of="frf.h5")
-def _(f):
-    replace(f, "response", np.swapaxes(f["response"][:], 1, 2))
+def attribute(name, value, of="/"):
+    return lambda f: f[of].attrs.__setitem__(name, value)
 
 
-@h5_edit("frf_real.h5", of="frf.h5")
-def _(f):
-    replace(f, "response", abs(f["response"][:]))
+def remove(name):
+    return lambda f: f.__delitem__(name)
 
 
-@h5_edit("frf_version.h5", of="frf.h5")
-def _(f):
-    f.attrs["format_version"] = 2
+def in_every_run(change):
+    return lambda f: [change(run) for run in f["runs"].values()]
 
 
-@h5_edit("frf_hold.h5", of="frf.h5")
-def _(f):
-    f.attrs["hold"] = "first order"
-
-
-@h5_edit("frf_without_response.h5", of="frf.h5")
-def _(f):
-    del f["response"]
-
-
-@h5_edit("frf_variance.h5", of="frf.h5")
-def _(f):
-    values = f["noise_variance"][:]
-    values[0, 0, 0] = -1.0
-    f["noise_variance"][:] = values
-
-
-@h5_edit("frf_bare.h5", of="frf.h5")
-def _(f):
+def without_variances(f):
     for name in ("noise_variance", "total_variance", "residual_covariance", "input_factor", "confidence_radius"):
         f.pop(name, None)
     for name in ("noise_dof", "total_dof"):
         f.attrs.pop(name, None)
 
 
-@h5_edit("frf_renamed.h5", of="held_back.h5")
-def _(f):
-    f["inputs"][:] = ["f1", "f2", "f3"]
+# name -> the file that is copied, what is changed in it
+EDITED = {
+    "frf_nan.h5": ("frf.h5", assign("response", (5, 1, 2), np.nan)),
+    "frf_falling.h5": ("frf.h5", remake("frequency_hz", lambda f: f[::-1])),
+    "frf_transposed.h5": ("frf.h5", remake("response", lambda G: np.swapaxes(G, 1, 2))),
+    "frf_real.h5": ("frf.h5", remake("response", abs)),
+    "frf_version.h5": ("frf.h5", attribute("format_version", 2)),
+    "frf_hold.h5": ("frf.h5", attribute("hold", "first order")),
+    "frf_without_response.h5": ("frf.h5", remove("response")),
+    "frf_variance.h5": ("frf.h5", assign("noise_variance", (0, 0, 0), -1.0)),
+    "frf_bare.h5": ("frf.h5", without_variances),
+    "frf_renamed.h5": ("held_back.h5", assign("inputs", ..., ["f1", "f2", "f3"])),
+    "frf_zero.h5": ("frf.h5", assign("response", ..., 0)),
+    "frf_duplicate.h5": ("frf.h5", assign("outputs", ..., ["s1", "s1"])),
+    "foreign.h5": ("frf.h5", attribute("format", "bench")),
+    "log_without_sensors.h5": ("log.h5", remove("runs/0003/sensors")),
+    "log_rows.h5": ("log.h5", remake("runs/0003/sensors", lambda y: y[:-7])),
+    "log_nan.h5": ("log.h5", assign("runs/0003/sensors", (1234, 1), np.nan)),
+    "log_period.h5": ("log.h5", attribute("period_samples", 400)),
+    "log_twice.h5": ("log.h5", attribute("experiment", 0, of="runs/0004")),
+    "log_still.h5": ("log.h5", in_every_run(assign("excitation", ..., 0))),
+    "log_dead.h5": ("log.h5", in_every_run(assign("sensors", np.s_[:, 1], 3e-6))),
+    "log_empty.h5": ("log.h5", lambda f: (f.__delitem__("runs"), f.create_group("runs"))),
+    "log_rate.h5": ("log.h5", attribute("sample_rate_hz", -2000.0)),
+    "model_version.json": ("model.json", lambda m: m.update(format_version=7)),
+    "model_without_submodels.json": ("model.json", lambda m: m.pop("submodels")),
+    "model_text.json": ("model.json", lambda m: m.update(sample_rate_hz="fast")),
+    "model_shape.json": ("model.json", lambda m: m["submodels"][0]["numerator"][0][0].append(1.0)),
+    "model_renamed.json": ("model.json", lambda m: m.update(outputs=["z1", "z2"])),
+    "model_units.json": ("model.json", lambda m: m.update(output_units=["m/s^2", "m/s^2"])),
+    "modes_negative.json": ("modes.json", lambda m: m["modes"][0].update(frequency_hz=-180.0)),
+    "modes_none.json": ("modes.json", lambda m: m.update(modes=[])),
+}
 
 
-@h5_edit("frf_zero.h5", of="frf.h5")
-def _(f):
-    f["response"][:] = 0
-
-
-@h5_edit("frf_duplicate.h5", of="frf.h5")
-def _(f):
-    f["outputs"][:] = ["s1", "s1"]
-
-
-@h5_edit("foreign.h5", of="frf.h5")
-def _(f):
-    f.attrs["format"] = "bench"
-
-
-@h5_edit("log_without_sensors.h5", of="log.h5")
-def _(f):
-    del f["runs/0003/sensors"]
-
-
-@h5_edit("log_rows.h5", of="log.h5")
-def _(f):
-    replace(f["runs/0003"], "sensors", f["runs/0003/sensors"][:-7])
-
-
-@h5_edit("log_nan.h5", of="log.h5")
-def _(f):
-    f["runs/0003/sensors"][1234, 1] = np.nan
-
-
-@h5_edit("log_period.h5", of="log.h5")
-def _(f):
-    f.attrs["period_samples"] = 400
-
-
-@h5_edit("log_twice.h5", of="log.h5")
-def _(f):
-    f["runs/0004"].attrs["experiment"] = 0
-
-
-@h5_edit("log_still.h5", of="log.h5")
-def _(f):
-    for run in f["runs"].values():
-        run["excitation"][:] = 0
-
-
-@h5_edit("log_dead.h5", of="log.h5")
-def _(f):
-    for run in f["runs"].values():
-        values = run["sensors"][:]
-        values[:, 1] = 3e-6
-        run["sensors"][:] = values
-
-
-@h5_edit("log_empty.h5", of="log.h5")
-def _(f):
-    del f["runs"]
-    f.create_group("runs")
-
-
-@h5_edit("log_rate.h5", of="log.h5")
-def _(f):
-    f.attrs["sample_rate_hz"] = -2000.0
-
-
-def json_edit(*names_of, of="model.json"):
-    def register(function):
-        def write(files, path):
-            content = json.loads(files.path(of).read_text())
-            function(content)
-            path.write_text(json.dumps(content, indent=1))
-
-        for name in names_of:
-            DAMAGED[name] = write
-        return function
-
-    return register
-
-
-@json_edit("model_version.json")
-def _(m):
-    m["format_version"] = 7
-
-
-@json_edit("model_without_submodels.json")
-def _(m):
-    del m["submodels"]
-
-
-@json_edit("model_text.json")
-def _(m):
-    m["sample_rate_hz"] = "fast"
-
-
-@json_edit("model_shape.json")
-def _(m):
-    m["submodels"][0]["numerator"][0][0].append(1.0)
-
-
-@json_edit("model_renamed.json")
-def _(m):
-    m["outputs"] = ["z1", "z2"]
-
-
-@json_edit("model_units.json")
-def _(m):
-    m["output_units"] = ["m/s^2", "m/s^2"]
-
-
-@json_edit("modes_negative.json", of="modes.json")
-def _(m):
-    m["modes"][0]["frequency_hz"] = -180.0
-
-
-@json_edit("modes_none.json", of="modes.json")
-def _(m):
-    m["modes"] = []
-
-
-def weights(name, values):
-    def write(_, path):
-        with h5py.File(path, "w") as f:
-            f[values[0]] = values[1]
-
-    DAMAGED[name] = write
+@damaged(*EDITED)
+def edited(files, path):
+    of, change = EDITED[path.name]
+    if path.suffix == ".json":
+        content = json.loads(files.path(of).read_text())
+        change(content)
+        path.write_text(json.dumps(content, indent=1))
+        return
+    shutil.copyfile(files.path(of), path)
+    with h5py.File(path, "r+") as f:
+        change(f)
 
 
 LINES, OUTPUTS, INPUTS = 197, 2, 3  # of frf.h5
-weights("weights_shape.h5", ("weights", np.ones((10, OUTPUTS, INPUTS))))
-weights("weights_negative.h5", ("weights", -np.ones((LINES, OUTPUTS, INPUTS))))
-weights("weights_zero.h5", ("weights", np.zeros((LINES, OUTPUTS, INPUTS))))
-weights("weights_other.h5", ("my_weights", np.ones((LINES, OUTPUTS, INPUTS))))
 INDEFINITE = np.diag([-1e9, *5 * [1e9]]).astype(complex)
-weights("weights_indefinite.h5", ("weight_matrices", np.tile(INDEFINITE, (LINES, 1, 1))))
+WEIGHTS = {
+    "weights_shape.h5": ("weights", np.ones((10, OUTPUTS, INPUTS))),
+    "weights_negative.h5": ("weights", -np.ones((LINES, OUTPUTS, INPUTS))),
+    "weights_zero.h5": ("weights", np.zeros((LINES, OUTPUTS, INPUTS))),
+    "weights_other.h5": ("my_weights", np.ones((LINES, OUTPUTS, INPUTS))),
+    "weights_indefinite.h5": ("weight_matrices", np.tile(INDEFINITE, (LINES, 1, 1))),
+}
+
+
+@damaged(*WEIGHTS)
+def weights(_, path):
+    name, values = WEIGHTS[path.name]
+    with h5py.File(path, "w") as f:
+        f[name] = values
 
 
 def copy(files, name, into):
