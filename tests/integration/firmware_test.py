@@ -76,6 +76,11 @@ class Firmware(unittest.TestCase):
             node.wait()
             node.stdout.close()
 
+    def succeed(self, *words):
+        done = run(*words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done
+
     def start(self, *command):
         """A node whose first lines contain its port."""
         node = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -109,10 +114,8 @@ class Firmware(unittest.TestCase):
         between(process)
         _, errors = process.communicate(timeout=50)
         self.assertEqual(process.returncode, 0, errors)
-        done = run("frf", log, "-o", frf)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        done = run("--json", "fit", frf, "-o", model, "--rigid-body", "none")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("frf", log, "-o", frf)
+        done = self.succeed("--json", "fit", frf, "-o", model, "--rigid-body", "none")
         found_hz = [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
         self.example.check_modes(self, found_hz)
         return found_hz

@@ -44,6 +44,11 @@ class Plugin(unittest.TestCase):
             peer.wait()
             peer.stdout.close()
 
+    def succeed(self, *words):
+        done = run(*words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done
+
     def peer(self, *options, stage=STAGE):
         peer = subprocess.Popen([PEER, stage, *map(str, options)], stdout=subprocess.PIPE, text=True)
         self.peers.append(peer)
@@ -61,16 +66,12 @@ class Plugin(unittest.TestCase):
 
     def test_measures_the_small_stage(self):
         log = self.work / "good.slog"
-        done = run("run", self.udp("good", self.peer()), "-o", log)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("run", self.udp("good", self.peer()), "-o", log)
         frf, model = self.work / "frf.h5", self.work / "model.json"
-        done = run("frf", log, "-o", frf)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        done = run("--json", "fit", frf, "-o", model, "--rigid-body", "suspension:0.4:0.5", "--direct-term", "full")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("frf", log, "-o", frf)
+        done = self.succeed("--json", "fit", frf, "-o", model, "--rigid-body", "suspension:0.4:0.5", "--direct-term", "full")
         modes = [mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"]]
-        truth = run("identify", EXPERIMENT, "-o", self.work / "truth")
-        self.assertEqual(truth.returncode, 0, truth.stderr)
+        self.succeed("identify", EXPERIMENT, "-o", self.work / "truth")
         true_modes = json.loads((self.work / "truth/summary.json").read_text())["truth"]["modes"]
         flexible = [m["true_frequency_hz"] for m in true_modes if m["true_frequency_hz"] > 16]
         self.assertGreaterEqual(len(flexible), 4)
@@ -87,8 +88,7 @@ class Plugin(unittest.TestCase):
         self.peers[0].kill()
         self.peers[0].wait()
         self.peer(0, port)
-        done = run("run", experiment, "-o", log, "--resume")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("run", experiment, "-o", log, "--resume")
 
     # The stage of the stop matrix: 20 kg, 650 N, a window of 200 um (docs/stops.md).
     AXIS = """
@@ -146,7 +146,7 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
             time.sleep(0.01)
 
     def check_log(self, log, marked):
-        self.assertEqual(run("log", "verify", log).returncode, 0)
+        self.succeed("log", "verify", log)
         done = run("log", "info", log, "--json")
         self.assertEqual([r["health"]["marked"] for r in json.loads(done.stdout)["runs"]], [marked])
 
@@ -156,7 +156,7 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         host.kill()
         host.communicate()
         self.device_rests()
-        self.assertEqual(run("log", "recover", log, "-o", self.work / "axis_recovered.slog").returncode, 0)
+        self.succeed("log", "recover", log, "-o", self.work / "axis_recovered.slog")
 
     def test_a_cut_wire_ends_the_run_and_the_device_stops(self):
         host, log = self.axis(cycles=20_000)
@@ -202,17 +202,13 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         file, stage = self.without_plant("real", self.peer(), stuck_sensor_s="between_runs: hold\nstuck_sensor_s")
         self.assertNotIn("plant:", stage.read_text())
         for checked in (file, stage):
-            done = run("config", "check", checked)
-            self.assertEqual(done.returncode, 0, done.stderr)
+            done = self.succeed("config", "check", checked)
             self.assertIn("stability of the loop is not tested: there is no 'plant'", done.stderr)
-        done = run("design", file, "-o", self.work / "blind.h5")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.succeed("design", file, "-o", self.work / "blind.h5")
         self.assertIn("signals are not predicted: the stage file has no 'plant'", done.stderr)
         log, frf = self.work / "real.slog", self.work / "real.h5"
-        done = run("run", file, "-o", log)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        done = run("--json", "frf", log, "-o", frf, "--stage", stage)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("run", file, "-o", log)
+        done = self.succeed("--json", "frf", log, "-o", frf, "--stage", stage)
         findings = json.loads(done.stdout)["health"]
         self.assertEqual([f for f in findings if f["severity"] in ("fault", "doubt")], [])
         self.assertTrue(any("geometry and mass" in f["remedy"] for f in findings), findings)
@@ -220,14 +216,12 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         designed = self.work / "designed.yaml"
         designed.write_text(file.read_text().replace(
             "level: {rms_n: 1.0}", "level: {limits: {prior: real.h5}}\n  crest_iterations: 20"))
-        done = run("design", designed, "-o", self.work / "designed.h5")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.succeed("design", designed, "-o", self.work / "designed.h5")
         self.assertNotIn("not tested", done.stderr)
         done = run("run", file, "-o", self.work / "sim.slog", "--backend", "sim")
         self.assertEqual(done.returncode, 2)
         self.assertIn("has no group 'plant', which is the simulated stage", done.stderr)
-        done = run("identify", file, "-o", self.work / "all")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("identify", file, "-o", self.work / "all")
         self.assertNotIn("truth", json.loads((self.work / "all/summary.json").read_text()))
 
     def test_is_supervised_and_shown_like_any_other(self):

@@ -117,10 +117,15 @@ class ZeroMq(unittest.TestCase):
             self.assertRegex(err, text)
         self.assertEqual(len(said), int(code != 0) + warnings, err)
         if (WORK / "run.slog").exists():
-            self.assertEqual(self.call("log", "verify", "run.slog").returncode, 0)
+            self.succeed("log", "verify", "run.slog")
 
     def call(self, *words):
         return subprocess.run([PROGRAM, *words], cwd=WORK, capture_output=True, text=True, timeout=120)
+
+    def succeed(self, *words):
+        done = self.call(*words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done
 
     def test_the_modes_are_those_of_the_stage(self):
         self.node()
@@ -132,16 +137,15 @@ class ZeroMq(unittest.TestCase):
         (WORK / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
         self.node("forward_node")
         self.check_modes(warnings=1)  # that the loop of the node is not tested
-        self.assertEqual(self.call("log", "convert", "run.slog", "-o", "run.csv").returncode, 0)
+        self.succeed("log", "convert", "run.slog", "-o", "run.csv")
         with open(WORK / "run.csv", newline="") as file:
             forces = [float(row["actuator z1 [N]"]) for row in csv.DictReader(file)]
         self.assertAlmostEqual(sum(forces) / len(forces), 0.05, delta=0.01)
 
     def check_modes(self, warnings=0):
         self.ends(self.start("experiment"), 0, warnings=warnings)
-        self.assertEqual(self.call("frf", "run.slog", "-o", "frf.h5").returncode, 0)
-        done = self.call("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.succeed("frf", "run.slog", "-o", "frf.h5")
+        done = self.succeed("--json", "fit", "frf.h5", "-o", "model.json", "--rigid-body", "none")
         found = sorted(mode["natural_frequency_hz"] for mode in json.loads(done.stdout)["modes"])
         self.example.check_modes(self, found)
 
@@ -203,8 +207,7 @@ class ZeroMq(unittest.TestCase):
         (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
         self.node()
         self.ends(self.start("long"), 0)
-        quiet = self.call("log", "convert", "run.slog", "-o", "quiet.csv")
-        self.assertEqual(quiet.returncode, 0, quiet.stderr)
+        self.succeed("log", "convert", "run.slog", "-o", "quiet.csv")
         node = self.node_again("slow_node")
         host = self.start("long")
         self.wait_for(node, MEASURING)
@@ -231,8 +234,7 @@ class ZeroMq(unittest.TestCase):
         self.assertIsNone(host.poll(), "the run lasts longer than the attack")
         peer.close()
         self.ends(host, 0)
-        loud = self.call("log", "convert", "run.slog", "-o", "loud.csv")
-        self.assertEqual(loud.returncode, 0, loud.stderr)
+        self.succeed("log", "convert", "run.slog", "-o", "loud.csv")
         self.assertEqual((WORK / "quiet.csv").read_bytes(), (WORK / "loud.csv").read_bytes(), "a sample differs")
 
     def test_a_thousand_idle_and_a_hundred_slow_clients_change_nothing(self):

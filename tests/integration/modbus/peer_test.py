@@ -83,12 +83,16 @@ class ModbusTest(unittest.TestCase):
         self.bench = Bench(PROGRAM, SOURCE, folder)
         self.addCleanup(self.bench.__exit__)
 
+    def succeed(self, *words):
+        done = self.bench.run(*words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done
+
     def frf(self, stage, name, *options):
         log, frf = self.bench.work / f'{name}.slog', self.bench.work / f'{name}.h5'
         for command in (('run', self.bench.experiment(stage, name), '-o', log, '--pace', 0, *options),
                         ('frf', log, '-o', frf)):
-            done = self.bench.run(*command)
-            self.assertEqual(done.returncode, 0, done.stderr)
+            self.succeed(*command)
         with h5py.File(frf) as file:
             return file['response'][:], file['noise_variance'][:]
 
@@ -167,8 +171,7 @@ class ModbusTest(unittest.TestCase):
         while subprocess.run(['mbpoll', '-m', 'tcp', '-p', str(port), '-1', '127.0.0.1'],
                              capture_output=True).returncode != 0:
             pass
-        done = self.bench.run('run', experiment, '-o', log, '--pace', 0, '--resume')
-        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.succeed('run', experiment, '-o', log, '--pace', 0, '--resume')
         self.assertIn('3 of 3 runs complete (1 of them before)', done.stdout)
 
     def test_mbpoll_reads_our_map(self):
@@ -244,8 +247,7 @@ class ModbusTest(unittest.TestCase):
             meanwhile(run)
             out, err = run.communicate(timeout=100)
             self.assertEqual(run.returncode, 0, out + err)
-            done = self.bench.run('log', 'convert', self.bench.work / f'{name}.slog', '-o', self.bench.work / f'{name}.csv')
-            self.assertEqual(done.returncode, 0, done.stderr)
+            self.succeed('log', 'convert', self.bench.work / f'{name}.slog', '-o', self.bench.work / f'{name}.csv')
             return (self.bench.work / f'{name}.csv').read_bytes()
 
         def attack(run):
