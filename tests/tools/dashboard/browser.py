@@ -18,8 +18,31 @@ FLAGS = ("--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --
          "--remote-debugging-pipe").split()
 
 
+failures = []
+
+
+def expect(condition, message):
+    if not condition:
+        failures.append(message)
+
+
+def verdict():
+    """Tells what was not as expected; returns the exit code."""
+    for failure in failures[:30]:
+        print("FAILED:", failure)
+    if len(failures) > 30:
+        print(f"and {len(failures) - 30} more")
+    return 1 if failures else 0
+
+
 def find_browser():
     return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+def skipped(what):
+    """The exit code where a check lacks what it needs."""
+    print(what)
+    return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
 
 
 class Browser:
@@ -64,7 +87,7 @@ class Browser:
         method, more = message.get("method"), message.get("params", {})
         if method == "Runtime.exceptionThrown":
             self.problems.append("uncaught: " + json.dumps(more["exceptionDetails"])[:400])
-        if method == "Runtime.consoleAPICalled" and more["type"] in ("error", "warning", "assert"):
+        if method == "Runtime.consoleAPICalled":
             self.problems.append("console: " + json.dumps(more["args"])[:400])
         if method == "Log.entryAdded" and more["entry"]["level"] in ("error", "warning"):
             self.problems.append("log: " + more["entry"]["text"] + " " + more["entry"].get("url", ""))

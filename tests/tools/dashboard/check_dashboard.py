@@ -8,13 +8,12 @@ by its button, with the keyboard.
 Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is not set, or no h5py.
 """
 
-import os
 import pathlib
 import shutil
 import subprocess
 import sys
 
-from browser import Browser, find_browser
+from browser import Browser, expect, find_browser, skipped, verdict
 from running_program import RunningProgram, with_experiment
 
 try:
@@ -24,13 +23,6 @@ except ImportError:
     h5py = None
 
 PACE = 0.2  # of a stage at 2 kHz
-
-failures = []
-
-
-def expect(condition, message):
-    if not condition:
-        failures.append(message)
 
 
 def start(program, configs, work, name, pace, **numbers):
@@ -168,15 +160,12 @@ def stop_one(program, configs, work):
 def main():
     program, configs, work = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
     if find_browser() is None or h5py is None:
-        print("no Chromium or no h5py found; install chromium, python3-h5py")
-        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
+        return skipped("no Chromium or no h5py found; install chromium, python3-h5py")
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     watch_one(program, configs, work)
     stop_one(program, configs, work)
-    for failure in failures:
-        print("FAILED:", failure)
-    return 1 if failures else 0
+    return verdict()
 
 
 if __name__ == "__main__":

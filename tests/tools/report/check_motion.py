@@ -11,26 +11,15 @@ STAGEID_REQUIRE_BROWSER is not set.
 import subprocess
 import sys
 
-from page_checks import expect, run  # must be first: it locates the browser
-
-from browser import Browser, find_browser
+from page_checks import expect, open_page, run
 
 SHAPES = "window.stageidReport.shapes"
-
-
-def open_page(page, still=False):
-    browser = Browser(find_browser())
-    browser.resize(1280, 1000)
-    browser.call("Emulation.setEmulatedMedia",
-                 features=[{"name": "prefers-reduced-motion", "value": "reduce" if still else "no-preference"}])
-    browser.call("Page.navigate", url=f"file://{page}")
-    expect(browser.wait_for("window.stageidReport.shapes.figure !== null && document.readyState === 'complete'"), "the page does not come up")
-    browser.evaluate("document.getElementById('shape-plot').scrollIntoView({block: 'center'})")
-    return browser
+SHOW = "document.getElementById('shape-plot').scrollIntoView({block: 'center'})"
 
 
 def check_motion(page):
     browser = open_page(page)
+    browser.evaluate(SHOW)
     expect(browser.wait_for(f"{SHAPES}.frames > 5"), "the mode shape does not move")
     rate = browser.evaluate(f"""new Promise((done) => {{ const first = {SHAPES}.frames, start = performance.now();
         setTimeout(() => done(1000 * ({SHAPES}.frames - first) / (performance.now() - start)), 1500); }})""")
@@ -46,6 +35,7 @@ def check_motion(page):
 
 def check_stillness(page):
     browser = open_page(page, still=True)
+    browser.evaluate(SHOW)
     browser.evaluate("(async () => { for (let i = 0; i < 10; ++i) await new Promise(requestAnimationFrame); })()")
     expect(browser.evaluate(f"{SHAPES}.frames") == 0, "it moves although the reader wants no motion")
     browser.evaluate("document.getElementById('shape-play').click()")
@@ -55,10 +45,7 @@ def check_stillness(page):
 
 def check_keyboard(page):
     """The first stop of the Tab key skips to the plots; every control and figure has a name that can be read out."""
-    browser = Browser(find_browser())
-    browser.resize(1280, 1000)
-    browser.call("Page.navigate", url=f"file://{page}")
-    expect(browser.wait_for("document.readyState === 'complete' && window.stageidReport.shapes.figure !== null"), "the page does not come up")
+    browser = open_page(page)
     browser.press("Tab")
     expect(browser.evaluate("document.activeElement.className") == "skip", "the first stop is not the way past the head")
     browser.press("Enter")

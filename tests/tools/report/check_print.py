@@ -12,9 +12,7 @@ import subprocess
 import sys
 import zlib
 
-from page_checks import expect, run  # must be first: it locates the browser
-
-from browser import Browser, find_browser
+from page_checks import expect, open_page, run
 
 LEAST_SEGMENTS = 4 * 13 * 100  # of the curves of the matrix
 MOST_PAGES = {"full": 8, "full_compared": 10}
@@ -43,10 +41,7 @@ def line_segments(pdf):
 
 
 def check_paper(page, kind, paper, work):
-    browser = Browser(find_browser())
-    browser.resize(1280, 1000)
-    browser.call("Page.navigate", url=f"file://{page}")
-    expect(browser.wait_for("document.readyState === 'complete' && window.stageidReport.shapes.figure !== null"), "the page does not come up")
+    browser = open_page(page)
     pdf = printed(browser, paper)
     (work / f"{kind}_{paper[0]}.pdf").write_bytes(pdf)
     pages, drawn = page_count(pdf), line_segments(printed(browser, paper, "1"))

@@ -2,77 +2,36 @@
 """Opens report pages in headless Chromium and compares what the page finds in itself with what was
 written into it.
 
-usage: check_report.py --sample REPORT_SAMPLE --work DIRECTORY [--kind full|full_compared|small|compared|bare|hostile]
+    check_report.py --sample REPORT_SAMPLE --work DIRECTORY [--kind full|full_compared|small|compared|bare|hostile]
 
 Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is not set.
 """
 
-import argparse
+import base64
 import json
 import math
-import os
-import pathlib
-import re
-import shutil
-import struct
 import subprocess
 import sys
-import tempfile
-import zlib
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-FLAGS = ("--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-         "--disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars "
-         "--enable-logging=stderr --virtual-time-budget=4000").split()
+from page_checks import expect, open_page, run
+
+COLOURS = """(async () => { const picture = new Image(); picture.src = 'data:image/png;base64,%s'; await picture.decode();
+  const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d'); context.drawImage(picture, 0, 0);
+  return new Set(new Uint32Array(context.getImageData(0, 0, picture.width, picture.height).data.buffer)).size; })()"""
 LARGEST_PAGE = {"full": 4_000_000, "full_compared": 4_800_000}  # bytes, of 4 x 13 x 4000
-
-failures = []
-
-
-def expect(condition, message):
-    if not condition:
-        failures.append(message)
-
 
 def near(got, want, tolerance, message):
     expect(isinstance(got, (int, float)) and math.isclose(got, want, rel_tol=tolerance, abs_tol=0.0),
            f"{message}: {got!r} instead of {want!r} (tolerance {tolerance:g})")
 
 
-def browse(browser, address, *flags):
-    """Runs the browser with a profile of its own; returns stdout. Console messages are failures."""
-    with tempfile.TemporaryDirectory() as profile:
-        done = subprocess.run([browser, *FLAGS, f"--user-data-dir={profile}", *flags, address],
-                              capture_output=True, text=True, timeout=900, check=False)
-    expect(done.returncode == 0, f"the browser ended with {done.returncode}: {done.stderr[-500:]}")
-    for line in done.stderr.splitlines():
-        expect("CONSOLE" not in line, f"console: {line}")
-    return done.stdout
-
-
-# A window is never narrower than 500 pixels; a frame is. The page in it reports to the one around it.
-FRAME = r"""<!DOCTYPE html><meta charset="utf-8"><body><script>
-addEventListener('message', function (event) {
-  var out = document.createElement('script');
-  out.type = 'application/json';
-  out.id = 'selftest';
-  out.textContent = JSON.stringify(event.data).replace(/</g, '\\u003c');
-  document.body.appendChild(out);
-});
-</script><iframe src="report.html#selftest" style="border:0;width:%dpx;height:1000px"></iframe></body>
-"""
-
-
-def findings(browser, page, width):
+def findings(page, width):
     """What the page says of itself when it is `width` pixels wide."""
-    frame = page.with_name("frame.html")
-    frame.write_text(FRAME % width, encoding="utf-8")
-    dom = browse(browser, f"file://{frame}", "--window-size=1400,1100", "--dump-dom")
-    match = re.search(r'<script type="application/json" id="selftest">(.*?)</script>', dom, re.DOTALL)
-    if not match:
-        failures.append("the page did not finish its self-check")
-        return None
-    return json.loads(match.group(1))
+    browser = open_page(page, width, "#selftest", "document.getElementById('selftest') !== null")
+    found = browser.evaluate("JSON.parse(document.getElementById('selftest').textContent)")
+    expect(browser.problems == [], f"console: {browser.problems}")
+    browser.close()
+    return found
 
 
 def check_arrays(found, expected):
@@ -84,7 +43,7 @@ def check_arrays(found, expected):
     for name, want in expected["arrays"].items():
         got = found["arrays"].get(name)
         if got is None:
-            failures.append(f"the page has no {name}")
+            expect(False, f"the page has no {name}")
             continue
         tolerance = {**exact, **coarse}[name]
         expect(got["count"] == want["count"], f"{name}: {got['count']} numbers instead of {want['count']}")
@@ -274,91 +233,30 @@ def check_page(found, expected, width):
         expect(found["rows"]["modes"] == expected["modes"], f"{found['rows']['modes']} modes in the table")
 
 
-def colours(png, enough):
-    """Distinct colours of an 8-bit RGB or RGBA PNG (PNG specification, section 9: filters), from the
-    top down until there are enough."""
-    data = png.read_bytes()
-    place, packed, width, kind = 8, b"", 0, 0
-    while place < len(data):
-        size, name = struct.unpack(">I4s", data[place:place + 8])
-        body = data[place + 8:place + 8 + size]
-        if name == b"IHDR":
-            width, _, _, kind = struct.unpack(">IIBB", body[:10])
-        elif name == b"IDAT":
-            packed += body
-        place += 12 + size
-    pixel = 4 if kind == 6 else 3
-    raw, stride, above, seen = zlib.decompress(packed), width * pixel, bytearray(width * pixel), set()
-    for start in range(0, len(raw), stride + 1):
-        line = bytearray(raw[start + 1:start + 1 + stride])
-        unfilter(raw[start], line, above, pixel)
-        if (start // (stride + 1)) % 4 == 0:
-            seen.update(bytes(line[i:i + 3]) for i in range(0, stride, pixel))
-        if len(seen) > enough:
-            break
-        above = line
-    return seen
+def check_screenshot(page, width, picture):
+    browser = open_page(page, width)
+    browser.screenshot(picture)
+    colours = browser.evaluate(COLOURS % base64.b64encode(picture.read_bytes()).decode())
+    expect(colours > 4000, f"the screenshot at {width} pixels has only {colours} colours: {picture}")
+    browser.close()
 
 
-def unfilter(kind, line, above, pixel):
-    for i in range(len(line)) if kind else ():
-        left = line[i - pixel] if i >= pixel else 0
-        corner = above[i - pixel] if i >= pixel else 0
-        if kind == 1:
-            guess = left
-        elif kind == 2:
-            guess = above[i]
-        elif kind == 3:
-            guess = (left + above[i]) // 2
-        else:
-            estimate = left + above[i] - corner
-            guess = min((left, above[i], corner), key=lambda v: abs(estimate - v))
-        line[i] = (line[i] + guess) & 255
-
-
-def check_screenshot(browser, page, width, picture, *flags):
-    browse(browser, f"file://{page}", f"--window-size={width},1400", f"--screenshot={picture}", *flags)
-    if not picture.exists():
-        failures.append(f"no screenshot at {width} pixels")
-        return
-    expect(len(colours(picture, 400)) > 400, f"the screenshot at {width} pixels is empty: {picture}")
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sample", required=True, help="program that writes the page and what to expect")
-    parser.add_argument("--work", required=True, type=pathlib.Path)
-    parser.add_argument("--kind", default="full")
-    options = parser.parse_args()
-
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
-        print("no Chromium found; install it with: apt-get install --no-install-recommends chromium")
-        return 1 if os.environ.get("STAGEID_REQUIRE_BROWSER") else 77
-
-    work = options.work.resolve() / options.kind
-    subprocess.run([options.sample, work, options.kind], check=True)
+def checks(sample, work, kind):
+    work /= kind
+    subprocess.run([sample, work, kind], check=True)
     page = work / "report.html"
     expected = json.loads((work / "expected.json").read_text(encoding="utf-8"))
-    if options.kind in LARGEST_PAGE:
+    if kind in LARGEST_PAGE:
         expect(expected["panels"] * expected["lines"] == 4 * 13 * 4000, "the page is not of full size")
-        expect(page.stat().st_size < LARGEST_PAGE[options.kind], f"the page has {page.stat().st_size} bytes")
+        expect(page.stat().st_size < LARGEST_PAGE[kind], f"the page has {page.stat().st_size} bytes")
     for width in (1280, 390):
-        found = findings(browser, page, width)
-        if found is None:
-            continue
+        found = findings(page, width)
         check_page(found, expected, width)
-        print(f"{options.kind}, {width} pixels: {page.stat().st_size} bytes, sections {found['sections']}, "
+        print(f"{kind}, {width} pixels: {page.stat().st_size} bytes, sections {found['sections']}, "
               f"built after {found['ready_ms']} ms, of them {found['script_ms']} ms our script")
-    if options.kind == "full":
-        check_screenshot(browser, page, 1280, work / "report_1280.png")
-        check_screenshot(browser, page, 390, work / "report_390.png")
-    for failure in failures[:30]:
-        print("FAILED:", failure)
-    if len(failures) > 30:
-        print(f"and {len(failures) - 30} more")
-    return 1 if failures else 0
+        if kind == "full":
+            check_screenshot(page, width, work / f"report_{width}.png")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run(__doc__, checks, kind="full"))
