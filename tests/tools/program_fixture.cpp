@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
+
+#include "acquisition/files/input_files.hpp"
 
 namespace stageid::test {
 namespace {
@@ -15,13 +16,7 @@ const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR)
 
 }  // namespace
 
-std::string read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw std::runtime_error(file.string() + ": cannot be read");
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
+std::string read_bytes(const std::filesystem::path& file) { return read_whole_file(file); }
 
 void write_bytes(const std::filesystem::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
@@ -63,9 +58,19 @@ ProgramResult ProgramTest::run(const std::vector<std::string>& arguments,
 }
 
 ProgramResult ProgramTest::succeed(const std::vector<std::string>& arguments) const {
-  const ProgramResult result = run(arguments);
-  EXPECT_EQ(result.exit_code, 0) << result.err << result.out;
+  return ends(arguments, 0);
+}
+
+ProgramResult ProgramTest::ends(const std::vector<std::string>& arguments, int exit_code,
+                                const std::string& text, ProgramOptions options) const {
+  const ProgramResult result = run(arguments, options);
+  EXPECT_EQ(result.exit_code, exit_code) << result.err << result.out;
+  EXPECT_THAT(result.err, testing::HasSubstr(text));
   return result;
+}
+
+nlohmann::json ProgramTest::log_info(const std::string& log) const {
+  return nlohmann::json::parse(succeed({"log", "info", name(log), "--json"}).out);
 }
 
 void ProgramTest::fail(const std::vector<std::string>& arguments, int exit_code,

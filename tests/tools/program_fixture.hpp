@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,11 @@ class ProgramTest : public testing::Test {
   ProgramResult run(const std::vector<std::string>& arguments, ProgramOptions options = {}) const;
   /// Runs and expects exit code 0.
   ProgramResult succeed(const std::vector<std::string>& arguments) const;
+  /// Runs and expects `exit_code`, and `text` on stderr.
+  ProgramResult ends(const std::vector<std::string>& arguments, int exit_code,
+                     const std::string& text = "", ProgramOptions options = {}) const;
+  /// What `stageid log info --json` tells of a log.
+  nlohmann::json log_info(const std::string& log) const;
   /// Expects `exit_code`, one line on stderr "stageid: ..." that contains `text`, nothing on stdout,
   /// and that no file appeared or changed.
   void fail(const std::vector<std::string>& arguments, int exit_code, const std::string& text,

@@ -47,8 +47,7 @@ TEST_F(CommandLine, HelpIsThatOfTheCommand) {
 }
 
 TEST_F(CommandLine, WithoutArgumentsThereAreThreeThingsToTry) {
-  const ProgramResult shown = run({});
-  EXPECT_EQ(shown.exit_code, 0);
+  const ProgramResult shown = succeed({});
   for (const char* start :
        {"\n  stageid identify ", "\n  stageid import ", "\n  stageid config schema"})
     EXPECT_THAT(shown.out, testing::HasSubstr(start));

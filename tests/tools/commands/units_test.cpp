@@ -48,8 +48,7 @@ TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
   EXPECT_THAT(designed.out, testing::ContainsRegex("a1 +A "));
   EXPECT_THAT(designed.out, testing::ContainsRegex("b1 +m/s\\^2 "));
 
-  const ProgramResult result = run({"identify", name("units.yaml"), "-o", name("all")});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  succeed({"identify", name("units.yaml"), "-o", name("all")});
   const FrfEstimate frf = read_frf(at("all/frf.h5"));
   EXPECT_EQ(frf.inputs.units, (std::vector<std::string>{"A", "A", "A"}));
   EXPECT_EQ(frf.outputs.units, (std::vector<std::string>{"m/s^2", "m/s^2"}));
@@ -77,11 +76,9 @@ TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
 TEST_F(Units, StandInTheMessagesOfALimit) {
   const std::string plan = replaced(read_bytes(at("units.yaml")), "rms: 0.08", "rms: 3");
   write_bytes(at("strong.yaml"), plan);
-  const ProgramResult refused = run({"design", name("strong.yaml"), "-o", name("e.h5")});
-  EXPECT_EQ(refused.exit_code, 2);
+  const ProgramResult refused = ends({"design", name("strong.yaml"), "-o", name("e.h5")}, 2);
   EXPECT_THAT(refused.err, testing::ContainsRegex("would be [0-9.]+ A, limit 3.5 A"));
-  const ProgramResult stopped = run({"run", name("strong.yaml"), "-o", name("strong.slog")});
-  EXPECT_EQ(stopped.exit_code, 4);
+  const ProgramResult stopped = ends({"run", name("strong.yaml"), "-o", name("strong.slog")}, 4);
   EXPECT_THAT(stopped.err, testing::ContainsRegex("[0-9.]+ (A|m/s\\^2|A/s), limit "));
 }
 

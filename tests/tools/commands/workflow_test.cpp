@@ -23,17 +23,25 @@ namespace test_workflow {
 using nlohmann::json;
 using testing::HasSubstr;
 
-class Workflow : public ProgramTest {};
+class Workflow : public ProgramTest {
+ protected:
+  /// Runs a stage of that name that has a fault, into a log of that name. @returns what is told of the log
+  json run_with_fault(const std::string& file, const std::string& fault, int exit_code,
+                      const std::string& cause, const std::string& more = "",
+                      const std::string& keys = "") const {
+    const std::string config =
+        stage(file + ".yaml", "noise:", keys + "faults: [{" + fault + "}]\nnoise:");
+    EXPECT_THAT(ends({"run", config, "-o", name(file + ".slog")}, exit_code, cause).err,
+                HasSubstr(more));
+    return log_info(file + ".slog");
+  }
+};
 
 constexpr std::array kOutputs = {"excitation.h5", "run.slog",   "frf.h5",   "frf_validation.h5",
                                  "modes.json",    "model.json", "model.h5", "model.csv",
                                  "summary.json",  "report.html"};
 
-TEST_F(Workflow, ANewcomerIsToldThreeThingsToTry) {
-  const ProgramResult result = succeed({});
-  EXPECT_THAT(result.out, HasSubstr("stageid identify"));
-  EXPECT_THAT(result.out, HasSubstr("stageid import"));
-  EXPECT_THAT(result.out, HasSubstr("stageid config schema"));
+TEST_F(Workflow, HelpAndVersionAreTold) {
   EXPECT_THAT(succeed({"--help"}).out, HasSubstr("import"));
   EXPECT_THAT(succeed({"--version"}).out, testing::MatchesRegex("stageid [0-9.]+\n"));
   EXPECT_THAT(succeed({"fit", "--help"}).out, HasSubstr("--weighting"));
@@ -68,9 +76,7 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
   const std::vector<std::string> fit = {
       "fit",          name("all/frf.h5"),  "-o", name("few.json"), "--modes", "1",
       "--rigid-body", "suspension:0.4:0.5"};
-  const ProgramResult fitted = run(fit);
-  EXPECT_EQ(fitted.exit_code, 3);
-  EXPECT_THAT(fitted.err, HasSubstr("not to be trusted: the residual is "));
+  const ProgramResult fitted = ends(fit, 3, "not to be trusted: the residual is ");
   EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
   std::vector<std::string> as_json = fit;
   as_json.emplace_back("--json");
@@ -79,15 +85,13 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
   EXPECT_EQ(told["status"], "unexplained");
 
   const ProgramResult validated =
-      run({"validate", name("few.json"), name("all/frf_validation.h5")});
-  EXPECT_EQ(validated.exit_code, 3);
+      ends({"validate", name("few.json"), name("all/frf_validation.h5")}, 3);
   EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
-  const ProgramResult reported = run({"report", name("few.json"), name("all/frf.h5"),
-                                      name("all/frf_validation.h5"), "-o", name("few.html")});
-  EXPECT_EQ(reported.exit_code, 3);
-  EXPECT_THAT(reported.err, HasSubstr("not to be trusted: the residual is "));
+  ends({"report", name("few.json"), name("all/frf.h5"), name("all/frf_validation.h5"), "-o",
+        name("few.html")},
+       3, "not to be trusted: the residual is ");
   EXPECT_TRUE(std::filesystem::exists(at("few.html")));
-  EXPECT_EQ(run({"report", name("all"), "-o", name("all.html")}).exit_code, 0);
+  succeed({"report", name("all"), "-o", name("all.html")});
   const ProgramResult sound =
       succeed({"validate", name("all/model.json"), name("all/frf_validation.h5")});
   EXPECT_THAT(sound.out, HasSubstr("verdict: trustworthy; noise and known distortion explain"));
@@ -97,9 +101,8 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
 TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
   const std::string config =
       stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1e15\n  plate:");
-  const ProgramResult result = run({"identify", config, "-o", name("cubic")});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("weighting: total_variance; the plant is nonlinear"));
+  ends({"identify", config, "-o", name("cubic")}, 0,
+       "weighting: total_variance; the plant is nonlinear");
   const json summary = json::parse(read_bytes(at("cubic/summary.json")));
   EXPECT_EQ(summary["fit"]["weighting"], "total_variance");
   EXPECT_EQ(summary["truth"]["extra_modes_hz"].size(), 0U);
@@ -134,7 +137,7 @@ TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
 TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
   succeed({"identify", config_, "-o", name("all")});
   const auto before = snapshot(at("all"));
-  EXPECT_EQ(run({"identify", config_, "-o", name("all")}).exit_code, 2);
+  ends({"identify", config_, "-o", name("all")}, 2);
   const ProgramResult again = succeed({"identify", config_, "-o", name("all"), "--resume"});
   for (const char* step : {"design", "run", "frf", "fit"})
     EXPECT_THAT(again.err, testing::ContainsRegex(std::string(step) + " .*up to date"));
@@ -159,13 +162,11 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
   ProgramOptions interrupt;
   interrupt.interrupt_after_file = at("cut.slog");
   interrupt.interrupt_after_s = 0.5;
-  const ProgramResult first =
-      run({"run", config, "-o", name("cut.slog"), "--pace", "0.1"}, interrupt);
-  EXPECT_EQ(first.exit_code, 130) << first.err;
-  EXPECT_THAT(first.err, HasSubstr("continue with --resume"));
+  ends({"run", config, "-o", name("cut.slog"), "--pace", "0.1"}, 130, "continue with --resume",
+       interrupt);
   ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
   succeed({"log", "verify", name("cut.slog")});
-  const json info = json::parse(succeed({"log", "info", name("cut.slog"), "--json"}).out);
+  const json info = log_info("cut.slog");
   for (const json& cut : info["runs"]) EXPECT_FALSE(cut["complete"]);
   succeed({"run", config, "-o", name("cut.slog"), "--resume"});
   succeed({"run", config, "-o", name("whole.slog")});
@@ -179,33 +180,23 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
 
 TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
-  const ProgramResult result = run({"run", loud, "-o", name("loud.slog")});
-  EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("|u|"));
-  const json info = json::parse(succeed({"log", "info", name("loud.slog"), "--json"}).out);
+  ends({"run", loud, "-o", name("loud.slog")}, 4, "|u|");
+  const json info = log_info("loud.slog");
   ASSERT_EQ(info["runs"].size(), 1U);
   EXPECT_FALSE(info["runs"][0]["complete"]);
   EXPECT_GT(info["runs"][0]["samples"], 0);
 }
 
 TEST_F(Workflow, AnInterlockEndsTheRunWithCodeOne) {
-  const std::string config =
-      stage("lock.yaml", "noise:", "faults: [{kind: interlock, from_cycle: 700, run: 1}]\nnoise:");
-  const ProgramResult result = run({"run", config, "-o", name("lock.slog")});
-  EXPECT_EQ(result.exit_code, 1) << result.err;
-  const json info = json::parse(succeed({"log", "info", name("lock.slog"), "--json"}).out);
+  const json info = run_with_fault("lock", "kind: interlock, from_cycle: 700, run: 1", 1, "");
   ASSERT_EQ(info["runs"].size(), 2U);
   EXPECT_TRUE(info["runs"][0]["complete"]);
   EXPECT_FALSE(info["runs"][1]["complete"]);
 }
 
 TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
-  const std::string config =
-      stage("stuck.yaml",
-            "noise:", "faults: [{kind: stuck_sensor, channel: s1, from_cycle: 1700}]\nnoise:");
-  const ProgramResult result = run({"run", config, "-o", name("stuck.slog")});
-  EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("sensor s1: has repeated"));
+  run_with_fault("stuck", "kind: stuck_sensor, channel: s1, from_cycle: 1700", 4,
+                 "sensor s1: has repeated");
 }
 
 TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
@@ -216,14 +207,8 @@ TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
   int number = 0;
   for (const auto& [fault, cause] : cases) {
     const std::string file = "open" + std::to_string(++number);
-    const std::string config =
-        stage(file + ".yaml",
-              "noise:", std::string("faults: [{") + fault + ", from_cycle: 1700}]\nnoise:");
-    const ProgramResult result = run({"run", config, "-o", name(file + ".slog")});
-    EXPECT_EQ(result.exit_code, 4) << result.err;
-    EXPECT_THAT(result.err, HasSubstr(cause));
-    EXPECT_THAT(result.err, HasSubstr("; braked, "));
-    const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
+    const json info =
+        run_with_fault(file, std::string(fault) + ", from_cycle: 1700", 4, cause, "; braked, ");
     EXPECT_GT(info["runs"][0]["health"]["marked"], 0);
     // The applied forces, not the commands of the controller.
     const std::unique_ptr<LogReader> log = open_log(at(file + ".slog"));
@@ -239,13 +224,8 @@ TEST_F(Workflow, AFaultWhileAGoodRunIsRampedDownIsToldAndTheRunIsKept) {
       {"kind: interlock", 1, "reports: fault"}};
   for (const auto& [fault, exit_code, cause] : cases) {
     const std::string file = "landing" + std::to_string(exit_code);
-    const std::string config =
-        stage(file + ".yaml",
-              "noise:", std::string("faults: [{") + fault + ", from_cycle: 2505}]\nnoise:");
-    const ProgramResult result = run({"run", config, "-o", name(file + ".slog")});
-    EXPECT_EQ(result.exit_code, exit_code) << result.err;
-    EXPECT_THAT(result.err, HasSubstr(cause));
-    const json info = json::parse(succeed({"log", "info", name(file + ".slog"), "--json"}).out);
+    const json info =
+        run_with_fault(file, std::string(fault) + ", from_cycle: 2505", exit_code, cause);
     ASSERT_EQ(info["runs"].size(), 1U);
     EXPECT_TRUE(info["runs"][0]["complete"]);
     EXPECT_EQ(info["runs"][0]["samples"], 2500);
@@ -255,23 +235,14 @@ TEST_F(Workflow, AFaultWhileAGoodRunIsRampedDownIsToldAndTheRunIsKept) {
 
 TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
   // Less than half a window: the loop follows it, past a limit of force, and is sound.
-  const std::string config = stage("ramp.yaml", "noise:",
-                                   "ramp_s: 0.01\nfaults: [{kind: sensor_offset, from_cycle: 1700, "
-                                   "value: 4.9e-4}]\nnoise:");
-  const ProgramResult result = run({"run", config, "-o", name("ramp.slog")});
-  EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("|u|"));
-  const json info = json::parse(succeed({"log", "info", name("ramp.slog"), "--json"}).out);
+  const json info = run_with_fault("ramp", "kind: sensor_offset, from_cycle: 1700, value: 4.9e-4",
+                                   4, "|u|", "", "ramp_s: 0.01\n");
   EXPECT_NEAR(info["runs"][0]["health"]["marked"].get<double>(), 21.0, 2.0);
 }
 
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
-  const std::string config = stage(
-      "miss.yaml", "noise:", "faults: [{kind: missed_cycle, from_cycle: 1700, run: 2}]\nnoise:");
-  const ProgramResult result = run({"run", config, "-o", name("miss.slog")});
-  EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_THAT(result.err,
-              HasSubstr("1 cycle is missing, 2 samples are marked as invalid: 'stageid log info'"));
+  run_with_fault("miss", "kind: missed_cycle, from_cycle: 1700, run: 2", 3,
+                 "1 cycle is missing, 2 samples are marked as invalid: 'stageid log info'");
   succeed({"frf", name("miss.slog"), "-o", name("f.h5")});
 }
 
@@ -283,10 +254,8 @@ TEST_F(Workflow, ReplayGivesTheSameLogAndNoticesADifference) {
   succeed({"frf", name("again.slog"), "-o", name("b.h5")});
   EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
   const std::string other = experiment("other.yaml", "rms_n: 1.0", "rms_n: 1.001");
-  const ProgramResult different = run(
-      {"run", other, "-o", name("c.slog"), "--backend", "replay", "--replay", name("run.slog")});
-  EXPECT_EQ(different.exit_code, 3);
-  EXPECT_THAT(different.err, HasSubstr("differ from the recorded ones"));
+  ends({"run", other, "-o", name("c.slog"), "--backend", "replay", "--replay", name("run.slog")}, 3,
+       "differ from the recorded ones");
 }
 
 TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {

@@ -8,6 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/key_suggestion.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tools/config/config_schema.hpp"
 #include "tools/terminal/format_errors.hpp"
 
@@ -62,12 +63,7 @@ Small read(const std::string& text) {
 }
 
 std::string error_of(const std::string& text) {
-  try {
-    read(text);
-  } catch (const FormatError& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_message<FormatError>([&] { read(text); });
 }
 
 TEST(ConfigReader, ReadsEveryKindOfValue) {

@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -80,9 +80,8 @@ TEST(Configs, TheWatchdogOutlastsARepetition) {
 // The file for can-utils and SavvyCAN is what `config dbc` writes for the wafer stage today.
 TEST(Configs, TheDatabaseOfFramesIsOfTheWaferStage) {
   const StageConfig stage = load_stage_config(kConfigs / "stage/wafer_stage_can.yaml");
-  std::ifstream file(std::filesystem::path(STAGEID_SOURCE_DIR) / "docs/wafer_stage_can.dbc");
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  EXPECT_EQ(text, can_dbc(can_layout(stage.can.spec, stage.spec.info), stage.spec.info));
+  EXPECT_EQ(read_whole_file(std::filesystem::path(STAGEID_SOURCE_DIR) / "docs/wafer_stage_can.dbc"),
+            can_dbc(can_layout(stage.can.spec, stage.spec.info), stage.spec.info));
 }
 
 TEST(Configs, TheMainJobHasItsNumbers) {

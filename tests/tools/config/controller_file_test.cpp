@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <fstream>
@@ -14,6 +13,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/health/data_health.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 #include "tools/config/stage_expectation.hpp"
@@ -64,12 +64,8 @@ class ControllerFileTest : public testing::Test {
     return file;
   }
   std::string error_of(const std::string& text) const {
-    try {
-      read_controller_file(YamlDocument::parse("c.yaml", text));
-    } catch (const FormatError& error) {
-      return error.what();
-    }
-    return "";
+    return test::error_message<FormatError>(
+        [&] { read_controller_file(YamlDocument::parse("c.yaml", text)); });
   }
   void write_measured() const {
     FrfEstimate frf;

@@ -6,10 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <sstream>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "hal/simulator/loop_stability.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/stage_expectation.hpp"
@@ -20,12 +21,6 @@ namespace stageid {
 namespace test_loop_controller {
 
 using testing::HasSubstr;
-
-std::string text_of(const std::filesystem::path& file) {
-  std::stringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
 
 const std::filesystem::path kSmall =
     std::filesystem::path(STAGEID_SOURCE_DIR) / "configs/stage/small_stage.yaml";
@@ -54,7 +49,7 @@ class LoopController : public testing::Test {
       : axes_(load_stage_config(kSmall).spec),
         controller_(axes_.controller),
         system_(controller_.realization()) {
-    const std::string text = text_of(kSmall);
+    const std::string text = read_whole_file(kSmall);
     head_ = text.substr(0, text.find("controller:"));
   }
 
@@ -63,12 +58,7 @@ class LoopController : public testing::Test {
     return load_stage_config(directory_ / "stage.yaml");
   }
   std::string error_of(const std::string& controller) const {
-    try {
-      stage(controller);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "";
+    return test::error_message<FormatError>([&] { stage(controller); });
   }
   std::string matrices() const {
     return fmt::format("state_space: {{a: {}, b: {}, c: {}, d: {}}}", row_by_row(system_.a),

@@ -5,7 +5,6 @@
 #include <Eigen/SVD>
 #include <cstdlib>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "acquisition/files/file_error.hpp"

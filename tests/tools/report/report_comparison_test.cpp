@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/support/process/error_message.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 
 namespace stageid::report {
@@ -20,12 +21,8 @@ ReportData small() {
 
 std::string refusal(ReportData own, std::optional<AdditiveModel> model,
                     const std::optional<FrfEstimate>& frf) {
-  try {
-    make_comparison(own, "Tuesday", std::move(model), frf);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_message<std::invalid_argument>(
+      [&] { make_comparison(own, "Tuesday", std::move(model), frf); });
 }
 
 TEST(ReportComparison, RefusesOtherChannelsAndAReportOfNothing) {
@@ -37,7 +34,7 @@ TEST(ReportComparison, RefusesOtherChannelsAndAReportOfNothing) {
   std::swap(frf.outputs.names[0], frf.outputs.names[1]);
   EXPECT_THAT(refusal(own, {}, frf), HasSubstr("Tuesday"));
   EXPECT_THAT(refusal(ReportData(), own.model, {}), HasSubstr("--compare"));
-  EXPECT_EQ(refusal(own, own.model, own.frf), "");
+  EXPECT_EQ(refusal(own, own.model, own.frf), "no error");
 }
 
 TEST(ReportComparison, DrawsAResponseOnlyOnTheLinesOfTheReport) {

@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <sstream>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/tools/report/packed_reader.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/report/report_page.hpp"
@@ -43,12 +43,7 @@ template <typename Change>
 std::string refusal(Change change) {
   ReportData data = small();
   change(data);
-  try {
-    report_page(data);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_message<std::invalid_argument>([&] { report_page(data); });
 }
 
 TEST(Report, HoldsTheResponseAsFloat32ChannelAfterChannel) {
@@ -245,7 +240,7 @@ TEST(Report, RefusesShapesThatDoNotAgree) {
   EXPECT_THAT(refusal([](ReportData& d) { d.frf.reset(); }), HasSubstr("need an frf"));
   EXPECT_THAT(refusal([](ReportData& d) { d.frf->response(0, 0) = std::nan(""); }),
               HasSubstr("not finite"));
-  EXPECT_EQ(refusal([](ReportData&) {}), "");
+  EXPECT_EQ(refusal([](ReportData&) {}), "no error");
 }
 
 TEST(Report, IsWrittenWholeOrNotAtAll) {
@@ -255,10 +250,7 @@ TEST(Report, IsWrittenWholeOrNotAtAll) {
   std::filesystem::create_directories(directory);
   const std::filesystem::path file = directory / "report.html";
   write_report(file, small());
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  EXPECT_EQ(text.str(), report_page(small()));
+  EXPECT_EQ(read_whole_file(file), report_page(small()));
 
   ReportData wrong = small();
   wrong.model_response.resize(1, 1);

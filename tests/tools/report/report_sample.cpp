@@ -1,8 +1,6 @@
 // Writes report.html of a synthetic stage and expected.json, the content that a browser must find.
 //   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>

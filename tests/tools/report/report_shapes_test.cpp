@@ -3,11 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 
 namespace stageid {
@@ -16,15 +15,9 @@ namespace test_report_shapes {
 using nlohmann::json;
 using testing::HasSubstr;
 
-std::string text_of(const std::string& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
-
 TEST(StageGeometry, IsWhatTheStageFileSays) {
   const std::string file = STAGEID_SOURCE_DIR "/configs/stage/wafer_stage.yaml";
-  const StageGeometry geometry = stage_geometry(file, text_of(file));
+  const StageGeometry geometry = stage_geometry(file, read_whole_file(file));
   EXPECT_EQ(geometry.stage, "wafer stage");
   ASSERT_EQ(geometry.actuators.size(), 17u);
   ASSERT_EQ(geometry.sensors.size(), 7u);

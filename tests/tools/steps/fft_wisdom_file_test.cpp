@@ -5,12 +5,12 @@
 
 #include <chrono>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/random_stream.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
@@ -22,13 +22,6 @@ namespace test_fft_wisdom_file {
 using test::expect_error;
 
 constexpr int kLength = 120;  // planned in no time
-
-std::string read(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 void write(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
@@ -65,7 +58,7 @@ TEST_F(FftWisdomFileTest, TheSecondTimeNothingIsPlannedAnew) {
     first = spectrum();
     plans = wisdom.save();
   }
-  const std::string kept = read(file_);
+  const std::string kept = read_whole_file(file_);
   EXPECT_THAT(kept, testing::StartsWith("stageid-fft-wisdom 1 " + plans + "\n(fftw"));
   const auto written = std::filesystem::last_write_time(file_) - std::chrono::hours(1);
   std::filesystem::last_write_time(file_, written);
@@ -74,17 +67,17 @@ TEST_F(FftWisdomFileTest, TheSecondTimeNothingIsPlannedAnew) {
     EXPECT_EQ(spectrum(), first);
     EXPECT_EQ(wisdom.save(), plans);
   }
-  EXPECT_EQ(read(file_), kept);
+  EXPECT_EQ(read_whole_file(file_), kept);
   EXPECT_EQ(std::filesystem::last_write_time(file_), written) << "written again";
 }
 
 TEST_F(FftWisdomFileTest, AnotherLengthIsAdded) {
   const std::string plans = make();
-  const std::string kept = read(file_);
+  const std::string kept = read_whole_file(file_);
   FftWisdomFile wisdom(file_);
   RealDft dft(kLength / 3 * 2);
   EXPECT_NE(wisdom.save(), plans);
-  EXPECT_GT(read(file_).size(), kept.size());
+  EXPECT_GT(read_whole_file(file_).size(), kept.size());
 }
 
 // Without the file, plans depend neither on earlier timings nor on earlier files.
@@ -94,7 +87,7 @@ TEST_F(FftWisdomFileTest, NothingOfItStays) {
   EXPECT_EQ(spectrum(), before);
   FftWisdomFile other(directory_ / "other");
   EXPECT_NE(other.save(), plans);
-  EXPECT_LT(read(directory_ / "other").size(), read(file_).size());
+  EXPECT_LT(read_whole_file(directory_ / "other").size(), read_whole_file(file_).size());
 }
 
 TEST_F(FftWisdomFileTest, OnlyOneAtATime) {
@@ -104,7 +97,7 @@ TEST_F(FftWisdomFileTest, OnlyOneAtATime) {
 
 TEST_F(FftWisdomFileTest, DamageIsToldByNameWithTheRemedy) {
   make();
-  const std::string whole = read(file_);
+  const std::string whole = read_whole_file(file_);
   std::vector<std::string> damaged = {"",
                                       "x",
                                       whole.substr(0, 30),
@@ -126,7 +119,7 @@ TEST_F(FftWisdomFileTest, DamageIsToldByNameWithTheRemedy) {
 
 TEST_F(FftWisdomFileTest, PlansOfAnotherFftwAreToldApartFromDamage) {
   make();
-  const std::string whole = read(file_);
+  const std::string whole = read_whole_file(file_);
   std::string wisdom = whole.substr(whole.find('\n') + 1);
   wisdom.replace(wisdom.find("fftw-"), 6, "fftw-9");
   write(file_, with_fingerprint(wisdom));
