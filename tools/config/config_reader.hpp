@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/strict_yaml.hpp"
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <filesystem>
-
 #include "frf/wiring/nominal_stage.hpp"
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/controller_keys.hpp"

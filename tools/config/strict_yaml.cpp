@@ -14,7 +14,6 @@
 #include <iterator>
 #include <map>
 #include <sstream>
-#include <system_error>
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <mutex>
-#include <optional>
 
 #include "acquisition/loop/run_observer.hpp"
 

@@ -3,8 +3,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "estimation/request/fit_request.hpp"
 #include "excitation/plan/experiment_plan.hpp"

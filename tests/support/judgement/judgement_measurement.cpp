@@ -1,10 +1,8 @@
-#include <fmt/format.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/loop/run_experiment.hpp"
