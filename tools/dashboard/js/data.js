@@ -5,15 +5,6 @@ const link = { search: location.search, edition: 0, loading: false };
 
 // The response in the format of the report page; empty until the first realization is complete.
 let content = { frf: null, arrays: {}, candidates: [], modes: [] };
-let blocks = {};  // by name, unpacked
-let decoded = {};
-
-function array(id) {
-  const about = content.arrays[id];
-  if (!about) return null;
-  if (!decoded[id]) decoded[id] = decoders[about.type](blocks[id], about, about.base && array(about.base));
-  return decoded[id];
-}
 
 async function setResponse(fresh) {
   blocks = await unpackAll(fresh.blocks);

@@ -1,5 +1,16 @@
 // Decodes packed numbers written by tools/report/report_encoding.hpp.
 
+let blocks = {};  // by name, unpacked
+let decoded = {};
+
+// The array of that name, decoded on first use; null if the page does not contain it.
+function array(id) {
+  const about = content.arrays[id];
+  if (!about) return null;
+  if (!decoded[id]) decoded[id] = decoders[about.type](blocks[id], about, about.base && array(about.base));
+  return decoded[id];
+}
+
 function bytesOf(base64) {
   const text = atob(base64);
   const bytes = new Uint8Array(text.length);
