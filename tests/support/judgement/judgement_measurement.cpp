@@ -134,15 +134,6 @@ class Loop {
   Eigen::VectorXd force_;
 };
 
-ChannelList list_of(const std::vector<Channel>& channels) {
-  ChannelList list;
-  for (const Channel& channel : channels) {
-    list.names.push_back(channel.name);
-    list.units.push_back(channel.unit);
-  }
-  return list;
-}
-
 void lose_sample(LogSamples& record, Eigen::Index at) {
   for (Eigen::MatrixXd* x : {&record.actuators, &record.sensors}) {
     const Eigen::Index rest = x->rows() - at - 1;

@@ -12,12 +12,6 @@
 #include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
-namespace {
-
-using Kind = PlantedFault::Kind;
-
-constexpr int kTaps = 32;               // a side, of the fractional delay
-constexpr Eigen::Index kRetuned = 200;  // samples between changes of a mode that drifts
 
 ChannelList list_of(const std::vector<Channel>& channels) {
   ChannelList list;
@@ -27,6 +21,13 @@ ChannelList list_of(const std::vector<Channel>& channels) {
   }
   return list;
 }
+
+namespace {
+
+using Kind = PlantedFault::Kind;
+
+constexpr int kTaps = 32;               // a side, of the fractional delay
+constexpr Eigen::Index kRetuned = 200;  // samples between changes of a mode that drifts
 
 /// x(t - delay), by a windowed sinc; delay in samples, less than one.
 Eigen::VectorXd delayed(const Eigen::VectorXd& x, double delay) {

@@ -11,6 +11,8 @@
 /// motion controller of hal, so that faults can be inside or outside the recording.
 namespace stageid::test {
 
+ChannelList list_of(const std::vector<Channel>& channels);
+
 /// One fault. Channels count within sensors or actuators.
 struct PlantedFault {
   enum class Kind : std::uint8_t {

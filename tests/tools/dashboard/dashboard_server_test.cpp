@@ -22,6 +22,14 @@ namespace test_dashboard_server {
 
 using namespace std::chrono_literals;
 
+bool connect_here(int socket, int port) {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  return ::connect(socket, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0;
+}
+
 /// A connection that requests the stream and may or may not read it.
 class RawWatcher {
  public:
@@ -34,12 +42,7 @@ class RawWatcher {
   RawWatcher(int port, const Request& request) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     const int small = 1024;
     ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(port));
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const bool connected = ::connect(socket_, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0;
-    good_ = connected && send(request.bytes);
+    good_ = connect_here(socket_, port) && send(request.bytes);
   }
   ~RawWatcher() { ::close(socket_); }
   RawWatcher(const RawWatcher&) = delete;
@@ -111,13 +114,9 @@ TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   serve();
   constexpr int kMoreThanThreads = DashboardServer::kWatchers + 16;
   std::vector<int> sockets;
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(port_));
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   for (int i = 0; i < kMoreThanThreads; ++i) {
     sockets.push_back(::socket(AF_INET, SOCK_STREAM, 0));
-    ASSERT_EQ(::connect(sockets.back(), reinterpret_cast<sockaddr*>(&to), sizeof to), 0);
+    ASSERT_TRUE(connect_here(sockets.back(), port_));
     const std::string begin = "GET / HTTP/1.1\r\nX: ";
     ASSERT_GT(::send(sockets.back(), begin.data(), begin.size(), MSG_NOSIGNAL), 0);
   }
@@ -150,13 +149,9 @@ TEST_F(DashboardServerTest, AThousandIdleAndAHundredSlowClientsDelayNobody) {
     slow.push_back(
         std::make_unique<RawWatcher>(port_, RawWatcher::Request{"GET / HTTP/1.1\r\nX: "}));
   std::vector<int> idle;
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(port_));
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   for (int i = 0; i < 1000; ++i) {  // none waits for its turn in the short queue of the port
     idle.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0));
-    ::connect(idle.back(), reinterpret_cast<sockaddr*>(&to), sizeof to);
+    connect_here(idle.back(), port_);
   }
   const auto began = std::chrono::steady_clock::now();
   httplib::Client other = client();

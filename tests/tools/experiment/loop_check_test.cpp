@@ -5,6 +5,7 @@
 
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/loop_stability.hpp"
+#include "tests/support/logs/faulty_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
@@ -18,14 +19,8 @@ FrfEstimate exact_pilot(const WaferStageSpec& stage) {
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(474, 4.0, 950.0);
   frf.sample_rate_hz = stage.info.sample_rate_hz;
   frf.hold = Hold::zoh;
-  for (const Channel& channel : stage.info.actuators) {
-    frf.inputs.names.push_back(channel.name);
-    frf.inputs.units.push_back(channel.unit);
-  }
-  for (const Channel& channel : stage.info.sensors) {
-    frf.outputs.names.push_back(channel.name);
-    frf.outputs.units.push_back(channel.unit);
-  }
+  frf.inputs = test::list_of(stage.info.actuators);
+  frf.outputs = test::list_of(stage.info.sensors);
   const std::vector<PlantMode> modes = wafer_stage_modes(stage);
   frf.response.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
