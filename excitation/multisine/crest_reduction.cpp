@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "excitation/multisine/line_spectrum.hpp"
-#include "excitation/multisine/phase.hpp"
+#include "excitation/multisine/multisine_lines.hpp"
 
 namespace stageid {
 namespace {
@@ -33,11 +33,7 @@ Eigen::VectorXd reduce_crest(const FrequencyGrid& grid,
                              const Eigen::Ref<const Eigen::VectorXd>& amplitude,
                              const Eigen::Ref<const Eigen::VectorXd>& phase_rad, int iterations) {
   LineSpectrum spectrum(grid, kOversampling);
-  Eigen::VectorXcd coefficients(grid.size());
-  for (Eigen::Index k = 0; k < grid.size(); ++k) {
-    coefficients[k] = std::polar(amplitude[k] / 2.0, phase_rad[k]);
-  }
-
+  Eigen::VectorXcd coefficients = line_coefficients(1.0, amplitude, phase_rad);
   Eigen::VectorXcd best;
   double best_peak = std::numeric_limits<double>::infinity();
   bool start_is_best = true;

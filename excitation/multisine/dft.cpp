@@ -68,6 +68,12 @@ std::span<const std::complex<double>> RealDft::forward() {
           static_cast<std::size_t>(half_size())};
 }
 
+std::span<const std::complex<double>> RealDft::forward(
+    const Eigen::Ref<const Eigen::VectorXd>& samples) {
+  std::copy_n(samples.data(), samples.size(), plan_->real);
+  return forward();
+}
+
 Eigen::VectorXd RealDft::inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_spectrum) {
   if (half_spectrum.size() != half_size()) {
     throw std::invalid_argument("inverse DFT: the half spectrum must have length / 2 + 1 entries");

@@ -24,6 +24,8 @@ class RealDft {
 
   /// X(l) = sum_n x(n) exp(-2 pi j l n / N), l = 0 .. N/2; no scaling. Valid until the next call.
   std::span<const std::complex<double>> forward();
+  /// The same of `length()` samples, which become the input.
+  std::span<const std::complex<double>> forward(const Eigen::Ref<const Eigen::VectorXd>& samples);
 
   /// x(n) = sum over l of both signs of X(l) exp(2 pi j l n / N), without 1/N. `half_spectrum`
   /// contains l = 0 .. N/2, size half_size().

@@ -45,7 +45,7 @@ class FrequencyGrid {
   int samples_per_period() const noexcept { return samples_per_period_; }
   double resolution_hz() const noexcept { return sample_rate_hz_ / samples_per_period_; }
   double period_s() const noexcept { return samples_per_period_ / sample_rate_hz_; }
-  Eigen::Index size() const noexcept { return static_cast<Eigen::Index>(lines_.size()); }
+  Eigen::Index size() const noexcept { return std::ssize(lines_); }
   const std::vector<int>& lines() const noexcept { return lines_; }
   Eigen::VectorXd frequency_hz() const;  ///< size()
   Eigen::VectorXd omega_rad_s() const;   ///< size()

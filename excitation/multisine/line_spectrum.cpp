@@ -30,9 +30,8 @@ Eigen::VectorXd LineSpectrum::samples(const Eigen::Ref<const Eigen::VectorXcd>& 
 }
 
 Eigen::VectorXcd LineSpectrum::coefficients(const Eigen::Ref<const Eigen::VectorXd>& samples) {
-  std::copy(samples.data(), samples.data() + samples.size(), dft_.input().begin());
-  const std::span<const std::complex<double>> spectrum = dft_.forward();
-  Eigen::VectorXcd coefficients(static_cast<Eigen::Index>(lines_.size()));
+  const std::span<const std::complex<double>> spectrum = dft_.forward(samples);
+  Eigen::VectorXcd coefficients(std::ssize(lines_));
   for (std::size_t k = 0; k < lines_.size(); ++k) {
     coefficients[static_cast<Eigen::Index>(k)] =
         spectrum[static_cast<std::size_t>(lines_[k])] / static_cast<double>(dft_.length());

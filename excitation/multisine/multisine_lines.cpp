@@ -36,4 +36,16 @@ Eigen::VectorXcd line_coefficients(std::complex<double> factor, const Eigen::Vec
   return coefficients;
 }
 
+Eigen::MatrixXcd axis_coefficients(const Eigen::VectorXcd& factors,
+                                   const Eigen::MatrixXd& amplitude,
+                                   const Eigen::MatrixXd& phase_rad) {
+  Eigen::MatrixXcd coefficients = Eigen::MatrixXcd::Zero(amplitude.rows(), amplitude.cols());
+  for (Eigen::Index p = 0; p < factors.size(); ++p)
+    if (factors[p] != 0.0)
+      coefficients.row(p) =
+          line_coefficients(factors[p], amplitude.row(p).transpose(), phase_rad.row(p).transpose())
+              .transpose();
+  return coefficients;
+}
+
 }  // namespace stageid

@@ -34,7 +34,7 @@ class HalfLines {
   /// transfer . r at bin `i`
   std::complex<double> product(Index i, const Eigen::Ref<const Eigen::VectorXcd>& r) const {
     const auto next = std::lower_bound(at_.begin(), at_.end(), i) - at_.begin();
-    const auto count = static_cast<Index>(at_.size());
+    const auto count = std::ssize(at_);
     if (next == count) return known(count - 1, r);
     if (next == 0 || at(next) == i) return known(next, r);
     const Index points = std::min(kPoints, count);

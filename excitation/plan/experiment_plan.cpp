@@ -37,8 +37,7 @@ void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size
                     axis.channel, axis.shape.size(), grid.size()));
   }
   for (Index k = 0; k < grid.size(); ++k) {
-    if (!has_line(spec.scheme, static_cast<Index>(number), static_cast<Index>(spec.axes.size()), k))
-      continue;
+    if (!has_line(spec.scheme, static_cast<Index>(number), std::ssize(spec.axes), k)) continue;
     // An unexcited line has no FRF, so it must not be in the grid.
     if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
       throw std::invalid_argument(fmt::format(
@@ -61,8 +60,7 @@ void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   at_least("crest_iterations", spec.crest_iterations, 0);
   if (spec.axes.empty())
     throw std::invalid_argument("experiment: axes: at least one axis is required");
-  if (spec.scheme == ExcitationScheme::zippered &&
-      grid.size() < static_cast<Index>(spec.axes.size())) {
+  if (spec.scheme == ExcitationScheme::zippered && grid.size() < std::ssize(spec.axes)) {
     throw std::invalid_argument(
         fmt::format("experiment: scheme zippered distributes {} lines over {} axes, which is too "
                     "few. Lengthen the period or widen the band",
@@ -109,7 +107,7 @@ Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& 
   if (spec.scheme != ExcitationScheme::zippered) return unit_rms_amplitude(grid, shape);
   if (shape.size() == 0) shape.setOnes(grid.size());
   for (Index k = 0; k < grid.size(); ++k)
-    if (!has_line(spec.scheme, axis, static_cast<Index>(spec.axes.size()), k)) shape[k] = 0.0;
+    if (!has_line(spec.scheme, axis, std::ssize(spec.axes), k)) shape[k] = 0.0;
   return unit_rms_amplitude(grid, shape);
 }
 
@@ -195,15 +193,7 @@ MatrixXd ExperimentPlan::phase_rad(int realization) const {
 
 MatrixXcd ExperimentPlan::spectrum(RunId run) const {
   check_run(run);
-  const MatrixXd phases = phase_rad(run.realization);
-  MatrixXcd spectrum = MatrixXcd::Zero(axes(), grid_.size());
-  for (int p = 0; p < axes(); ++p) {
-    if (!excites(p, run.experiment)) continue;
-    spectrum.row(p) = line_coefficients(mixing_(p, run.experiment), amplitude_.row(p).transpose(),
-                                        phases.row(p).transpose())
-                          .transpose();
-  }
-  return spectrum;
+  return axis_coefficients(mixing_.col(run.experiment), amplitude_, phase_rad(run.realization));
 }
 
 MatrixXd ExperimentPlan::excitation(RunId run) const {

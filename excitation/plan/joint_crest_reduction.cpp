@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "excitation/multisine/line_spectrum.hpp"
-#include "excitation/multisine/phase.hpp"
+#include "excitation/multisine/multisine_lines.hpp"
 #include "excitation/multisine/signal_peaks.hpp"
 
 namespace stageid {
@@ -36,9 +36,7 @@ class JointCrest {
   }
 
   Eigen::MatrixXd reduce(const Eigen::MatrixXd& phase_rad, int iterations) {
-    R_.resize(phase_rad.rows(), phase_rad.cols());
-    for (Index i = 0; i < R_.size(); ++i)
-      R_.data()[i] = std::polar(problem_.amplitude.data()[i] / 2.0, phase_rad.data()[i]);
+    R_ = axis_coefficients(Eigen::VectorXcd::Ones(phase_rad.rows()), problem_.amplitude, phase_rad);
     MatrixXcd best;
     double best_peak = std::numeric_limits<double>::infinity();
     double level = std::numeric_limits<double>::infinity();

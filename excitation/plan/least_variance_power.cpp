@@ -56,10 +56,7 @@ PowerSpectrum least_variance_power(const Eigen::Ref<const Eigen::VectorXd>& cost
     // max over s > 0 of  2 sqrt(s) S - s L,  S = sum sqrt(c price), L = sum lambda.
     const double root_sum = (c * price).sqrt().sum();
     const double bound = root_sum * root_sum / lambda.sum();
-    if (bound > best.lower_bound) {
-      best.lower_bound = bound;
-      best.multiplier = lambda * (root_sum * root_sum / (lambda.sum() * lambda.sum()));
-    }
+    best.lower_bound = std::max(best.lower_bound, bound);
     if (best.cost <= (1.0 + kGap) * best.lower_bound) break;
     // B a = 1 at the optimum. a has degree -1/2 in lambda, so the scale converges without a step size.
     lambda.array() *= use.array() / use.maxCoeff();

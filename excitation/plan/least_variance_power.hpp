@@ -6,10 +6,9 @@ namespace stageid {
 
 /// Distribution of the excitation's power for the least variance, and its distance from the optimum.
 struct PowerSpectrum {
-  Eigen::VectorXd power;       ///< a, size of `cost`
-  double cost = 0.0;           ///< sum c_i / a_i
-  double lower_bound = 0.0;    ///< by duality, no spectrum within the bounds has a lower cost
-  Eigen::VectorXd multiplier;  ///< of each bound, not negative; 0: the bound is not active
+  Eigen::VectorXd power;     ///< a, size of `cost`
+  double cost = 0.0;         ///< sum c_i / a_i
+  double lower_bound = 0.0;  ///< by duality, no spectrum within the bounds has a lower cost
 };
 
 /// Solves   min sum_i c_i / a_i   over a > 0   subject to   B a <= 1.

@@ -28,7 +28,7 @@ void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
   const auto fail = [](const std::string& what) {
     throw std::invalid_argument("limited design: " + what);
   };
-  const auto axes = static_cast<Index>(spec.experiment.axes.size());
+  const auto axes = std::ssize(spec.experiment.axes);
   if (spec.cost.rows() != axes || spec.cost.cols() != grid.size())
     fail(fmt::format("cost is {} x {}; expected {} axes x {} lines", spec.cost.rows(),
                      spec.cost.cols(), axes, grid.size()));
@@ -51,14 +51,10 @@ void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
 
 /// Axes of a group are excited in the same runs: one group per axis, or one group of all axes.
 std::vector<std::vector<Index>> groups_of(const ExperimentPlan& plan) {
-  std::vector<std::vector<Index>> groups;
-  const auto axes = static_cast<Index>(plan.spec().axes.size());
-  if (plan.spec().scheme == ExcitationScheme::single_axis) {
-    for (Index p = 0; p < axes; ++p) groups.push_back({p});
-    return groups;
-  }
-  groups.emplace_back();
-  for (Index p = 0; p < axes; ++p) groups.front().push_back(p);
+  const auto axes = plan.spec().axes.size();
+  const bool single = plan.spec().scheme == ExcitationScheme::single_axis;
+  std::vector<std::vector<Index>> groups(single ? axes : 1);
+  for (std::size_t p = 0; p < axes; ++p) groups[single ? p : 0].push_back(static_cast<Index>(p));
   return groups;
 }
 
@@ -74,8 +70,7 @@ class Designer {
         gain_.back().col(k) *=
             std::norm(kind_factor(s.kind, frequency_hz[k], grid.sample_rate_hz()));
     }
-    crest_.setConstant(static_cast<Index>(spec.signals.size()), static_cast<Index>(groups_.size()),
-                       kFirstCrestFactor);
+    crest_.setConstant(std::ssize(spec.signals), std::ssize(groups_), kFirstCrestFactor);
   }
 
   LimitedDesign design() {
@@ -134,8 +129,8 @@ class Designer {
     const Index lines = grid_.size();
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const std::vector<Index>& group = groups_[g];
-      const auto size = static_cast<Index>(group.size());
-      MatrixXd bounds(static_cast<Index>(spec_.signals.size()), size * lines);
+      const auto size = std::ssize(group);
+      MatrixXd bounds(std::ssize(spec_.signals), size * lines);
       Eigen::VectorXd cost(size * lines);
       for (Index i = 0; i < size; ++i) {
         const Index p = group[static_cast<std::size_t>(i)];
@@ -165,11 +160,7 @@ class Designer {
     Peaks peaks(groups_.size(), std::vector<SignalPeak>(spec_.signals.size()));
     SignalPredictor predictor(grid_);
     for (int e = 0; e < plan_.experiments(); ++e) {
-      Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(amplitude_.rows(), amplitude_.cols());
-      for (Index p = 0; p < R.rows(); ++p)
-        R.row(p) = line_coefficients(plan_.mixing()(p, e), amplitude_.row(p).transpose(),
-                                     phase_rad.row(p).transpose())
-                       .transpose();
+      const Eigen::MatrixXcd R = axis_coefficients(plan_.mixing().col(e), amplitude_, phase_rad);
       const std::size_t group = groups_.size() == 1 ? 0 : static_cast<std::size_t>(e);
       const std::vector<SignalPeak> run = predictor.predict(spec_.signals, R);
       for (std::size_t s = 0; s < run.size(); ++s) peaks[group][s].include(run[s]);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/acquisition/files/expect_error.hpp"
 #include "tests/excitation/reference/multisine_reference.hpp"
 
 namespace stageid {
@@ -94,12 +95,8 @@ TEST(FrequencyGrid, DrawsTheLinesOfTheIndependentReference) {
 
 /// Expects an std::invalid_argument with `word` in its message.
 void expect_refused(double rate_hz, int samples, const LineSpec& spec, const std::string& word) {
-  try {
-    FrequencyGrid::band(rate_hz, samples, spec);
-    ADD_FAILURE() << "accepted; expected a word on " << word;
-  } catch (const std::invalid_argument& e) {
-    EXPECT_NE(std::string(e.what()).find(word), std::string::npos) << e.what();
-  }
+  test::expect_error<std::invalid_argument>([&] { FrequencyGrid::band(rate_hz, samples, spec); },
+                                            "frequency ", word);
 }
 
 TEST(FrequencyGrid, RefusesBandsThatCannotBeMeasured) {

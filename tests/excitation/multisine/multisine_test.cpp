@@ -32,14 +32,12 @@ double rms(const Eigen::VectorXd& x) { return x.norm() / std::sqrt(static_cast<d
 
 Eigen::VectorXcd dft_over_n(const Eigen::VectorXd& x) {
   RealDft dft(static_cast<int>(x.size()));
-  std::copy(x.begin(), x.end(), dft.input().begin());
-  const auto spectrum = dft.forward();
-  return Eigen::Map<const Eigen::VectorXcd>(spectrum.data(), dft.half_size()) /
+  return Eigen::Map<const Eigen::VectorXcd>(dft.forward(x).data(), dft.half_size()) /
          static_cast<double>(x.size());
 }
 
 Eigen::VectorXd map(const std::vector<double>& values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
 }
 
 TEST(RandomStream, HasThePublishedCheckValues) {

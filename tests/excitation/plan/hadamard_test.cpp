@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <stdexcept>
-#include <string>
+
+#include "tests/acquisition/files/expect_error.hpp"
 
 namespace stageid {
 namespace test_hadamard {
@@ -33,12 +34,8 @@ TEST(Hadamard, HasTheSizesThatPaleyAndSylvesterReach) {
 }
 
 TEST(Hadamard, NamesTheNearestSizes) {
-  try {
-    hadamard_matrix(13);
-    FAIL();
-  } catch (const std::invalid_argument& e) {
-    EXPECT_NE(std::string(e.what()).find("12 and 16"), std::string::npos) << e.what();
-  }
+  test::expect_error<std::invalid_argument>([] { hadamard_matrix(13); },
+                                            "Hadamard matrix: ", "12 and 16");
   EXPECT_THROW(hadamard_matrix(0), std::invalid_argument);
 }
 
