@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/line_datasets.hpp"
 
@@ -10,40 +12,13 @@ namespace {
 
 constexpr double kLargestCount = 1e8;
 
-Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {
-  const std::vector<hsize_t> shape = file.shape(dataset);
-  if (shape.size() != 1) {
-    throw FormatError(file.path(), dataset,
-                      fmt::format("shape is {}; expected a list of numbers", join_shape(shape)));
-  }
-  const std::vector<double> values = file.read_reals(dataset);
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-/// (rows * columns) x lines from [lines x rows x columns], or empty if the dataset is missing.
-Eigen::MatrixXd read_if_there(const Hdf5File& file, const std::string& dataset, Eigen::Index lines,
-                              Eigen::Index rows, Eigen::Index columns) {
-  if (!file.exists(dataset)) return {};
-  require_shape(file, dataset, {size_of(lines), size_of(rows), size_of(columns)});
-  return from_c_order(file.read_reals(dataset), rows, columns);
-}
-
-void write_columns(Hdf5File& file, const std::string& dataset, const Eigen::MatrixXd& columns,
-                   Eigen::Index rows) {
-  if (columns.size() == 0) return;
-  file.write_reals(dataset,
-                   {size_of(columns.cols()), size_of(rows), size_of(columns.rows() / rows)},
-                   to_c_order<double>(columns, rows).data());
-}
-
 void write_detection(Hdf5File& file, const DetectionLines& lines, Eigen::Index n_y) {
   if (lines.line.size() == 0) return;
   const std::vector<long long> line(lines.line.begin(), lines.line.end());
-  file.write_reals("/detection_frequency_hz", {size_of(lines.line.size())},
-                   lines.frequency_hz.data());
+  write_vector(file, "/detection_frequency_hz", lines.frequency_hz);
   file.write_integers("/detection_line", {line.size()}, line.data());
   file.write_texts("/detection_groups", lines.groups);
-  file.write_reals("/detection_runs", {size_of(lines.runs.size())}, lines.runs.data());
+  write_vector(file, "/detection_runs", lines.runs);
   write_columns(file, "/detection_power", lines.power, n_y);
   file.write_reals("/detection_noise", {size_of(lines.noise.cols()), size_of(n_y)},
                    lines.noise.data());
@@ -63,7 +38,7 @@ void read_detection(const Hdf5File& file, FrfEstimate& frf) {
     throw FormatError(file.path(), "/detection_line", "DFT lines must be counts (0, 1, 2, ...)");
   lines.line = line.cast<int>();
   lines.groups = file.read_texts("/detection_groups");
-  const auto n_g = static_cast<Eigen::Index>(lines.groups.size());
+  const auto n_g = std::ssize(lines.groups);
   if (n_g == 0) throw FormatError(file.path(), "/detection_groups", "no groups; name at least one");
   lines.runs = read_vector(file, "/detection_runs");
   require_shape(file, "/detection_power", {size_of(D), size_of(n_y), size_of(n_g)});
@@ -72,7 +47,7 @@ void read_detection(const Hdf5File& file, FrfEstimate& frf) {
   lines.noise = from_c_order(file.read_reals("/detection_noise"), n_y, 1);
   if (file.has_attribute("/detection_noise", "dof"))
     lines.noise_dof = file.read_real_attribute("/detection_noise", "dof");
-  lines.linear_power = read_if_there(file, "/detection_linear_power", frf.lines(), n_y, n_g);
+  lines.linear_power = read_columns(file, "/detection_linear_power", frf.lines(), n_y, n_g);
 }
 
 void write_nonlinearity(Hdf5File& file, const NonlinearityTest& test, Eigen::Index n_y) {
@@ -81,9 +56,7 @@ void write_nonlinearity(Hdf5File& file, const NonlinearityTest& test, Eigen::Ind
                    Eigen::MatrixXd(test.band_hz.transpose()).data());
   write_columns(file, "/nonlinearity_p_value", test.p_value, n_y);
   write_columns(file, "/nonlinearity_distortion", test.distortion, n_y);
-  if (test.settled_p_value.size() > 0)
-    file.write_reals("/nonlinearity_settled_p_value", {size_of(test.settled_p_value.size())},
-                     test.settled_p_value.data());
+  write_vector(file, "/nonlinearity_settled_p_value", test.settled_p_value);
   write_columns(file, "/nonlinearity_even_p_value", test.even.p_value, n_y);
   write_columns(file, "/nonlinearity_even_level", test.even.level, n_y);
   write_columns(file, "/nonlinearity_odd_p_value", test.odd.p_value, n_y);
@@ -103,18 +76,18 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   const Eigen::Index bands = test.band_hz.rows();
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index n_u = frf.n_inputs();
-  const auto n_g = static_cast<Eigen::Index>(frf.detection.groups.size());
-  test.p_value = read_if_there(file, "/nonlinearity_p_value", bands, n_y, n_u);
-  test.distortion = read_if_there(file, "/nonlinearity_distortion", bands, n_y, n_u);
+  const auto n_g = std::ssize(frf.detection.groups);
+  test.p_value = read_columns(file, "/nonlinearity_p_value", bands, n_y, n_u);
+  test.distortion = read_columns(file, "/nonlinearity_distortion", bands, n_y, n_u);
   if (file.exists("/nonlinearity_settled_p_value")) {
     require_shape(file, "/nonlinearity_settled_p_value", {size_of(bands)});
     test.settled_p_value = read_vector(file, "/nonlinearity_settled_p_value");
   }
   if (n_g == 0) return;
-  test.even.p_value = read_if_there(file, "/nonlinearity_even_p_value", bands, n_y, n_g);
-  test.even.level = read_if_there(file, "/nonlinearity_even_level", bands, n_y, n_g);
-  test.odd.p_value = read_if_there(file, "/nonlinearity_odd_p_value", bands, n_y, n_g);
-  test.odd.level = read_if_there(file, "/nonlinearity_odd_level", bands, n_y, n_g);
+  test.even.p_value = read_columns(file, "/nonlinearity_even_p_value", bands, n_y, n_g);
+  test.even.level = read_columns(file, "/nonlinearity_even_level", bands, n_y, n_g);
+  test.odd.p_value = read_columns(file, "/nonlinearity_odd_p_value", bands, n_y, n_g);
+  test.odd.level = read_columns(file, "/nonlinearity_odd_level", bands, n_y, n_g);
 }
 
 /// @throws FormatError if a number is negative or implausibly large
@@ -127,40 +100,37 @@ std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset
   return counts;
 }
 
-/// Discarded data: one row of indices and one reason each.
-struct LeftOut {
-  std::vector<std::vector<int>> where;
-  std::vector<std::string> reasons;
-};
-
-void write_left_out(Hdf5File& file, const LeftOut& left_out, const std::string& places,
-                    const std::string& reasons) {
-  if (left_out.reasons.empty()) return;
+/// Discarded data: a row of indices each in one dataset, the reasons in another.
+template <typename Item, typename IndicesOf>
+void write_left_out(Hdf5File& file, const std::vector<Item>& items, const std::string& places,
+                    const std::string& reasons, const IndicesOf& indices_of) {
+  if (items.empty()) return;
   std::vector<long long> rows;
-  for (const std::vector<int>& row : left_out.where)
-    rows.insert(rows.end(), row.begin(), row.end());
-  std::vector<hsize_t> shape = {left_out.where.size()};
-  if (const std::size_t columns = left_out.where.front().size(); columns > 1)
-    shape.push_back(columns);
+  std::vector<std::string> texts;
+  for (const Item& item : items) {
+    for (const int index : indices_of(item)) rows.push_back(index);
+    texts.push_back(item.reason);
+  }
+  std::vector<hsize_t> shape = {items.size()};
+  if (rows.size() > items.size()) shape.push_back(rows.size() / items.size());
   file.write_integers(places, shape, rows.data());
-  file.write_texts(reasons, left_out.reasons);
+  file.write_texts(reasons, texts);
 }
 
-/// Empty if the datasets are missing.
-LeftOut read_left_out(const Hdf5File& file, const std::string& places, const std::string& reasons,
-                      std::size_t columns) {
-  LeftOut left_out;
-  if (!file.exists(places)) return left_out;
-  left_out.reasons = file.read_texts(reasons);
-  std::vector<hsize_t> shape = {left_out.reasons.size()};
+/// Calls add(indices, reason) for each; not at all if the datasets are missing.
+template <typename Add>
+void read_left_out(const Hdf5File& file, const std::string& places, const std::string& reasons,
+                   std::size_t columns, const Add& add) {
+  if (!file.exists(places)) return;
+  const std::vector<std::string> texts = file.read_texts(reasons);
+  std::vector<hsize_t> shape = {texts.size()};
   if (columns > 1) shape.push_back(columns);
   require_shape(file, places, shape);
   const std::vector<double> counts = read_counts(file, places);
-  for (std::size_t i = 0; i < left_out.reasons.size(); ++i) {
+  for (std::size_t i = 0; i < texts.size(); ++i) {
     const auto row = counts.begin() + static_cast<std::ptrdiff_t>(columns * i);
-    left_out.where.emplace_back(row, row + static_cast<std::ptrdiff_t>(columns));
+    add(std::vector<int>(row, row + static_cast<std::ptrdiff_t>(columns)), texts[i]);
   }
-  return left_out;
 }
 
 }  // namespace
@@ -168,32 +138,25 @@ LeftOut read_left_out(const Hdf5File& file, const std::string& places, const std
 void write_quality(Hdf5File& file, const FrfEstimate& frf) {
   write_detection(file, frf.detection, frf.n_outputs());
   write_nonlinearity(file, frf.nonlinearity, frf.n_outputs());
-  LeftOut periods;
-  for (const DroppedPeriod& one : frf.dropped_periods) {
-    periods.where.push_back({one.realization, one.experiment, one.period});
-    periods.reasons.push_back(one.reason);
-  }
-  write_left_out(file, periods, "/dropped_periods", "/dropped_reasons");
-  LeftOut realizations;
-  for (const LeftOutRealization& one : frf.left_out_realizations) {
-    realizations.where.push_back({one.realization});
-    realizations.reasons.push_back(one.reason);
-  }
-  write_left_out(file, realizations, "/left_out_realizations", "/left_out_reasons");
+  write_left_out(file, frf.dropped_periods, "/dropped_periods", "/dropped_reasons",
+                 [](const DroppedPeriod& one) {
+                   return std::array{one.realization, one.experiment, one.period};
+                 });
+  write_left_out(file, frf.left_out_realizations, "/left_out_realizations", "/left_out_reasons",
+                 [](const LeftOutRealization& one) { return std::array{one.realization}; });
 }
 
 void read_quality(const Hdf5File& file, FrfEstimate& frf) {
   read_detection(file, frf);
   read_nonlinearity(file, frf);
-  const LeftOut periods = read_left_out(file, "/dropped_periods", "/dropped_reasons", 3);
-  for (std::size_t i = 0; i < periods.reasons.size(); ++i) {
-    const std::vector<int>& at = periods.where[i];
-    frf.dropped_periods.push_back({at[0], at[1], at[2], periods.reasons[i]});
-  }
-  const LeftOut realizations =
-      read_left_out(file, "/left_out_realizations", "/left_out_reasons", 1);
-  for (std::size_t i = 0; i < realizations.reasons.size(); ++i)
-    frf.left_out_realizations.push_back({realizations.where[i][0], realizations.reasons[i]});
+  read_left_out(file, "/dropped_periods", "/dropped_reasons", 3,
+                [&](const std::vector<int>& at, const std::string& reason) {
+                  frf.dropped_periods.push_back({at[0], at[1], at[2], reason});
+                });
+  read_left_out(file, "/left_out_realizations", "/left_out_reasons", 1,
+                [&](const std::vector<int>& at, const std::string& reason) {
+                  frf.left_out_realizations.push_back({at[0], reason});
+                });
 }
 
 }  // namespace stageid

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "acquisition/files/hdf5_file.hpp"
@@ -30,7 +31,7 @@ template <typename Scalar>
 VecColumns<Scalar> from_c_order(const std::vector<Scalar>& data, Eigen::Index rows,
                                 Eigen::Index columns) {
   const Eigen::Index n = rows * columns;
-  const Eigen::Index lines = static_cast<Eigen::Index>(data.size()) / n;
+  const Eigen::Index lines = std::ssize(data) / n;
   VecColumns<Scalar> result(n, lines);
   for (Eigen::Index k = 0; k < lines; ++k) {
     Eigen::Map<VecColumns<Scalar>>(result.col(k).data(), rows, columns) =
@@ -47,5 +48,37 @@ void require_shape(const Hdf5File& file, const std::string& dataset,
                    const std::vector<hsize_t>& wanted);
 
 inline hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
+
+/// Writes columns vec(matrix), `rows` rows each; nothing if there are none.
+template <typename Scalar>
+void write_columns(Hdf5File& file, const std::string& dataset, const VecColumns<Scalar>& columns,
+                   Eigen::Index rows) {
+  if (columns.size() == 0) return;
+  const std::vector<Scalar> data = to_c_order(columns, rows);
+  const std::vector<hsize_t> shape = {size_of(columns.cols()), size_of(rows),
+                                      size_of(columns.rows() / rows)};
+  if constexpr (std::is_same_v<Scalar, double>)
+    file.write_reals(dataset, shape, data.data());
+  else
+    file.write_complex(dataset, shape, data.data());
+}
+
+/// The inverse; empty if the dataset is missing. @throws FormatError unless it is [lines x rows x columns]
+template <typename Scalar = double>
+VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset,
+                                Eigen::Index lines, Eigen::Index rows, Eigen::Index columns) {
+  if (!file.exists(dataset)) return {};
+  require_shape(file, dataset, {size_of(lines), size_of(rows), size_of(columns)});
+  if constexpr (std::is_same_v<Scalar, double>)
+    return from_c_order(file.read_reals(dataset), rows, columns);
+  else
+    return from_c_order(file.read_complex(dataset), rows, columns);
+}
+
+/// Writes a list of numbers; nothing if it is empty.
+void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values);
+
+/// @throws FormatError unless it is a list of numbers
+Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset);
 
 }  // namespace stageid

@@ -12,26 +12,23 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "tests/support/logs/hdf5_surgery.hpp"
+#include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/models/numbered_frf.hpp"
+#include "tests/support/process/error_message.hpp"
+#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
 namespace test_frf_file {
 
 using test::numbered_frf;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
 class FrfFile : public testing::Test {
  protected:
-  FrfFile() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("frf_file_") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~FrfFile() override { fs::remove_all(folder_); }
-
   std::string bytes(const char* name) const {
     std::ifstream in(folder_ / name, std::ios::binary);
     std::ostringstream all;
@@ -40,46 +37,51 @@ class FrfFile : public testing::Test {
   }
 
   std::string read_error(const char* name) const {
-    try {
-      read_frf(folder_ / name);
-    } catch (const FormatError& error) {
-      return error.what();
-    } catch (const std::exception& error) {
-      return std::string("another kind of error: ") + error.what();
-    }
-    return "no error";
+    return test::error_message<FormatError>([&] { read_frf(folder_ / name); });
   }
 
-  fs::path folder_;
+  test::TemporaryDirectory folder_;
 };
 
+Eigen::MatrixXd numbered(Eigen::Index rows, Eigen::Index columns, double from) {
+  Eigen::MatrixXd matrix(rows, columns);
+  for (Eigen::Index i = 0; i < matrix.size(); ++i) matrix.data()[i] = from + static_cast<double>(i);
+  return matrix;
+}
+
+/// 2 outputs, 3 inputs, 4 lines; 5 detection lines, 3 groups, 2 bands.
+FrfEstimate with_quality() {
+  FrfEstimate frf = numbered_frf();
+  frf.detection.frequency_hz = numbered(5, 1, 1.25);
+  frf.detection.line = Eigen::VectorXi{{2, 3, 4, 6, 8}};
+  frf.detection.groups = {"a1", "a2", "a3"};
+  frf.detection.runs = numbered(3, 1, 2.0);
+  frf.detection.power = numbered(6, 5, 10.0);
+  frf.detection.noise = numbered(2, 5, 60.0);
+  frf.detection.noise_dof = 12.0;
+  frf.detection.linear_power = numbered(6, 4, 100.0);
+  frf.nonlinearity.band_hz = numbered(2, 2, 1.0);
+  frf.nonlinearity.p_value = numbered(6, 2, 0.5);
+  frf.nonlinearity.distortion = numbered(6, 2, 0.25);
+  frf.nonlinearity.settled_p_value = numbered(2, 1, 0.125);
+  frf.nonlinearity.even = {numbered(6, 2, 20.0), numbered(6, 2, 40.0)};
+  frf.nonlinearity.odd = {numbered(6, 2, 30.0), numbered(6, 2, 50.0)};
+  frf.dropped_periods = {{0, 1, 4, "a marked sample"}, {2, 0, 7, "12 times the scatter"}};
+  frf.left_out_realizations = {{3, "run.slog:/runs/0007: each of its 4 periods"}};
+  return frf;
+}
+
 TEST_F(FrfFile, GivesBackWhatWasWritten) {
-  const FrfEstimate frf = numbered_frf();
+  FrfEstimate frf = with_quality();
   write_frf(folder_ / "frf.h5", frf);
-  const FrfEstimate back = read_frf(folder_ / "frf.h5");
-  EXPECT_EQ(back.frequency_hz, frf.frequency_hz);
-  EXPECT_EQ(back.response, frf.response);
-  EXPECT_EQ(back.noise_variance, frf.noise_variance);
-  EXPECT_EQ(back.total_variance, frf.total_variance);
-  EXPECT_EQ(back.covariance, frf.covariance);
-  EXPECT_EQ(back.residual_covariance_re, frf.residual_covariance_re);
-  EXPECT_EQ(back.input_factor, frf.input_factor);
-  EXPECT_EQ(back.residual_covariance_im, frf.residual_covariance_im);
-  EXPECT_EQ(back.input_condition, frf.input_condition);
-  EXPECT_EQ(back.inputs, frf.inputs);
-  EXPECT_EQ(back.outputs, frf.outputs);
-  EXPECT_EQ(back.sample_rate_hz, frf.sample_rate_hz);
-  EXPECT_EQ(back.hold, frf.hold);
-  EXPECT_EQ(back.compensated, frf.compensated);
-  EXPECT_EQ(back.delay_s, frf.delay_s);
-  EXPECT_EQ(back.realizations, 3);
-  EXPECT_EQ(back.periods, 5);
-  EXPECT_EQ(back.experiments, 7);
-  EXPECT_EQ(back.noise_dof, 84.0);
-  EXPECT_EQ(back.total_dof, 2.0);
-  EXPECT_EQ(back.excluded_channels, frf.excluded_channels);
-  EXPECT_EQ(back.excluded_power, frf.excluded_power);
-  EXPECT_EQ(back.provenance_json, frf.provenance_json);
+  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
+  frf.method = FrfMethod::lpm;
+  frf.covariance_lines = 9;
+  frf.correlated_lines = 3.5;
+  frf.experiment_noise_ratio = 2.5;
+  frf.interpolation_misfit = numbered(4, 1, 0.5);
+  write_frf(folder_ / "frf.h5", frf);
+  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
 }
 
 TEST_F(FrfFile, WhatIsUnknownStaysUnknown) {
@@ -89,15 +91,7 @@ TEST_F(FrfFile, WhatIsUnknownStaysUnknown) {
   frf.outputs = {{"z"}, {"m"}};
   frf.response = Eigen::MatrixXcd::Constant(1, 1, {1.0, 2.0});
   write_frf(folder_ / "frf.h5", frf);
-  const FrfEstimate back = read_frf(folder_ / "frf.h5");
-  EXPECT_EQ(back.response, frf.response);
-  EXPECT_EQ(back.noise_variance.size(), 0);
-  EXPECT_EQ(back.total_variance.size(), 0);
-  EXPECT_EQ(back.covariance.size(), 0);
-  EXPECT_EQ(back.input_condition.size(), 0);
-  EXPECT_TRUE(back.excluded_channels.empty());
-  EXPECT_EQ(back.hold, Hold::none);
-  EXPECT_EQ(back.sample_rate_hz, 0.0);
+  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
 }
 
 // The layout of docs/formats.md: [N x n_y x n_u] in C order, as indexed by h5py and MATLAB users.
@@ -134,6 +128,24 @@ TEST_F(FrfFile, TheLayoutIsLinesThenOutputsThenInputs) {
       }
     }
   }
+}
+
+TEST_F(FrfFile, QualityDatasetsAreAsDocumented) {
+  const FrfEstimate frf = with_quality();
+  write_frf(folder_ / "frf.h5", frf);
+  const Hdf5File h5 = Hdf5File::open(folder_ / "frf.h5");
+  EXPECT_THAT(h5.shape("/detection_power"), ElementsAre(5u, 2u, 3u));
+  // [line 1, output 1, group 2]
+  EXPECT_EQ(h5.read_reals("/detection_power")[(1 * 2 + 1) * 3 + 2],
+            frf.detection.power(1 + 2 * 2, 1));
+  EXPECT_THAT(h5.shape("/detection_noise"), ElementsAre(5u, 2u));
+  EXPECT_EQ(h5.read_reals("/detection_noise")[3 * 2 + 1], frf.detection.noise(1, 3));
+  EXPECT_THAT(h5.shape("/nonlinearity_p_value"), ElementsAre(2u, 2u, 3u));
+  EXPECT_EQ(h5.read_reals("/nonlinearity_p_value")[(1 * 2 + 0) * 3 + 1],
+            frf.nonlinearity.p_value(0 + 2 * 1, 1));
+  EXPECT_EQ(h5.read_reals("/nonlinearity_band_hz")[1], frf.nonlinearity.band_hz(0, 1));
+  EXPECT_THAT(h5.read_reals("/dropped_periods"), ElementsAre(0, 1, 4, 2, 0, 7));
+  EXPECT_EQ(h5.read_text_attribute("/", "method"), "periodic");
 }
 
 TEST_F(FrfFile, TheConfidenceRadiusNamesItsVariance) {
@@ -206,94 +218,70 @@ void write_good(Hdf5File& file) {
   file.write_texts("/outputs", {"z1"});
 }
 
-const std::complex<double> kTwo[] = {{1.0, 0.0}, {2.0, 0.0}, {3.0, 0.0}, {4.0, 0.0}};
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+/// Two lines of one channel.
+void write_response(Hdf5File& file, std::complex<double> second = 2.0) {
+  write_good(file);
+  const std::complex<double> response[] = {1.0, second};
+  file.write_complex("/response", {2, 1, 1}, response);
+}
 
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+const double kTwo[] = {1.0, -2.0};
+
+// All but the first two have the right format.
 const Damage kDamages[] = {
     {"NoFormat", [](Hdf5File&) {}, "attribute format is missing"},
     {"OtherFormat",
      [](Hdf5File& f) { f.write_attribute("/", "format", std::string("stageid-log")); },
      "is a log in HDF5, not a frequency response;"},
-    {"LaterVersion",
-     [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       f.write_attribute("/", "format_version", 2LL);
-     },
+    {"LaterVersion", [](Hdf5File& f) { f.write_attribute("/", "format_version", 2LL); },
      "unsupported format_version 2; this program reads 1"},
-    {"Hold",
-     [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       f.write_attribute("/", "hold", std::string("foh"));
-     },
+    {"Hold", [](Hdf5File& f) { f.write_attribute("/", "hold", std::string("foh")); },
      "hold is 'foh'"},
-    {"Compensated",
-     [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       f.write_attribute("/", "compensated", std::string("yes"));
-     },
+    {"Compensated", [](Hdf5File& f) { f.write_attribute("/", "compensated", std::string("yes")); },
      "compensated is 'yes'"},
-    {"Count",
-     [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       f.write_attribute("/", "periods", -3LL);
-     },
-     "periods is -3"},
+    {"Count", [](Hdf5File& f) { f.write_attribute("/", "periods", -3LL); }, "periods is -3"},
     {"Shape",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
        write_good(f);
-       f.write_complex("/response", {2, 2, 1}, kTwo);
+       const std::complex<double> response[4] = {};
+       f.write_complex("/response", {2, 2, 1}, response);
      },
      "/response: shape is [2 x 2 x 1]; expected [2 x 1 x 1]"},
     {"VarianceShape",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       write_good(f);
-       f.write_complex("/response", {2, 1, 1}, kTwo);
-       const double variance[] = {1.0, 2.0};
-       f.write_reals("/noise_variance", {2}, variance);
+       write_response(f);
+       f.write_reals("/noise_variance", {2}, kTwo);
      },
      "/noise_variance: shape is [2]"},
     {"FrequencyShape",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       const double frequency[] = {1.0, 2.0};
-       f.write_reals("/frequency_hz", {1, 2}, frequency);
+       f.write_reals("/frequency_hz", {1, 2}, kTwo);
        f.write_texts("/inputs", {"a1"});
        f.write_texts("/outputs", {"z1"});
      },
      "/frequency_hz: shape is [1 x 2]"},
     {"NotANumber",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       write_good(f);
-       const std::complex<double> response[] = {{1.0, 0.0}, {0.0, kNan}};
-       f.write_complex("/response", {2, 1, 1}, response);
+       write_response(f, {0.0, kNan});
      },
      ":/response[line 1, z1 <- a1]: not finite"},
     {"NegativeVariance",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       write_good(f);
-       f.write_complex("/response", {2, 1, 1}, kTwo);
-       const double variance[] = {1.0, -2.0};
-       f.write_reals("/total_variance", {2, 1, 1}, variance);
+       write_response(f);
+       f.write_reals("/total_variance", {2, 1, 1}, kTwo);
      },
      ":/total_variance[line 1, z1 <- a1]: a variance must be 0 or more"},
     {"Units",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
-       write_good(f);
+       write_response(f);
        f.write_attribute("/inputs", "unit", std::vector<std::string>{"N", "m"});
-       f.write_complex("/response", {2, 1, 1}, kTwo);
      },
      ":/inputs: 2 units for 1 channel"},
     {"RealResponse",
      [](Hdf5File& f) {
-       f.write_attribute("/", "format", std::string("stageid-frf"));
        write_good(f);
-       const double response[] = {1.0, 2.0};
-       f.write_reals("/response", {2, 1, 1}, response);
+       f.write_reals("/response", {2, 1, 1}, kTwo);
      },
      "/response"},
 };
@@ -303,6 +291,8 @@ class DamagedFrfFile : public FrfFile, public testing::WithParamInterface<Damage
 TEST_P(DamagedFrfFile, IsRefusedByName) {
   Hdf5File file = Hdf5File::create(folder_ / "damaged.h5");
   GetParam().write(file);
+  if (!file.has_attribute("/", "format") && GetParam().name != std::string("NoFormat"))
+    file.write_attribute("/", "format", std::string("stageid-frf"));
   file.close();
   EXPECT_THAT(read_error("damaged.h5"),
               AllOf(HasSubstr("damaged.h5:"), HasSubstr(GetParam().message)));
@@ -324,8 +314,25 @@ TEST_F(FrfFile, ARefusedEstimateLeavesNoFile) {
   FrfEstimate frf = numbered_frf();
   frf.response(0, 0) = {kNan, 0.0};
   EXPECT_THROW(write_frf(folder_ / "bad.h5", frf), std::invalid_argument);
-  EXPECT_THROW(write_frf(folder_ / "no" / "folder" / "frf.h5", numbered_frf()), FileError);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_THROW(write_frf(folder_ / "no/folder/frf.h5", numbered_frf()), FileError);
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
+}
+
+TEST_F(FrfFile, SpoiltDatasetsAreNamed) {
+  for (const char* dataset :
+       {"/detection_line", "/detection_power", "/detection_noise", "/detection_runs",
+        "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
+        "/nonlinearity_p_value", "/nonlinearity_settled_p_value", "/nonlinearity_even_level"}) {
+    write_frf(folder_ / "frf.h5", with_quality());
+    test::Hdf5Surgery(folder_ / "frf.h5").reshape(dataset, {7});
+    EXPECT_THAT(read_error("frf.h5"), HasSubstr(dataset)) << dataset;
+  }
+  FrfEstimate frf = with_quality();
+  frf.detection.noise(1, 1) = kNan;
+  EXPECT_THROW(write_frf(folder_ / "frf.h5", frf), std::invalid_argument);
+  frf = with_quality();
+  frf.nonlinearity.p_value.resize(6, 1);
+  EXPECT_THROW(write_frf(folder_ / "frf.h5", frf), std::invalid_argument);
 }
 
 }  // namespace test_frf_file
