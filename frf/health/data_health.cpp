@@ -17,7 +17,6 @@
 #include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
 #include "frf/wiring/excitation_timing.hpp"
-#include "frf/wiring/repetition_check.hpp"
 #include "frf/wiring/rigid_body_check.hpp"
 #include "frf/wiring/skew_check.hpp"
 #include "frf/wiring/timing_check.hpp"
@@ -55,18 +54,6 @@ const std::string& Examination::name(Index channel) const {
 bool Examination::found(Cause cause) const {
   return std::any_of(findings_.begin(), findings_.end(),
                      [&](const Finding& f) { return f.cause == cause; });
-}
-
-std::vector<Index> Examination::excited_actuators() const {
-  std::vector<Index> found;
-  const auto& names = record_.info.actuators.names;
-  for (const Index axis : record_.axes) {
-    const auto at = std::find(names.begin(), names.end(),
-                              record_.info.excitation.names[static_cast<std::size_t>(axis)]);
-    if (at == names.end()) return {};
-    found.push_back(at - names.begin());
-  }
-  return found;
 }
 
 void Examination::check_cycles() {

@@ -33,7 +33,7 @@ bool above_noise(const HealthRecord& record, Index channel,
     else if (mean_square > 0.0)
       return true;
   }
-  return tail_of_evidence(evidence, static_cast<Index>(record.lines.size())) < kSignificance;
+  return tail_of_evidence(evidence, std::ssize(record.lines)) < kSignificance;
 }
 
 bool responds(const HealthRecord& record, Index channel) {

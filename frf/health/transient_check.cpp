@@ -130,9 +130,47 @@ class Window {
   bool linear() const { return phases_.agreement() > kAgreement; }
 
   /// Ratio q of the transient in consecutive periods.
-  std::complex<double> ratio() const;
+  std::complex<double> ratio() const {
+    const int P = evidence_.runs.front().periods;
+    const std::complex<double> c = along_ / start_;
+    std::complex<double> best = 0.0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto look = [&](std::complex<double> q) {
+      const double off =
+          std::abs((q - mean_of_powers(q, 2, P)) / (1.0 - mean_of_powers(q, 1, P)) - c);
+      if (off >= least) return;
+      least = off;
+      best = q;
+    };
+    // A coarse grid, then three finer ones around the best point.
+    constexpr int kAngles = 48;
+    for (int i = 1; i <= 80; ++i)
+      for (int a = 0; a < kAngles; ++a)
+        look(std::polar(std::exp(-0.1 * i), 2.0 * std::numbers::pi * a / kAngles));
+    double reach = 1.0;
+    for (int pass = 0; pass < 3; ++pass, reach /= 5.0) {
+      const std::complex<double> centre = best;
+      for (int i = -5; i <= 5; ++i)
+        for (int a = -5; a <= 5; ++a) {
+          const std::complex<double> q =
+              centre * std::polar(std::exp(0.02 * reach * i), 0.03 * reach * a);
+          if (std::abs(q) < 0.999) look(q);
+        }
+    }
+    return best;
+  }
+
   /// Shift of a parameter in standard deviations; see the header. @param used the periods' mean includes the start
-  double shift(std::complex<double> q, bool used) const;
+  double shift(std::complex<double> q, bool used) const {
+    const int P = evidence_.runs.front().periods;
+    const std::complex<double> left =
+        mean_of_powers(q, used ? 0 : 1, P) / (1.0 - mean_of_powers(q, 1, P));
+    const double averaged = used ? P + 1.0 : P;
+    // Power over noise is a mean over the sensors; the real part has half of the noise.
+    return std::abs(left) *
+           std::sqrt(2.0 * static_cast<double>(evidence_.sensors) * averaged * start_);
+  }
+
   double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
 
  private:
@@ -159,50 +197,6 @@ class Window {
   Phases phases_;
   Phases bends_;
 };
-
-std::complex<double> Window::ratio() const {
-  const int P = evidence_.runs.front().periods;
-  const std::complex<double> c = along_ / start_;
-  std::complex<double> best = 0.0;
-  double least = std::numeric_limits<double>::infinity();
-  const auto look = [&](std::complex<double> q) {
-    const double off =
-        std::abs((q - mean_of_powers(q, 2, P)) / (1.0 - mean_of_powers(q, 1, P)) - c);
-    if (off >= least) return;
-    least = off;
-    best = q;
-  };
-  // A coarse grid, then three finer ones around the best point.
-  constexpr int kAngles = 48;
-  for (int i = 1; i <= 80; ++i)
-    for (int a = 0; a < kAngles; ++a)
-      look(std::polar(std::exp(-0.1 * i), 2.0 * std::numbers::pi * a / kAngles));
-  double reach = 1.0;
-  for (int pass = 0; pass < 3; ++pass, reach /= 5.0) {
-    const std::complex<double> centre = best;
-    for (int i = -5; i <= 5; ++i)
-      for (int a = -5; a <= 5; ++a) {
-        const std::complex<double> q =
-            centre * std::polar(std::exp(0.02 * reach * i), 0.03 * reach * a);
-        if (std::abs(q) < 0.999) look(q);
-      }
-  }
-  return best;
-}
-
-double Window::shift(std::complex<double> q, bool used) const {
-  const int P = evidence_.runs.front().periods;
-  const std::complex<double> left =
-      mean_of_powers(q, used ? 0 : 1, P) / (1.0 - mean_of_powers(q, 1, P));
-  const double averaged = used ? P + 1.0 : P;
-  // Power over noise is a mean over the sensors; the real part has half of the noise.
-  return std::abs(left) *
-         std::sqrt(2.0 * static_cast<double>(evidence_.sensors) * averaged * start_);
-}
-
-std::string periods_text(int periods) {
-  return counted(static_cast<std::size_t>(periods), "period");
-}
 
 /// "71, 182 and 3 more Hz"
 std::string names_of(const std::vector<double>& frequencies_hz) {
@@ -259,23 +253,23 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
                         "let the stage warm up, or measure for a shorter time"});
   if (frequencies.empty()) return findings;
   const int needed = evidence.transient_periods + std::max(1, more);
-  Finding finding;
   // The bound is reached if all runs shift the mode alike. Their phases are random.
   const double expected = settled / std::sqrt(static_cast<double>(evidence.runs.size()));
-  finding.severity = expected > kTolerable ? Severity::fault : Severity::doubt;
-  finding.cause = Cause::unsettled;
-  finding.what = fmt::format("not settled: the transient of the start still rings at {} after {}",
-                             names_of(frequencies), periods_text(evidence.transient_periods));
-  finding.figure = fmt::format(
+  std::string figure = fmt::format(
       "shifts a mode by up to {:.2g} standard deviations; {:.2g} % remains after one more period",
       largest, 100.0 * of_largest);
   if (evidence.runs.front().start_used)
-    finding.figure += fmt::format("; {:.2g} standard deviations without the first one", settled);
-  const int recorded = evidence.transient_periods + evidence.periods;
-  finding.remedy =
-      needed <= recorded - 2
+    figure += fmt::format("; {:.2g} standard deviations without the first one", settled);
+  Finding finding{
+      expected > kTolerable ? Severity::fault : Severity::doubt,
+      Cause::unsettled,
+      "",
+      fmt::format("not settled: the transient of the start still rings at {} after {}",
+                  names_of(frequencies), counted(evidence.transient_periods, "period")),
+      figure,
+      needed <= evidence.transient_periods + evidence.periods - 2
           ? fmt::format("--transient-periods {}, or --method lpm", needed)
-          : fmt::format("--method lpm, or measure again with transient_periods: {}", needed);
+          : fmt::format("--method lpm, or measure again with transient_periods: {}", needed)};
   if (!linear) {
     finding.cause = Cause::limit_cycle;
     finding.what = fmt::format(

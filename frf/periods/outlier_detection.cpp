@@ -45,7 +45,7 @@ double power_ratio(const Eigen::MatrixXd& gram, const Periods& core, Index p) {
 /// over the root of the line's scatter.
 std::vector<Eigen::MatrixXd> line_grams(const ComparedPeriods& periods, Index channel,
                                         const std::vector<Index>& bands) {
-  const auto P = static_cast<Index>(periods.spectra.size());
+  const auto P = std::ssize(periods.spectra);
   const double smallest =
       kRounding *
       periods.spectra.front().row(channel).head(periods.frequency_hz.size()).cwiseAbs2().maxCoeff();
@@ -113,7 +113,7 @@ Periods closest_periods(const std::vector<Eigen::MatrixXd>& grams) {
 /// The periods that reduce the variance of the mean.
 Periods core_of(const std::vector<Eigen::MatrixXd>& grams) {
   Periods core = closest_periods(grams);
-  while (static_cast<Index>(core.size()) < grams.front().rows()) {
+  while (std::ssize(core) < grams.front().rows()) {
     Index next = -1;
     double least = worth_dropping(core.size());
     for (Index p = 0; p < grams.front().rows(); ++p) {
@@ -199,9 +199,9 @@ struct Excess {
 std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> number,
                              const Periods& core, Index p, double log_chance) {
   const Periods positions = comparable_positions(octave, core, p);
-  const auto M = static_cast<Index>(positions.size());
+  const auto M = std::ssize(positions);
   if (M < kFewestPositions) return std::nullopt;
-  const auto n = static_cast<Index>(core.size());
+  const auto n = std::ssize(core);
   Eigen::MatrixXd residuals = octave.detail(positions, core);
   const Eigen::VectorXd mean = residuals.rowwise().mean();
   residuals.colwise() -= mean;
@@ -224,8 +224,7 @@ std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> nu
 
 /// The record of one channel, samples x periods.
 Eigen::MatrixXd record_of(const ComparedPeriods& periods, Index channel) {
-  Eigen::MatrixXd record(periods.samples.front().rows(),
-                         static_cast<Index>(periods.spectra.size()));
+  Eigen::MatrixXd record(periods.samples.front().rows(), std::ssize(periods.spectra));
   for (Index p = 0; p < record.cols(); ++p)
     record.col(p) = periods.samples[static_cast<std::size_t>(p)].col(channel).cast<double>();
   return record;
@@ -251,9 +250,9 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
   const std::vector<Eigen::MatrixXd> grams = line_grams(periods, channel, bands);
   if (grams.empty()) return {};
   const Periods core = core_of(grams);
-  const auto P = static_cast<Index>(periods.spectra.size());
+  const auto P = std::ssize(periods.spectra);
   std::vector<Candidate> found;
-  if (static_cast<Index>(core.size()) == P) return found;
+  if (std::ssize(core) == P) return found;
   std::vector<OctaveRecord> octaves = octave_records(
       record_of(periods, channel), periods.number, periods.sample_rate_hz, periods.frequency_hz[0]);
   std::erase_if(octaves, [&](const OctaveRecord& octave) {

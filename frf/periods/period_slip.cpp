@@ -100,10 +100,9 @@ struct Explained {
 /// Independent samples of a stationary signal: (sum S)^2 / sum S^2 over the lines of both signs of its spectrum S.
 /// For white noise this is its length (Satterthwaite).
 double independent_samples(const ArrayXd& signal, RealDft& dft) {
-  std::copy_n(signal.data(), signal.size(), dft.input().begin());
   double sum = 0.0;
   double squares = 0.0;
-  for (const std::complex<double>& line : dft.forward()) {
+  for (const std::complex<double>& line : dft.forward(signal.matrix())) {
     const double power = std::norm(line);
     sum += power;
     squares += power * power;
@@ -199,14 +198,9 @@ double advantage(const Explained& of, const Change& change) {
 void add_peaks(const MatrixXd& earlier, const MatrixXd& later, RealDft& dft,
                Eigen::VectorXcd& correlation) {
   for (Index c = 0; c < later.cols(); ++c) {
-    const auto fill = [&](const MatrixXd& samples) {
-      std::copy_n(samples.col(c).data(), samples.rows(), dft.input().begin());
-    };
-    fill(later);
-    const auto X = dft.forward();
+    const auto X = dft.forward(later.col(c));
     const std::vector<std::complex<double>> of_later(X.begin(), X.end());
-    fill(earlier);
-    const auto R = dft.forward();
+    const auto R = dft.forward(earlier.col(c));
     for (Index l = 1; l < correlation.size(); ++l) {
       const auto at = static_cast<std::size_t>(l);
       const std::complex<double> product = std::conj(R[at]) * of_later[at];

@@ -20,6 +20,9 @@ struct RealizationChange {
 };
 Finding to_finding(const RealizationChange& change);
 
+/// "1.05 +- 0.002"; without a deviation the value with this number of digits.
+std::string with_deviation(double value, double deviation, int digits);
+
 /// Differences between the realizations of a log.
 struct RealizationDifferences {
   std::vector<RealizationChange> changes;  ///< by realization, then by what they explain

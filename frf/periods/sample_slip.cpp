@@ -21,23 +21,20 @@ std::string samples_of(const SampleSlip& slip) {
 }  // namespace
 
 std::string to_string(const SampleSlip& slip) {
-  const std::string samples = samples_of(slip);
-  return fmt::format("{} {} near row {}", samples, slip.lost > 0 ? "lost" : "too many", slip.row);
+  return fmt::format("{} {} near row {}", samples_of(slip), slip.lost > 0 ? "lost" : "too many",
+                     slip.row);
 }
 
 Finding to_finding(const SampleSlip& slip) {
-  const std::string samples = samples_of(slip);
-  Finding finding;
-  finding.severity = Severity::doubt;
-  finding.cause = Cause::lost_samples;
-  finding.what = fmt::format("{} {} in run {} near row {}", samples,
-                             slip.lost > 0 ? "lost" : "too many", slip.run, slip.row);
-  finding.figure =
-      fmt::format("realization {}, experiment {}", slip.realization + 1, slip.experiment + 1);
-  finding.remedy =
-      slip.spoilt ? "its period is discarded and the later ones are realigned; check the recorder"
-                  : "the later periods are realigned; check the recorder";
-  return finding;
+  return {Severity::doubt,
+          Cause::lost_samples,
+          "",
+          fmt::format("{} {} in run {} near row {}", samples_of(slip),
+                      slip.lost > 0 ? "lost" : "too many", slip.run, slip.row),
+          fmt::format("realization {}, experiment {}", slip.realization + 1, slip.experiment + 1),
+          slip.spoilt
+              ? "its period is discarded and the later ones are realigned; check the recorder"
+              : "the later periods are realigned; check the recorder"};
 }
 
 }  // namespace stageid

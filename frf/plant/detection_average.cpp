@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "excitation/threads/worker_pool.hpp"
+#include "frf/response/line_estimate.hpp"
 
 namespace stageid {
 namespace {
@@ -46,12 +47,12 @@ DetectionAverage::DetectionAverage(const std::vector<int>& lines,
       detection_(detection_lines(lines)),
       outputs_(outputs),
       groups_(single_axis ? axes : std::vector<std::string>{"all"}) {
-  const auto D = static_cast<Eigen::Index>(detection_.size());
-  const auto rows = outputs * static_cast<Eigen::Index>(groups_.size());
-  runs_.setZero(static_cast<Eigen::Index>(groups_.size()));
+  const auto D = std::ssize(detection_);
+  const auto rows = outputs * std::ssize(groups_);
+  runs_.setZero(std::ssize(groups_));
   power_.setZero(rows, D);
   noise_.setZero(outputs, D);
-  linear_power_.setZero(rows, static_cast<Eigen::Index>(lines.size()));
+  linear_power_.setZero(rows, std::ssize(lines));
 }
 
 void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
@@ -65,7 +66,7 @@ void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
     runs_[groups.back()] += 1.0;
     periods_ += spectra.periods(e);
   }
-  for_each_line(workers, static_cast<Eigen::Index>(detection_.size()),
+  for_each_line(workers, std::ssize(detection_),
                 [&](Eigen::Index d) { add_line(spectra, G, groups, d); });
   for_each_line(workers, linear_power_.cols(), [&](Eigen::Index k) {
     const Eigen::MatrixXcd Z = spectra.response(k);
@@ -77,36 +78,28 @@ void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
 
 void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
                                 const std::vector<Eigen::Index>& groups, Eigen::Index d) {
-  const auto column = static_cast<Eigen::Index>(excited_.size()) + d;
+  const auto column = std::ssize(excited_) + d;
   const Eigen::MatrixXcd Z = spectra.response(column);
   const Eigen::VectorXcd between =
       interpolated_response(excited_, detection_[static_cast<std::size_t>(d)], G);
-  Eigen::MatrixXcd residual_of_Z(outputs_, Z.rows());  // [I, -G]
-  residual_of_Z.leftCols(outputs_).setIdentity();
-  residual_of_Z.rightCols(Z.rows() - outputs_) =
-      -Eigen::Map<const Eigen::MatrixXcd>(between.data(), outputs_, Z.rows() - outputs_);
-  const Eigen::MatrixXcd E = residual_of_Z * Z;
+  const Eigen::MatrixXcd factor = residual_of_Z(between.reshaped(outputs_, Z.rows() - outputs_));
+  const Eigen::MatrixXcd E = factor * Z;
   for (Eigen::Index e = 0; e < E.cols(); ++e) {
     const auto run = static_cast<std::size_t>(e);
     power_.col(d).segment(outputs_ * groups[run], outputs_) +=
         spectra.periods(run) * E.col(e).cwiseAbs2();
   }
-  const Eigen::MatrixXcd scatter = residual_of_Z * spectra.scatter(column);
+  const Eigen::MatrixXcd scatter = factor * spectra.scatter(column);
   // The scatter is a sum of squares, but rounding may make it negative.
-  noise_.col(d) += (scatter.array() * residual_of_Z.conjugate().array())
-                       .rowwise()
-                       .sum()
-                       .real()
-                       .max(0.0)
-                       .matrix();
+  noise_.col(d) +=
+      (scatter.array() * factor.conjugate().array()).rowwise().sum().real().max(0.0).matrix();
 }
 
 DetectionLines DetectionAverage::finish(double resolution_hz) const {
   DetectionLines found;
   if (!noise_known_ || detection_.empty() || runs_.size() == 0) return found;
   if (!(runs_.minCoeff() > 0.0) || !(noise_dof_ > 0.0)) return found;
-  found.line = Eigen::Map<const Eigen::VectorXi>(detection_.data(),
-                                                 static_cast<Eigen::Index>(detection_.size()));
+  found.line = Eigen::Map<const Eigen::VectorXi>(detection_.data(), std::ssize(detection_));
   found.frequency_hz = resolution_hz * found.line.cast<double>();
   found.groups = groups_;
   found.runs = runs_;

@@ -39,7 +39,7 @@ MatrixXd dependence_of(const RealizationSpectra& spectra, Index outputs, Index b
 ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
                                  const std::vector<LineEstimate>& lines, double shared, int workers)
     : spectra_(spectra),
-      lines_(static_cast<Index>(lines.size())),
+      lines_(std::ssize(lines)),
       outputs_(lines.empty() ? 0 : lines.front().G.rows()) {
   const Index E = spectra.experiments();
   const Index n_y = outputs_;
@@ -134,37 +134,34 @@ std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
     else if (std::abs(std::log(run.ratio)) > std::abs(std::log(known->ratio)))
       *known = run;
   };
-  const NoiseLevels* first = nullptr;
+  std::vector<const NoiseLevels*> known;
   for (const NoiseLevels& one : realizations)
-    if (first == nullptr && one.differs.any()) first = &one;
-  if (first == nullptr) return found;
-  for (Index b = 0; b < first->differs.cols(); ++b)
-    for (Index i = 0; i < first->differs.rows(); ++i) {
-      const bool differs = std::any_of(
-          realizations.begin(), realizations.end(),
-          [i, b](const NoiseLevels& one) { return one.differs.size() > 0 && one.differs(i, b); });
-      if (!differs) continue;
+    if (one.differs.size() > 0) known.push_back(&one);
+  if (known.empty()) return found;
+  for (Index b = 0; b < known.front()->differs.cols(); ++b)
+    for (Index i = 0; i < known.front()->differs.rows(); ++i) {
+      if (std::none_of(known.begin(), known.end(),
+                       [i, b](const NoiseLevels* one) { return one->differs(i, b); }))
+        continue;
       std::vector<double> values;
-      for (const NoiseLevels& one : realizations)
-        if (one.differs.size() > 0)
-          for (const double x : one.log_power[static_cast<std::size_t>(b)].row(i))
-            values.push_back(x);
+      for (const NoiseLevels* one : known)
+        for (const double x : one->log_power[static_cast<std::size_t>(b)].row(i))
+          values.push_back(x);
       const double middle = value_of_rank(values, (values.size() - 1) / 2);
       OddRun most;
       double largest = 0.0;
       bool any = false;
-      for (const NoiseLevels& one : realizations) {
-        if (one.differs.size() == 0) continue;
-        const MatrixXd& x = one.log_power[static_cast<std::size_t>(b)];
+      for (const NoiseLevels* one : known) {
+        const MatrixXd& x = one->log_power[static_cast<std::size_t>(b)];
         for (Index e = 0; e < x.cols(); ++e) {
           const double off = std::abs(x(i, e) - middle);
-          const OddRun run{one.realization, e, i, std::exp(x(i, e) - middle)};
+          const OddRun run{one->realization, e, i, std::exp(x(i, e) - middle)};
           if (off > largest) {
             largest = off;
             most = run;
           }
           if (!(off > std::log(kWorthwhileRatio)) ||
-              !(off * std::sqrt(one.weight[static_cast<std::size_t>(b)](i, e)) > kDeviations))
+              !(off * std::sqrt(one->weight[static_cast<std::size_t>(b)](i, e)) > kDeviations))
             continue;
           note(run);
           any = true;

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "frf/response/noise_covariance.hpp"
+#include "frf/response/line_estimate.hpp"
 #include "frf/runs/realization_spectra.hpp"
 
 namespace stageid {

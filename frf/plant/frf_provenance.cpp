@@ -5,6 +5,7 @@
 
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/version.hpp"
+#include "frf/response/channel_positions.hpp"
 
 namespace stageid {
 
@@ -28,13 +29,9 @@ std::string FrfProvenance::json() const {
                       {"fingerprint", fingerprint_of(log.fingerprints)},
                       {"runs", log.runs}});
   }
-  Json outputs = Json::array();
-  for (const Eigen::Index i : channels_.outputs) {
-    outputs.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
-  }
   const Json options = {{"method", to_string(options_.method)},
                         {"inputs", channels_.inputs},
-                        {"outputs", outputs},
+                        {"outputs", pick(info_.sensors, channels_.outputs).names},
                         {"transient_periods", transient_periods(info_, options_)},
                         {"period_samples", info_.period_samples},
                         {"covariance", to_string(options_.covariance)},

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "excitation/threads/worker_pool.hpp"
@@ -15,27 +17,25 @@ constexpr double kAlignmentRounding =
 
 }  // namespace
 
-AlignmentAverage::AlignmentAverage(std::vector<int> excited, std::vector<int> detection,
+AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<int>& detection,
                                    Eigen::Index outputs)
-    : excited_(std::move(excited)), detection_(std::move(detection)), outputs_(outputs) {
-  std::size_t e = 0;
-  std::size_t d = 0;
-  while (e < excited_.size() || d < detection_.size()) {
-    const bool is_excited =
-        d == detection_.size() || (e < excited_.size() && excited_[e] < detection_[d]);
-    lines_.push_back(is_excited ? excited_[e] : detection_[d]);
-    column_.push_back(static_cast<Eigen::Index>(is_excited ? e : excited_.size() + d));
-    ++(is_excited ? e : d);
-  }
-  const auto L = static_cast<Eigen::Index>(lines_.size());
+    : excited_(std::move(excited)), outputs_(outputs) {
+  std::vector<int> lines = excited_;
+  lines.insert(lines.end(), detection.begin(), detection.end());
+  column_.resize(lines.size());
+  std::iota(column_.begin(), column_.end(), 0);
+  const auto line_of = [&](Eigen::Index column) { return lines[static_cast<std::size_t>(column)]; };
+  std::ranges::sort(column_, {}, line_of);
+  std::ranges::transform(column_, std::back_inserter(lines_), line_of);
+  const auto L = std::ssize(lines_);
   cosine_.setZero(outputs, L);
   pairs_.setZero(outputs, L);
 }
 
 void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G_before,
                            const Eigen::MatrixXcd& G, int workers) {
-  const auto N = static_cast<Eigen::Index>(excited_.size());
-  const auto L = static_cast<Eigen::Index>(lines_.size());
+  const auto N = std::ssize(excited_);
+  const auto L = std::ssize(lines_);
   const Eigen::Index E = spectra.experiments();
   Eigen::MatrixXcd residual = Eigen::MatrixXcd::Zero(outputs_ * E, L);
   for_each_line(workers, L, [&](Eigen::Index l) {
@@ -77,9 +77,9 @@ void AlignmentAverage::add_run(const Eigen::MatrixXcd& residual, const Eigen::Ve
 
 LineAlignment AlignmentAverage::finish(double resolution_hz) const {
   LineAlignment found;
-  found.frequency_hz = resolution_hz * Eigen::Map<const Eigen::VectorXi>(
-                                           lines_.data(), static_cast<Eigen::Index>(lines_.size()))
-                                           .cast<double>();
+  found.frequency_hz =
+      resolution_hz *
+      Eigen::Map<const Eigen::VectorXi>(lines_.data(), std::ssize(lines_)).cast<double>();
   found.cosine = cosine_;
   found.pairs = pairs_;
   return found;

@@ -13,7 +13,8 @@ namespace stageid {
 class AlignmentAverage {
  public:
   /// `excited`, `detection`: ascending.
-  AlignmentAverage(std::vector<int> excited, std::vector<int> detection, Eigen::Index outputs);
+  AlignmentAverage(std::vector<int> excited, const std::vector<int>& detection,
+                   Eigen::Index outputs);
 
   /// `G_before`: (n_y n_u) x excited lines, the mean of the previous realizations, which does not contain the noise
   /// of this one; used from the second realization on. `G`: includes this realization, for the detection lines.
@@ -27,7 +28,6 @@ class AlignmentAverage {
   void add_run(const Eigen::MatrixXcd& residual, const Eigen::VectorXd& smallest);
 
   std::vector<int> excited_;
-  std::vector<int> detection_;
   std::vector<int> lines_;            // of both, ascending
   std::vector<Eigen::Index> column_;  // index into the spectra for each of lines_
   Eigen::Index outputs_;

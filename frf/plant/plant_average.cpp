@@ -23,7 +23,7 @@ Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Ei
 double lines_that_share(const RealizationSpectra& spectra) {
   const RunSpectra& run = spectra.run(0);
   if (run.scatter_window == 0) return 1.0;
-  const auto N = static_cast<Eigen::Index>(run.scatter_first.size());
+  const auto N = std::ssize(run.scatter_first);
   double sum = 0.0;
   for (Eigen::Index l = 0; l < N; ++l) sum += common_scatter(run, N / 2, l);
   return sum;

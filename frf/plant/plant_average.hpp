@@ -11,7 +11,7 @@
 #include "frf/plant/response_drift.hpp"
 #include "frf/plant/zippered_fit.hpp"
 #include "frf/response/frf_estimate.hpp"
-#include "frf/response/noise_covariance.hpp"
+#include "frf/response/line_estimate.hpp"
 #include "frf/runs/realization_spectra.hpp"
 
 namespace stageid {

@@ -14,7 +14,6 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
-#include "excitation/multisine/frequency_grid.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
 #include "frf/plant/frf_provenance.hpp"
@@ -22,11 +21,11 @@
 #include "frf/plant/plant_average.hpp"
 #include "frf/plant/step_search.hpp"
 #include "frf/plant/zippered_fit.hpp"
+#include "frf/response/channel_positions.hpp"
 #include "frf/response/covariance_smoothing.hpp"
 #include "frf/response/leaked_noise.hpp"
 #include "frf/runs/byte_counter.hpp"
 #include "frf/runs/channel_choice.hpp"
-#include "frf/runs/constant_input.hpp"
 #include "frf/runs/excitation_spectrum.hpp"
 #include "frf/runs/health_gathering.hpp"
 #include "frf/runs/realization_spectra.hpp"
@@ -49,6 +48,13 @@ struct ExcitedPart {
   std::vector<Eigen::Index> only{};  ///< zippered: the channel of each line; otherwise empty
 };
 
+std::size_t most_runs(const std::vector<RealizationRuns>& realizations) {
+  std::size_t most = 0;
+  for (const RealizationRuns& realization : realizations)
+    most = std::max(most, realization.runs.size());
+  return most;
+}
+
 /// An estimate in progress: reads realization by realization, with threads over its runs.
 class PlantEstimation {
  public:
@@ -58,47 +64,262 @@ class PlantEstimation {
         options_(options),
         info_(realizations_.front().runs.front().log->info()),
         workers_(worker_count(options.threads)),
-        bytes_(options_, realizations_) {
-    const std::size_t most =
-        std::max_element(realizations_.begin(), realizations_.end(),
-                         [](const auto& a, const auto& b) { return a.runs.size() < b.runs.size(); })
-            ->runs.size();
-    // At most one workspace per run, because each contains a period of samples.
-    run_workers_ = static_cast<int>(std::min(static_cast<std::size_t>(workers_), most));
-    for (int w = 0; w < run_workers_; ++w) {
-      workspaces_.push_back(std::make_unique<RunWorkspace>(info_.period_samples, pool_));
-    }
-  }
+        run_workers_(options.threads, most_runs(realizations_), info_.period_samples),
+        bytes_(options_, realizations_) {}
 
   /// `health`: receives the same data; may be null.
-  FrfEstimate estimate(HealthGathering* health);
+  FrfEstimate estimate(HealthGathering* health) {
+    for (std::size_t m = 0; m < realizations_.size(); ++m) {
+      const RealizationRuns& realization = realizations_[m];
+      const std::vector<RunExcitation> excitation =
+          run_workers_.read_excitation(realization.runs, true);
+      if (!average_) prepare(realization, excitation);
+      check_excitation(realization, excitation);
+      if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
+        throw std::invalid_argument(fmt::format(
+            "{} but only {} in realization {} (counted from 1); exclude this realization",
+            counted(excited_.axes.size(), "excited axis", "excited axes"),
+            counted(realization.runs.size(), "experiment"), realization.realization + 1));
+      }
+      if (health != nullptr) health->excite(m, excitation);
+      std::vector<Eigen::MatrixXcd> R;
+      for (const RunExcitation& run : excitation)
+        R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
+      RealizationSpectra spectra(realization.realization, std::move(R), run_workers_.pool());
+      measure(m, excitation, health, spectra);
+      note_dropped(realization, spectra);
+      if (leave_out(realization, spectra)) continue;
+      refuse_constant_inputs(realization, spectra, channels_);
+      note_quality(realization, spectra);
+      include(spectra, excitation);
+    }
+    if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
+    FrfEstimate frf = describe();
+    average_->finish(frf, workers_);
+    const RealizationScatter scatter = average_->scatter();
+    if (options_.method == FrfMethod::periodic) lower_leaked_noise(scatter, frf);
+    if (health != nullptr) note_change(frf, *health);
+    if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
+    // Outside these lines, the response to some axis would be extrapolated.
+    if (zippered_) {
+      const double low_hz = frf.frequency_hz[zippered_->lines().first()];
+      const double high_hz = frf.frequency_hz[zippered_->lines().last()];
+      frf = select_band(std::move(frf), low_hz, high_hz);
+    }
+    if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
+      frf.nonlinearity = nonlinearity_test(
+          frf, {scatter, alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
+    frf.provenance_json = provenance_->json();
+    if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
+    if (channels_.inputs == frf.inputs.names) return frf;
+    return select_channels(frf, channels_.inputs, frf.outputs.names);
+  }
+
   const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }
 
  private:
-  std::vector<RunExcitation> read_excitation(const RealizationRuns& realization);
   ExcitedPart excited_part(const RealizationRuns& realization,
-                           const std::vector<RunExcitation>& excitation) const;
+                           const std::vector<RunExcitation>& excitation) const {
+    ExcitedPart part{excitation.front().spectrum.lines, {}};
+    if (part.lines.empty()) {
+      throw std::invalid_argument(fmt::format(
+          "{}/excitation: nothing is excited; record the signal that is added in the loop",
+          realization.runs.front().place()));
+    }
+    part.axes = excited_axes(excitation);
+    part.single_axis =
+        std::all_of(excitation.begin(), excitation.end(),
+                    [](const RunExcitation& run) { return run.spectrum.channels.size() == 1; });
+    const ExcitationSpectrum& first = excitation.front().spectrum;
+    if (excitation.size() == 1 && first.is_zippered()) part.only = first.only;
+    return part;
+  }
+
   void check_excitation(const RealizationRuns& realization,
-                        const std::vector<RunExcitation>& excitation) const;
-  void measure(std::size_t realization, const std::vector<RunExcitation>& excitation,
-               HealthGathering* health, RealizationSpectra& spectra);
-  void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation);
-  void note_dropped(const RealizationRuns& realization, const RealizationSpectra& spectra);
-  bool leave_out(const RealizationRuns& realization, const RealizationSpectra& spectra);
-  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra);
-  void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation);
-  FrfEstimate describe() const;
-  void note_change(const FrfEstimate& frf, HealthGathering& health) const;
+                        const std::vector<RunExcitation>& excitation) const {
+    for (std::size_t e = 0; e < excitation.size(); ++e) {
+      const ExcitationSpectrum& spectrum = excitation[e].spectrum;
+      const std::string place = realization.runs[e].place() + "/excitation";
+      if (spectrum.lines.empty())
+        throw std::invalid_argument(
+            fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
+                        "axis (--inputs with the other axes), or measure the run again",
+                        place, excited_.lines.size(), realizations_.front().runs.front().place()));
+      if (spectrum.lines != excited_.lines) {
+        std::vector<int> differing;
+        std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),
+                                      excited_.lines.begin(), excited_.lines.end(),
+                                      std::back_inserter(differing));
+        const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
+        throw std::invalid_argument(fmt::format(
+            "{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
+            "of them. All runs must excite the same lines",
+            place, spectrum.lines.size(), excited_.lines.size(),
+            realizations_.front().runs.front().place(), differing.front(),
+            differing.front() * resolution_hz));
+      }
+      if (!excited_.only.empty() && spectrum.only != excited_.only) {
+        throw std::invalid_argument(
+            fmt::format("{}: the axes have different lines than in {}; in a zippered experiment an "
+                        "axis must have the same lines in all realizations",
+                        place, realizations_.front().runs.front().place()));
+      }
+      for (const Eigen::Index axis : spectrum.channels) {
+        if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
+        throw std::invalid_argument(fmt::format(
+            "{}: channel {} is excited here but not in realization {} (counted from 1); "
+            "all realizations must excite the same axes",
+            place, info_.excitation.name(axis), realizations_.front().realization + 1));
+      }
+    }
+  }
+
+  void measure(std::size_t m, const std::vector<RunExcitation>& excitation, HealthGathering* health,
+               RealizationSpectra& spectra) {
+    const RealizationRuns& realization = realizations_[m];
+    std::mutex mutex;
+    run_workers_.for_each(realization.runs.size(), [&](RunWorkspace& workspace, std::size_t e) {
+      const auto read_done = [this](double bytes) { bytes_.add(bytes); };
+      HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
+      RunSpectra run =
+          options_.method == FrfMethod::lpm
+              ? measure_record(realization.runs[e], excitation[e], channels_, options_.periods,
+                               workspace, part, read_done)
+              : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
+                            options_.periods, workspace, part, read_done);
+      const std::lock_guard lock(mutex);
+      spectra.add(e, std::move(run));
+    });
+  }
+
+  void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation) {
+    excited_ = excited_part(realization, excitation);
+    const bool zippered = !excited_.only.empty();
+    channels_ = choose_channels(info_, excited_.axes,
+                                zippered ? excited_.axes.size() : realization.runs.size(),
+                                realization.realization, options_);
+    const auto outputs = std::ssize(channels_.outputs);
+    average_ = std::make_unique<PlantAverage>(frequencies_hz(info_, excited_.lines), excited_.lines,
+                                              outputs, std::ssize(channels_.estimated),
+                                              options_.covariance);
+    provenance_ = std::make_unique<FrfProvenance>(info_, options_, channels_);
+    excluded_power_.setZero(std::ssize(channels_.excluded));
+    lines_ = {excited_.lines, excited_.lines.size()};
+    const std::vector<std::string> axes = pick(info_.excitation, excited_.axes).names;
+    if (zippered) {
+      ZipperedLines lines{excited_.lines, {}, std::ssize(axes)};
+      for (const Eigen::Index channel : excited_.only)
+        lines.axis.push_back(std::lower_bound(excited_.axes.begin(), excited_.axes.end(), channel) -
+                             excited_.axes.begin());
+      require_enough_lines(lines, axes, realization.runs.front().place() + "/excitation");
+      zippered_ = std::make_unique<ZipperedFit>(std::move(lines), outputs);
+    }
+    if (options_.method == FrfMethod::lpm) return;
+    const std::vector<int> detection = detection_lines(excited_.lines);
+    lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
+    detection_ =
+        std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
+    if (!zippered)
+      alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
+  }
+
+  void note_dropped(const RealizationRuns& realization, const RealizationSpectra& spectra) {
+    for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+      for (DroppedPeriod dropped : spectra.run(e).dropped) {
+        dropped.realization = realization.realization;
+        dropped.experiment = realization.runs[e].run().experiment;
+        dropped_.push_back(std::move(dropped));
+      }
+    }
+  }
+
+  /// Whether a run has no clean period; records it and the realization is skipped.
+  bool leave_out(const RealizationRuns& realization, const RealizationSpectra& spectra) {
+    for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+      if (spectra.run(e).periods > 0) continue;
+      left_out_.push_back(
+          {realization.realization, fmt::format("{}: {}", realization.runs[e].place(),
+                                                no_clean_period(realization.runs[e]))});
+      if (first_marked_ == nullptr) first_marked_ = &realization.runs[e];
+      return true;
+    }
+    return false;
+  }
+
+  void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra) {
+    const auto inputs = std::ssize(channels_.estimated);
+    for (std::size_t e = 0; e < realization.runs.size(); ++e) {
+      const RunSpectra& run = spectra.run(e);
+      provenance_->add(realization.runs[e], run.fingerprint);
+      fewest_periods_ = std::min(fewest_periods_, run.periods);
+      for (Eigen::Index k = 0; k < std::ssize(excited_.lines); ++k) {
+        for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
+          input_power_ += std::norm(run.mean(i, k));
+        }
+      }
+      excluded_power_ += run.excluded_power;
+    }
+  }
+
+  void include(const RealizationSpectra& spectra, const std::vector<RunExcitation>& excitation) {
+    const Eigen::MatrixXcd G_before = alignment_ ? average_->mean_response() : Eigen::MatrixXcd();
+    average_->add(spectra, workers_, zippered_.get());
+    if (!detection_) return;
+    if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);
+    std::vector<std::size_t> axis;
+    for (const RunExcitation& run : excitation) {
+      const auto at = std::lower_bound(excited_.axes.begin(), excited_.axes.end(),
+                                       run.spectrum.channels.front());
+      axis.push_back(static_cast<std::size_t>(at - excited_.axes.begin()));
+    }
+    detection_->add(spectra, average_->mean_response(), axis, workers_);
+  }
+
+  FrfEstimate describe() const {
+    FrfEstimate frf;
+    frf.outputs = pick(info_.sensors, channels_.outputs);
+    frf.inputs = pick(info_.actuators, channels_.estimated);
+    frf.excluded_channels = pick(info_.actuators, channels_.excluded).names;
+    frf.excluded_power = excluded_power_ / input_power_;
+    frf.sample_rate_hz = info_.sample_rate_hz;
+    frf.hold = Hold::zoh;
+    frf.method = options_.method;
+    frf.dropped_periods = dropped_;
+    std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
+               std::back_inserter(frf.left_out_realizations),
+               [](const auto& a, const auto& b) { return a.realization < b.realization; });
+    frf.periods = fewest_periods_;
+    frf.experiments = static_cast<int>(realizations_.front().runs.size());
+    return frf;
+  }
+
+  /// Records drift and noise differences, which only the finished response shows.
+  void note_change(const FrfEstimate& frf, HealthGathering& health) const {
+    std::vector<NoisyRun> noisy;
+    for (const OddRun& odd : average_->odd_runs()) {
+      const auto of =
+          std::find_if(realizations_.begin(), realizations_.end(),
+                       [&odd](const auto& r) { return r.realization == odd.realization; });
+      noisy.push_back({odd.realization,
+                       of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
+                       frf.outputs.name(odd.output), odd.ratio});
+    }
+    const UsedRun& run = realizations_.front().runs.front();
+    RealizationDifferences differences = average_->differences(frf);
+    // A channel that one realization records differently has a slope over the realizations, too.
+    std::optional<ModeDrift> drift;
+    if (differences.changes.empty())
+      drift = average_->drift(frf, run.transient_periods + run.periods);
+    health.note(drift, std::move(noisy), std::move(differences));
+  }
 
   std::vector<RealizationRuns> realizations_;
   std::vector<LeftOutRealization> incomplete_;
   const FrfOptions& options_;
   const LogInfo& info_;
   int workers_;
-  int run_workers_ = 1;
+  RunWorkers run_workers_;
   ByteCounter bytes_;
-  MatrixPool pool_;
-  std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
   ExcitedPart excited_;
   SpectrumLines lines_;
   ChannelChoice channels_;
@@ -114,275 +335,6 @@ class PlantEstimation {
   double input_power_ = 0.0;
   Eigen::VectorXd excluded_power_;
 };
-
-std::vector<RunExcitation> PlantEstimation::read_excitation(const RealizationRuns& realization) {
-  std::vector<RunExcitation> excitation(realization.runs.size());
-  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
-    excitation[e] = read_run_excitation(realization.runs[e],
-                                        workspaces_[static_cast<std::size_t>(worker)]->dft);
-  });
-  return excitation;
-}
-
-ExcitedPart PlantEstimation::excited_part(const RealizationRuns& realization,
-                                          const std::vector<RunExcitation>& excitation) const {
-  ExcitedPart part{excitation.front().spectrum.lines, {}};
-  if (part.lines.empty()) {
-    throw std::invalid_argument(fmt::format(
-        "{}/excitation: nothing is excited; record the signal that is added in the loop",
-        realization.runs.front().place()));
-  }
-  for (const RunExcitation& run : excitation) {
-    part.axes.insert(part.axes.end(), run.spectrum.channels.begin(), run.spectrum.channels.end());
-    part.single_axis = part.single_axis && run.spectrum.channels.size() == 1;
-  }
-  std::sort(part.axes.begin(), part.axes.end());
-  part.axes.erase(std::unique(part.axes.begin(), part.axes.end()), part.axes.end());
-  const ExcitationSpectrum& first = excitation.front().spectrum;
-  if (excitation.size() == 1 && first.is_zippered()) part.only = first.only;
-  return part;
-}
-
-void PlantEstimation::check_excitation(const RealizationRuns& realization,
-                                       const std::vector<RunExcitation>& excitation) const {
-  for (std::size_t e = 0; e < excitation.size(); ++e) {
-    const ExcitationSpectrum& spectrum = excitation[e].spectrum;
-    const std::string place = realization.runs[e].place() + "/excitation";
-    if (spectrum.lines.empty())
-      throw std::invalid_argument(
-          fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
-                      "axis (--inputs with the other axes), or measure the run again",
-                      place, excited_.lines.size(), realizations_.front().runs.front().place()));
-    if (spectrum.lines != excited_.lines) {
-      std::vector<int> differing;
-      std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),
-                                    excited_.lines.begin(), excited_.lines.end(),
-                                    std::back_inserter(differing));
-      const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
-      throw std::invalid_argument(
-          fmt::format("{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
-                      "of them. All runs must excite the same lines",
-                      place, spectrum.lines.size(), excited_.lines.size(),
-                      realizations_.front().runs.front().place(), differing.front(),
-                      differing.front() * resolution_hz));
-    }
-    if (!excited_.only.empty() && spectrum.only != excited_.only) {
-      throw std::invalid_argument(
-          fmt::format("{}: the axes have different lines than in {}; in a zippered experiment an "
-                      "axis must have the same lines in all realizations",
-                      place, realizations_.front().runs.front().place()));
-    }
-    for (const Eigen::Index axis : spectrum.channels) {
-      if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
-      throw std::invalid_argument(
-          fmt::format("{}: channel {} is excited here but not in realization {} (counted from 1); "
-                      "all realizations must excite the same axes",
-                      place, info_.excitation.names[static_cast<std::size_t>(axis)],
-                      realizations_.front().realization + 1));
-    }
-  }
-}
-
-void PlantEstimation::measure(std::size_t m, const std::vector<RunExcitation>& excitation,
-                              HealthGathering* health, RealizationSpectra& spectra) {
-  const RealizationRuns& realization = realizations_[m];
-  std::mutex mutex;
-  for_each_task(run_workers_, realization.runs.size(), [&](int worker, std::size_t e) {
-    RunWorkspace& workspace = *workspaces_[static_cast<std::size_t>(worker)];
-    const auto read_done = [this](double bytes) { bytes_.add(bytes); };
-    HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
-    RunSpectra run = options_.method == FrfMethod::lpm
-                         ? measure_record(realization.runs[e], excitation[e], channels_,
-                                          options_.periods, workspace, part, read_done)
-                         : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
-                                       options_.periods, workspace, part, read_done);
-    const std::lock_guard lock(mutex);
-    spectra.add(e, std::move(run));
-  });
-}
-
-void PlantEstimation::note_dropped(const RealizationRuns& realization,
-                                   const RealizationSpectra& spectra) {
-  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-    for (DroppedPeriod dropped : spectra.run(e).dropped) {
-      dropped.realization = realization.realization;
-      dropped.experiment = realization.runs[e].run().experiment;
-      dropped_.push_back(std::move(dropped));
-    }
-  }
-}
-
-/// Whether a run has no clean period; records it and the realization is skipped.
-bool PlantEstimation::leave_out(const RealizationRuns& realization,
-                                const RealizationSpectra& spectra) {
-  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-    if (spectra.run(e).periods > 0) continue;
-    left_out_.push_back(
-        {realization.realization,
-         fmt::format("{}: {}", realization.runs[e].place(), no_clean_period(realization.runs[e]))});
-    if (first_marked_ == nullptr) first_marked_ = &realization.runs[e];
-    return true;
-  }
-  return false;
-}
-
-void PlantEstimation::note_quality(const RealizationRuns& realization,
-                                   const RealizationSpectra& spectra) {
-  const auto inputs = static_cast<Eigen::Index>(channels_.estimated.size());
-  for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-    const RunSpectra& run = spectra.run(e);
-    provenance_->add(realization.runs[e], run.fingerprint);
-    fewest_periods_ = std::min(fewest_periods_, run.periods);
-    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(excited_.lines.size()); ++k) {
-      for (Eigen::Index i = run.mean.rows() - inputs; i < run.mean.rows(); ++i) {
-        input_power_ += std::norm(run.mean(i, k));
-      }
-    }
-    excluded_power_ += run.excluded_power;
-  }
-}
-
-FrfEstimate PlantEstimation::describe() const {
-  FrfEstimate frf;
-  for (const Eigen::Index i : channels_.outputs) {
-    frf.outputs.names.push_back(info_.sensors.names[static_cast<std::size_t>(i)]);
-    frf.outputs.units.push_back(info_.sensors.units[static_cast<std::size_t>(i)]);
-  }
-  for (const Eigen::Index i : channels_.estimated) {
-    frf.inputs.names.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
-    frf.inputs.units.push_back(info_.actuators.units[static_cast<std::size_t>(i)]);
-  }
-  for (const Eigen::Index i : channels_.excluded) {
-    frf.excluded_channels.push_back(info_.actuators.names[static_cast<std::size_t>(i)]);
-  }
-  frf.excluded_power = excluded_power_ / input_power_;
-  frf.sample_rate_hz = info_.sample_rate_hz;
-  frf.hold = Hold::zoh;
-  frf.method = options_.method;
-  frf.dropped_periods = dropped_;
-  std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
-             std::back_inserter(frf.left_out_realizations),
-             [](const auto& a, const auto& b) { return a.realization < b.realization; });
-  frf.periods = fewest_periods_;
-  frf.experiments = static_cast<int>(realizations_.front().runs.size());
-  return frf;
-}
-
-void PlantEstimation::prepare(const RealizationRuns& realization,
-                              const std::vector<RunExcitation>& excitation) {
-  excited_ = excited_part(realization, excitation);
-  const bool zippered = !excited_.only.empty();
-  channels_ = choose_channels(info_, excited_.axes,
-                              zippered ? excited_.axes.size() : realization.runs.size(),
-                              realization.realization, options_);
-  const FrequencyGrid grid(info_.sample_rate_hz, info_.period_samples, excited_.lines);
-  const auto outputs = static_cast<Eigen::Index>(channels_.outputs.size());
-  average_ = std::make_unique<PlantAverage>(grid.frequency_hz(), excited_.lines, outputs,
-                                            static_cast<Eigen::Index>(channels_.estimated.size()),
-                                            options_.covariance);
-  provenance_ = std::make_unique<FrfProvenance>(info_, options_, channels_);
-  excluded_power_.setZero(static_cast<Eigen::Index>(channels_.excluded.size()));
-  lines_ = {excited_.lines, excited_.lines.size()};
-  std::vector<std::string> axes;
-  for (const Eigen::Index axis : excited_.axes)
-    axes.push_back(info_.excitation.names[static_cast<std::size_t>(axis)]);
-  if (zippered) {
-    ZipperedLines lines{excited_.lines, {}, static_cast<Eigen::Index>(axes.size())};
-    for (const Eigen::Index channel : excited_.only)
-      lines.axis.push_back(std::lower_bound(excited_.axes.begin(), excited_.axes.end(), channel) -
-                           excited_.axes.begin());
-    require_enough_lines(lines, axes, realization.runs.front().place() + "/excitation");
-    zippered_ = std::make_unique<ZipperedFit>(std::move(lines), outputs);
-  }
-  if (options_.method == FrfMethod::lpm) return;
-  const std::vector<int> detection = detection_lines(excited_.lines);
-  lines_.lines.insert(lines_.lines.end(), detection.begin(), detection.end());
-  detection_ =
-      std::make_unique<DetectionAverage>(excited_.lines, axes, excited_.single_axis, outputs);
-  if (!zippered)
-    alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
-}
-
-void PlantEstimation::include(const RealizationSpectra& spectra,
-                              const std::vector<RunExcitation>& excitation) {
-  const Eigen::MatrixXcd G_before = alignment_ ? average_->mean_response() : Eigen::MatrixXcd();
-  average_->add(spectra, workers_, zippered_.get());
-  if (!detection_) return;
-  if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);
-  std::vector<std::size_t> axis;
-  for (const RunExcitation& run : excitation) {
-    const auto at =
-        std::lower_bound(excited_.axes.begin(), excited_.axes.end(), run.spectrum.channels.front());
-    axis.push_back(static_cast<std::size_t>(at - excited_.axes.begin()));
-  }
-  detection_->add(spectra, average_->mean_response(), axis, workers_);
-}
-
-/// Records drift and noise differences, which only the finished response shows.
-void PlantEstimation::note_change(const FrfEstimate& frf, HealthGathering& health) const {
-  std::vector<NoisyRun> noisy;
-  for (const OddRun& odd : average_->odd_runs()) {
-    const auto of = std::find_if(realizations_.begin(), realizations_.end(), [&odd](const auto& r) {
-      return r.realization == odd.realization;
-    });
-    noisy.push_back({odd.realization,
-                     of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
-                     frf.outputs.names[static_cast<std::size_t>(odd.output)], odd.ratio});
-  }
-  const UsedRun& run = realizations_.front().runs.front();
-  RealizationDifferences differences = average_->differences(frf);
-  // A channel that one realization records differently has a slope over the realizations, too.
-  std::optional<ModeDrift> drift;
-  if (differences.changes.empty())
-    drift = average_->drift(frf, run.transient_periods + run.periods);
-  health.note(drift, std::move(noisy), std::move(differences));
-}
-
-FrfEstimate PlantEstimation::estimate(HealthGathering* health) {
-  for (std::size_t m = 0; m < realizations_.size(); ++m) {
-    const RealizationRuns& realization = realizations_[m];
-    const std::vector<RunExcitation> excitation = read_excitation(realization);
-    if (!average_) prepare(realization, excitation);
-    check_excitation(realization, excitation);
-    if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
-      throw std::invalid_argument(
-          fmt::format("{} but only {} in realization {} (counted from 1); exclude this realization",
-                      counted(excited_.axes.size(), "excited axis", "excited axes"),
-                      counted(realization.runs.size(), "experiment"), realization.realization + 1));
-    }
-    if (health != nullptr) health->excite(m, excitation);
-    std::vector<Eigen::MatrixXcd> R;
-    for (const RunExcitation& run : excitation)
-      R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
-    RealizationSpectra spectra(realization.realization, std::move(R), pool_);
-    measure(m, excitation, health, spectra);
-    note_dropped(realization, spectra);
-    if (leave_out(realization, spectra)) continue;
-    refuse_constant_inputs(realization, spectra, channels_);
-    note_quality(realization, spectra);
-    include(spectra, excitation);
-  }
-  if (left_out_.size() == realizations_.size()) refuse_marked_runs(*first_marked_);
-  FrfEstimate frf = describe();
-  average_->finish(frf, workers_);
-  const RealizationScatter scatter = average_->scatter();
-  if (options_.method == FrfMethod::periodic) lower_leaked_noise(scatter, frf);
-  if (health != nullptr) note_change(frf, *health);
-  if (detection_) frf.detection = detection_->finish(info_.sample_rate_hz / info_.period_samples);
-  // Outside these lines, the response to some axis would be extrapolated.
-  if (zippered_) {
-    const double low_hz = frf.frequency_hz[zippered_->lines().first()];
-    const double high_hz = frf.frequency_hz[zippered_->lines().last()];
-    frf = select_band(std::move(frf), low_hz, high_hz);
-  }
-  if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
-    frf.nonlinearity = nonlinearity_test(
-        frf, {scatter, alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
-  frf.provenance_json = provenance_->json();
-  if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
-  if (channels_.inputs == frf.inputs.names) return frf;
-  return select_channels(frf, channels_.inputs, frf.outputs.names);
-}
 
 /// The chosen runs, with what an earlier estimate has shown.
 ChosenRuns runs_of(const std::vector<const LogReader*>& logs, const FrfOptions& options,

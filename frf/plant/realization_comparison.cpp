@@ -19,6 +19,7 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
+using Kind = RealizationChange::Kind;
 
 constexpr Index kMostLines = 400;
 constexpr double kWorthSearching = 1.5;  // of the misfit that noise alone has
@@ -42,7 +43,7 @@ struct Part {
 };
 
 struct Candidate {
-  RealizationChange::Kind kind = RealizationChange::Kind::gain;
+  Kind kind = Kind::gain;
   Part part;
   Part with;  // swap
   double value = 1.0;
@@ -61,26 +62,31 @@ class Comparison {
         omega_(omega_rad_s),
         n_y_(outputs),
         n_u_(reference.rows() / outputs),
-        sample_s_(sample_rate_hz > 0.0 ? 1.0 / sample_rate_hz : 0.0) {}
+        sample_s_(sample_rate_hz > 0.0 ? 1.0 / sample_rate_hz : 0.0) {
+    for (Index y = 0; y < n_y_; ++y) channels_.push_back({y, 1, 0, n_u_});
+    for (Index u = 0; u < n_u_; ++u) channels_.push_back({0, n_y_, u, 1});
+  }
 
   double misfit() const { return (weight_.array() * (G_ - reference_).array().abs2()).mean(); }
 
   std::vector<Candidate> run() {
     std::vector<Candidate> found;
     const double before = misfit();
-    if (!(before > kWorthSearching) && !local_misfit()) return found;
-    for (Index i = 0; i < n_y_ + n_u_; ++i) {
+    if (!(before > kWorthSearching) &&
+        std::none_of(channels_.begin(), channels_.end(),
+                     [this](const Part& part) { return exceeds_noise(part); }))
+      return found;
+    for (std::size_t i = 0; i < channels_.size(); ++i) {
       std::optional<Candidate> best;
       const auto offer = [&](const std::optional<Candidate>& one) {
         if (one && (!best || one->explained > best->explained)) best = one;
       };
-      for (Index y = 0; y < n_y_; ++y) try_part(row(y), offer);
-      for (Index u = 0; u < n_u_; ++u) try_part(column(u), offer);
+      for (const Part& part : channels_) try_part(part, offer);
       if (n_y_ > 1 && n_u_ > 1) try_part({0, n_y_, 0, n_u_}, offer);
-      for (Index y = 0; y < n_y_; ++y)
-        for (Index z = 0; z < y; ++z) offer(exchange(row(z), row(y)));
-      for (Index u = 0; u < n_u_; ++u)
-        for (Index v = 0; v < u; ++v) offer(exchange(column(v), column(u)));
+      const auto rows = static_cast<std::size_t>(n_y_);
+      for (std::size_t p = 0; p < channels_.size(); ++p)
+        for (std::size_t q = p < rows ? 0 : rows; q < p; ++q)
+          offer(exchange(channels_[q], channels_[p]));
       if (!best) break;
       undo(*best);
       include(*best, found);
@@ -93,9 +99,6 @@ class Comparison {
   }
 
  private:
-  Part row(Index y) const { return {y, 1, 0, n_u_}; }
-  Part column(Index u) const { return {0, n_y_, u, 1}; }
-
   template <typename Term>
   void over(const Part& part, const Term& term) const {
     for (Index k = 0; k < G_.cols(); ++k)
@@ -118,21 +121,13 @@ class Comparison {
     return misfit_of(part) > kWorthSearching * entries(part);
   }
 
-  bool local_misfit() const {
-    for (Index y = 0; y < n_y_; ++y)
-      if (exceeds_noise(row(y))) return true;
-    for (Index u = 0; u < n_u_; ++u)
-      if (exceeds_noise(column(u))) return true;
-    return false;
-  }
-
-  static bool is_change(RealizationChange::Kind kind, double value) {
+  static bool is_change(Kind kind, double value) {
     switch (kind) {
-      case RealizationChange::Kind::gain:
+      case Kind::gain:
         return std::abs(value - 1.0) > kLeastGainChange;
-      case RealizationChange::Kind::skew:
+      case Kind::skew:
         return std::abs(value) > kLeastSkewChange_s;
-      case RealizationChange::Kind::swap:
+      case Kind::swap:
         return true;
     }
     return true;
@@ -143,9 +138,9 @@ class Comparison {
     const auto same = std::find_if(found.begin(), found.end(), [&](const Candidate& other) {
       return other.kind == change.kind && other.part == change.part;
     });
-    if (same == found.end() || change.kind == RealizationChange::Kind::swap)
+    if (same == found.end() || change.kind == Kind::swap)
       found.push_back(change);
-    else if (change.kind == RealizationChange::Kind::skew)
+    else if (change.kind == Kind::skew)
       same->value += change.value;
     else
       same->value *= change.value;
@@ -200,20 +195,19 @@ class Comparison {
     // A value from one half of the lines must explain the other half; that of a few disturbed lines does not.
     const Sums even = sums_of(part, 0, 2);
     const Sums odd = sums_of(part, 1, 2);
-    const auto offer_if = [&](RealizationChange::Kind kind, double value, double length,
-                              double confirmed) {
+    const auto offer_if = [&](Kind kind, double value, double length, double confirmed) {
       if (significant(part, all.misfit, confirmed))
         offer(std::optional<Candidate>(
             {kind, part, {}, value, 1.0 / std::sqrt(2.0 * length), confirmed}));
     };
-    if (is_change(RealizationChange::Kind::gain, all.gain()))
-      offer_if(RealizationChange::Kind::gain, all.gain(), all.length,
+    if (is_change(Kind::gain, all.gain()))
+      offer_if(Kind::gain, all.gain(), all.length,
                explained(even, odd.gain(), 0.0) + explained(odd, even.gain(), 0.0));
     if (sample_s_ == 0.0) return;
     const double skew_s = best_skew(all.cross);
-    if (is_change(RealizationChange::Kind::skew, skew_s))
+    if (is_change(Kind::skew, skew_s))
       offer_if(
-          RealizationChange::Kind::skew, skew_s, all.bend,
+          Kind::skew, skew_s, all.bend,
           explained(even, 1.0, best_skew(odd.cross)) + explained(odd, 1.0, best_skew(even.cross)));
   }
 
@@ -262,7 +256,7 @@ class Comparison {
     if (after[0] > 0.5 * before[0] || after[1] > 0.5 * before[1] ||
         explained < kChangeDeviations * kChangeDeviations)
       return std::nullopt;
-    return Candidate{RealizationChange::Kind::swap, one, other, 1.0, 0.0, explained};
+    return Candidate{Kind::swap, one, other, 1.0, 0.0, explained};
   }
 
   void undo(const Candidate& change) {
@@ -270,17 +264,17 @@ class Comparison {
         change.with.row - change.part.row + n_y_ * (change.with.column - change.part.column);
     over(change.part, [&](Index c, Index k) {
       switch (change.kind) {
-        case RealizationChange::Kind::gain:
+        case Kind::gain:
           // A dead channel has nothing left to examine.
           if (std::abs(change.value) > kLeastGainChange)
             G_(c, k) /= change.value;
           else
             G_(c, k) = reference_(c, k);
           break;
-        case RealizationChange::Kind::skew:
+        case Kind::skew:
           G_(c, k) *= std::polar(1.0, omega_[k] * change.value);
           break;
-        case RealizationChange::Kind::swap:
+        case Kind::swap:
           std::swap(G_(c, k), G_(c + apart, k));
           break;
       }
@@ -294,6 +288,7 @@ class Comparison {
   Index n_y_;
   Index n_u_;
   double sample_s_;
+  std::vector<Part> channels_;  // the rows, then the columns
 };
 
 /// Median of the real and of the imaginary parts; of two, the first.
@@ -318,9 +313,9 @@ bool is_actuator(const Part& part, const FrfEstimate& frf) {
 }
 
 std::string name_of(const Part& part, const FrfEstimate& frf) {
-  if (is_actuator(part, frf)) return frf.inputs.names[static_cast<std::size_t>(part.column)];
+  if (is_actuator(part, frf)) return frf.inputs.name(part.column);
   if (part.rows > 1) return "all sensors";
-  return frf.outputs.names[static_cast<std::size_t>(part.row)];
+  return frf.outputs.name(part.row);
 }
 
 /// The factor of a column of G is one over that of the actuator's record.
@@ -328,13 +323,13 @@ RealizationChange described(const Candidate& change, const FrfEstimate& frf) {
   RealizationChange found;
   found.kind = change.kind;
   found.channel = name_of(change.part, frf);
-  if (change.kind == RealizationChange::Kind::swap)
+  if (change.kind == Kind::swap)
     found.channel = fmt::format("{} {}", found.channel, name_of(change.with, frf));
   found.value = change.value;
   found.deviation = change.deviation;
   if (!is_actuator(change.part, frf)) return found;
-  if (change.kind == RealizationChange::Kind::skew) found.value = -change.value;
-  if (change.kind == RealizationChange::Kind::gain && std::abs(change.value) > kLeastGainChange) {
+  if (change.kind == Kind::skew) found.value = -change.value;
+  if (change.kind == Kind::gain && std::abs(change.value) > kLeastGainChange) {
     found.value = 1.0 / change.value;
     found.deviation = change.deviation * found.value * found.value;
   }

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "frf/response/noise_covariance.hpp"
+#include "frf/response/line_estimate.hpp"
 #include "frf/response/nonlinearity.hpp"
 
 namespace stageid {
@@ -11,7 +11,7 @@ namespace stageid {
 double harmonic_mean(const Eigen::VectorXd& dof);
 
 /// Accumulates RealizationScatter over realizations. With q_m = LineNoise::gain, the gain of realization m from the
-/// noise C_E to an entry of G (noise_covariance.hpp), and w_m = 1 / q_m, W = sum_m w_m,
+/// noise C_E to an entry of G (line_estimate.hpp), and w_m = 1 / q_m, W = sum_m w_m,
 ///   total = sum_m w_m |G^[m] - G_w|^2 / ((M - 1) W),  G_w = sum_m w_m G^[m] / W,
 ///   noise = C_E / W,  C_E pooled over the realizations by their degrees of freedom.
 /// On a linear plant w_m |G^[m] - G|^2 has the variance C_E for every m. The ratio of total and noise therefore has

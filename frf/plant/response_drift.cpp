@@ -261,23 +261,21 @@ std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const Matri
 }
 
 Finding to_finding(const ModeDrift& drift) {
-  Finding finding;
-  finding.severity = drift.bias > kMisleading ? Severity::fault : Severity::doubt;
-  finding.cause = Cause::drift;
-  finding.what = fmt::format(
-      "the response changes during the measurement: near {:.4g} Hz a mode moves by {:+.2g} % from "
-      "the "
-      "first run to the last{}",
-      drift.frequency_hz, 100.0 * drift.change,
-      drift.in_total ? "" : "; the standard deviations do not include it");
-  finding.figure = fmt::format(
-      "{:+.2g} +- {:.1g} %; the error of the response is up to {:.2g} standard deviations",
-      100.0 * drift.change, 100.0 * drift.deviation, drift.bias);
-  finding.remedy = drift.in_total ? "let the stage warm up, or measure for a shorter time; the "
-                                    "total variance includes the drift"
-                                  : "let the stage warm up, or measure for a shorter time; with "
-                                    "several realizations the total variance includes the drift";
-  return finding;
+  return {
+      drift.bias > kMisleading ? Severity::fault : Severity::doubt,
+      Cause::drift,
+      "",
+      fmt::format(
+          "the response changes during the measurement: near {:.4g} Hz a mode moves by {:+.2g} % "
+          "from the first run to the last{}",
+          drift.frequency_hz, 100.0 * drift.change,
+          drift.in_total ? "" : "; the standard deviations do not include it"),
+      fmt::format(
+          "{:+.2g} +- {:.1g} %; the error of the response is up to {:.2g} standard deviations",
+          100.0 * drift.change, 100.0 * drift.deviation, drift.bias),
+      fmt::format("let the stage warm up, or measure for a shorter time; {}the total variance "
+                  "includes the drift",
+                  drift.in_total ? "" : "with several realizations ")};
 }
 
 }  // namespace stageid

@@ -1,10 +1,14 @@
 #include "frf/plant/zippered_fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <stdexcept>
 #include <utility>
 
+#include "frf/runs/excitation_spectrum.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/local_fit.hpp"
 
@@ -21,13 +25,6 @@ constexpr double kNarrowestPole = 0.2;
 // Below this probability of the misfit under noise, the residual replaces the noise instead of being pooled.
 constexpr double kMisfitByChance = 0.01;
 
-MatrixXcd open_loop_residual(const MatrixXcd& G) {  // [I, -G]
-  MatrixXcd factor(G.rows(), G.rows() + G.cols());
-  factor.leftCols(G.rows()).setIdentity();
-  factor.rightCols(G.cols()) = -G;
-  return factor;
-}
-
 /// The matrix A for which A kron diag(C_E) equals the covariance due to the uncertainty of D, F_i F_i^H with
 /// F_i = [I, -G] X_i U^-1, in the mean over the outputs.
 MatrixXcd pole_part(const LineEstimate& line, const MatrixXcd& pole_spread,
@@ -35,7 +32,7 @@ MatrixXcd pole_part(const LineEstimate& line, const MatrixXcd& pole_spread,
   const Index n_u = line.Q.cols();
   MatrixXcd part = MatrixXcd::Zero(n_u, n_u);
   if (!(variance.minCoeff() > 0.0)) return part;
-  const MatrixXcd factor = open_loop_residual(line.G);
+  const MatrixXcd factor = residual_of_Z(line.G);
   const Eigen::VectorXd weight = variance.cwiseInverse() / static_cast<double>(variance.size());
   for (Index i = 0; i < pole_spread.cols(); ++i) {
     const MatrixXcd X = pole_spread.col(i).reshaped(factor.cols(), n_u);
@@ -70,7 +67,7 @@ std::vector<Index> ZipperedFit::window(Index k) const {
 
 ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index k) const {
   const std::vector<Index> window = this->window(k);
-  const auto B = static_cast<Index>(window.size());
+  const auto B = std::ssize(window);
   const Index axes = lines_.axes;
   const auto distance = [&](Index i) {
     const auto line = [this](Index at) { return lines_.lines[static_cast<std::size_t>(at)]; };
@@ -105,7 +102,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   result.variance_share = (fit.weight.array() * R.array()).abs2().sum() / static_cast<double>(axes);
 
   // For the mean of periods, the data of the local model.
-  const MatrixXcd left = open_loop_residual(result.line.G) * fit.residual;
+  const MatrixXcd left = residual_of_Z(result.line.G) * fit.residual;
   const Eigen::VectorXd left_variance = left.rowwise().squaredNorm() / fit.dof;
   const bool from_periods = spectra.scatter_dof() > 0;
   const double periods = from_periods ? spectra.periods(0) : 1.0;
@@ -153,6 +150,53 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
     result.noise.input_part +=
         pole_part(result.line, fit.pole_spread, result.noise.residual.diagonal().real());
   return result;
+}
+
+int zippered_window(int axes) {
+  constexpr int kDof = 6;
+  constexpr int kLeastDofOfAnAxis = 2;
+  return ZipperedFit::kRegressors + std::max(kLeastDofOfAnAxis, (kDof + axes - 1) / axes);
+}
+
+bool is_zippered(const LogReader& log) {
+  if (log.runs().empty()) return false;
+  RealDft dft(log.info().period_samples);
+  const Eigen::MatrixXd period = log.excitation(0);
+  if (period.rows() != dft.length()) return false;
+  return excitation_spectrum(period, dft).is_zippered();
+}
+
+std::vector<Eigen::Index> ZipperedLines::of(Eigen::Index wanted) const {
+  std::vector<Eigen::Index> positions;
+  for (std::size_t k = 0; k < axis.size(); ++k)
+    if (axis[k] == wanted) positions.push_back(static_cast<Eigen::Index>(k));
+  return positions;
+}
+
+Eigen::Index ZipperedLines::first() const {
+  Eigen::Index first = 0;
+  for (Eigen::Index p = 0; p < axes; ++p) first = std::max(first, of(p).front());
+  return first;
+}
+
+Eigen::Index ZipperedLines::last() const {
+  Eigen::Index last = std::ssize(axis) - 1;
+  for (Eigen::Index p = 0; p < axes; ++p) last = std::min(last, of(p).back());
+  return last;
+}
+
+void require_enough_lines(const ZipperedLines& lines, const std::vector<std::string>& names,
+                          const std::string& place) {
+  const auto needed = static_cast<std::size_t>(zippered_window(static_cast<int>(lines.axes)));
+  for (Eigen::Index p = 0; p < lines.axes; ++p) {
+    const std::size_t there = lines.of(p).size();
+    if (there >= needed) continue;
+    throw std::invalid_argument(fmt::format(
+        "{}: zippered lines: {} is excited on {} of the {} lines, but {} are required to "
+        "interpolate its responses. Lengthen the period, widen the band, or excite all axes on all "
+        "lines in {} experiments (orthogonal_dft)",
+        place, names[static_cast<std::size_t>(p)], there, lines.lines.size(), needed, lines.axes));
+  }
 }
 
 }  // namespace stageid

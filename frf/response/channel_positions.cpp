@@ -33,4 +33,13 @@ std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
   return found;
 }
 
+ChannelList pick(const ChannelList& channels, const std::vector<Eigen::Index>& at) {
+  ChannelList picked;
+  for (const Eigen::Index i : at) {
+    picked.names.push_back(channels.name(i));
+    picked.units.push_back(channels.unit(i));
+  }
+  return picked;
+}
+
 }  // namespace stageid

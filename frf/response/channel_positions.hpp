@@ -16,4 +16,7 @@ std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
                                             const std::vector<std::string>& wanted,
                                             const char* option, const char* kind);
 
+/// The channels at these indices.
+ChannelList pick(const ChannelList& channels, const std::vector<Eigen::Index>& at);
+
 }  // namespace stageid

@@ -43,7 +43,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   const Eigen::MatrixXd row = row_power(frf);
   const auto prior_dof = static_cast<double>(kFewestLinesOfBand);  // of the expectation
   out.dof = frf.total_dof + prior_dof;
-  const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
+  const auto bands = std::ssize(limits) - 1;
   out.distortion.band_hz.resize(bands, 2);
   out.distortion.level.resize(frf.response.rows(), bands);
   for (std::size_t b = 0; b + 1 < limits.size(); ++b) {

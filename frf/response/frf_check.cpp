@@ -8,6 +8,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "frf/response/frf_estimate.hpp"
+#include "frf/response/nonlinearity_sentence.hpp"
 
 namespace stageid {
 namespace {
@@ -51,16 +52,9 @@ void check_frequencies(const FrfEstimate& frf) {
   }
 }
 
-bool is_finite(double value) { return std::isfinite(value); }
-bool is_finite(const std::complex<double>& value) {
-  return std::isfinite(value.real()) && std::isfinite(value.imag());
-}
-
 std::string entry_place(const char* dataset, const FrfEstimate& frf, Eigen::Index c,
                         Eigen::Index k) {
-  return fmt::format("{}[line {}, {} <- {}]", dataset, k,
-                     frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
-                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
+  return fmt::format("{}[line {}, {}]", dataset, k, pair_name(frf, c));
 }
 
 template <typename Matrix>
@@ -76,24 +70,26 @@ void check_variance(const char* dataset, const FrfEstimate& frf, const Eigen::Ma
   check_shape(dataset, variance, frf.n_outputs() * frf.n_inputs(), frf.lines());
   for (Eigen::Index k = 0; k < variance.cols(); ++k) {
     for (Eigen::Index c = 0; c < variance.rows(); ++c) {
-      if (!is_finite(variance(c, k))) refuse(entry_place(dataset, frf, c, k), "not finite");
+      if (!std::isfinite(variance(c, k))) refuse(entry_place(dataset, frf, c, k), "not finite");
       if (variance(c, k) < 0.0)
         refuse(entry_place(dataset, frf, c, k), "a variance must be 0 or more");
     }
   }
 }
 
-/// An optional dataset of numbers without own channel names.
+/// A dataset of numbers without own channel names.
+template <typename Matrix>
+void check_numbers(const char* dataset, const Matrix& matrix, Eigen::Index rows,
+                   Eigen::Index lines) {
+  check_shape(dataset, matrix, rows, lines);
+  for (Eigen::Index k = 0; k < matrix.cols(); ++k)
+    if (!matrix.col(k).allFinite()) refuse(fmt::format("{}[line {}]", dataset, k), "not finite");
+}
+
 template <typename Matrix>
 void check_optional(const char* dataset, const Matrix& matrix, Eigen::Index rows,
                     Eigen::Index lines) {
-  if (matrix.size() == 0) return;
-  check_shape(dataset, matrix, rows, lines);
-  for (Eigen::Index k = 0; k < matrix.cols(); ++k) {
-    for (Eigen::Index c = 0; c < matrix.rows(); ++c) {
-      if (!is_finite(matrix(c, k))) refuse(fmt::format("{}[line {}]", dataset, k), "not finite");
-    }
-  }
+  if (matrix.size() > 0) check_numbers(dataset, matrix, rows, lines);
 }
 
 void check_scalars(const FrfEstimate& frf) {
@@ -114,19 +110,17 @@ void check_scalars(const FrfEstimate& frf) {
 void check_detection(const FrfEstimate& frf) {
   const DetectionLines& lines = frf.detection;
   const Eigen::Index D = lines.frequency_hz.size();
-  const Eigen::Index rows = frf.n_outputs() * static_cast<Eigen::Index>(lines.groups.size());
+  const Eigen::Index rows = frf.n_outputs() * std::ssize(lines.groups);
   if (lines.line.size() != D)
     refuse("detection_line", "must have as many values as there are frequencies");
   if (D == 0) return;
-  if (lines.runs.size() != static_cast<Eigen::Index>(lines.groups.size()))
+  if (lines.runs.size() != std::ssize(lines.groups))
     refuse("detection_runs", fmt::format("{} values for {} groups; give one per group",
                                          lines.runs.size(), lines.groups.size()));
   if (!lines.runs.allFinite() || !lines.frequency_hz.allFinite() || !std::isfinite(lines.noise_dof))
     refuse("detection_frequency_hz", "the frequencies, detection_runs and the dof must be finite");
-  check_shape("detection_power", lines.power, rows, D);
-  check_optional("detection_power", lines.power, rows, D);
-  check_shape("detection_noise", lines.noise, frf.n_outputs(), D);
-  check_optional("detection_noise", lines.noise, frf.n_outputs(), D);
+  check_numbers("detection_power", lines.power, rows, D);
+  check_numbers("detection_noise", lines.noise, frf.n_outputs(), D);
   check_optional("detection_linear_power", lines.linear_power, rows, frf.lines());
 }
 
@@ -137,15 +131,12 @@ void check_nonlinearity(const FrfEstimate& frf) {
   if (test.band_hz.cols() != 2 || !test.band_hz.allFinite())
     refuse("nonlinearity_band_hz", "expected two finite frequencies per band");
   const Eigen::Index n_c = frf.n_outputs() * frf.n_inputs();
-  check_shape("nonlinearity_p_value", test.p_value, n_c, bands);
-  check_optional("nonlinearity_p_value", test.p_value, n_c, bands);
-  check_shape("nonlinearity_distortion", test.distortion, n_c, bands);
-  check_optional("nonlinearity_distortion", test.distortion, n_c, bands);
+  check_numbers("nonlinearity_p_value", test.p_value, n_c, bands);
+  check_numbers("nonlinearity_distortion", test.distortion, n_c, bands);
   if (test.settled_p_value.size() > 0 &&
       (test.settled_p_value.size() != bands || !test.settled_p_value.allFinite()))
     refuse("nonlinearity_settled_p_value", "expected one probability per band");
-  const Eigen::Index rows =
-      frf.n_outputs() * static_cast<Eigen::Index>(frf.detection.groups.size());
+  const Eigen::Index rows = frf.n_outputs() * std::ssize(frf.detection.groups);
   for (const DetectedDistortion* kind : {&test.even, &test.odd}) {
     const char* dataset = kind == &test.even ? "nonlinearity_even" : "nonlinearity_odd";
     check_optional(dataset, kind->p_value, rows, bands);
@@ -163,11 +154,10 @@ void check(const FrfEstimate& frf) {
 
   const Eigen::Index n_channels = frf.n_outputs() * frf.n_inputs();
   check_shape("response", frf.response, n_channels, frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    for (Eigen::Index c = 0; c < n_channels; ++c) {
-      if (!is_finite(frf.response(c, k))) refuse(entry_place("response", frf, c, k), "not finite");
-    }
-  }
+  for (Eigen::Index k = 0; k < frf.lines(); ++k)
+    for (Eigen::Index c = 0; c < n_channels; ++c)
+      if (!Eigen::numext::isfinite(frf.response(c, k)))
+        refuse(entry_place("response", frf, c, k), "not finite");
   check_variance("noise_variance", frf, frf.noise_variance);
   check_variance("total_variance", frf, frf.total_variance);
   const Eigen::Index n_residuals = frf.n_outputs() * frf.n_outputs();
@@ -178,17 +168,11 @@ void check(const FrfEstimate& frf) {
   }
   check_optional("input_factor", frf.input_factor, frf.n_inputs() * frf.n_inputs(), frf.lines());
   check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
-  if (frf.input_condition.size() != 0) {
-    check_optional("input_condition", Eigen::MatrixXd(frf.input_condition.transpose()), 1,
-                   frf.lines());
-  }
-  if (frf.interpolation_misfit.size() != 0) {
-    check_optional("interpolation_misfit", Eigen::MatrixXd(frf.interpolation_misfit.transpose()), 1,
-                   frf.lines());
-  }
+  check_optional("input_condition", frf.input_condition.transpose(), 1, frf.lines());
+  check_optional("interpolation_misfit", frf.interpolation_misfit.transpose(), 1, frf.lines());
   check_detection(frf);
   check_nonlinearity(frf);
-  if (frf.excluded_power.size() != static_cast<Eigen::Index>(frf.excluded_channels.size())) {
+  if (frf.excluded_power.size() != std::ssize(frf.excluded_channels)) {
     refuse("excluded_power", fmt::format("{} values for {} channels; give one per channel",
                                          frf.excluded_power.size(), frf.excluded_channels.size()));
   }

@@ -22,15 +22,6 @@ Indices positions(const ChannelList& channels, const std::vector<std::string>& w
   return channel_positions(channels, wanted, option, kind);
 }
 
-ChannelList pick(const ChannelList& channels, const Indices& at) {
-  ChannelList picked;
-  for (const Eigen::Index i : at) {
-    picked.names.push_back(channels.names[static_cast<std::size_t>(i)]);
-    picked.units.push_back(channels.units[static_cast<std::size_t>(i)]);
-  }
-  return picked;
-}
-
 /// Selects rows of a matrix; an empty one (unknown) remains empty.
 template <typename Matrix>
 Matrix rows_or_empty(const Matrix& matrix, const Indices& rows) {
@@ -96,14 +87,12 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
         fmt::format("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
                     high_hz, range));
   }
-  keep_columns(frf.response, first, kept);
-  keep_columns(frf.noise_variance, first, kept);
-  keep_columns(frf.total_variance, first, kept);
-  keep_columns(frf.residual_covariance_re, first, kept);
-  keep_columns(frf.residual_covariance_im, first, kept);
-  keep_columns(frf.input_factor, first, kept);
-  keep_columns(frf.covariance, first, kept);
-  keep_columns(frf.detection.linear_power, first, kept);
+  for (Eigen::MatrixXcd* const columns : {&frf.response, &frf.input_factor, &frf.covariance})
+    keep_columns(*columns, first, kept);
+  for (Eigen::MatrixXd* const columns :
+       {&frf.noise_variance, &frf.total_variance, &frf.residual_covariance_re,
+        &frf.residual_covariance_im, &frf.detection.linear_power})
+    keep_columns(*columns, first, kept);
   for (Eigen::VectorXd* const of_lines :
        {&frf.input_condition, &frf.interpolation_misfit, &frf.frequency_hz}) {
     if (of_lines->size() != 0) *of_lines = of_lines->segment(first, kept).eval();

@@ -99,8 +99,8 @@ struct FrfEstimate {
   std::string provenance_json = "{}";  ///< inputs (hash), configuration, version, seeds
 
   Eigen::Index lines() const noexcept { return frequency_hz.size(); }
-  Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
-  Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
+  Eigen::Index n_outputs() const noexcept { return std::ssize(outputs); }
+  Eigen::Index n_inputs() const noexcept { return std::ssize(inputs); }
   Eigen::VectorXd omega_rad_s() const;
   /// G(j omega_k), n_y x n_u; a view, valid as long as *this.
   Eigen::Map<const Eigen::MatrixXcd> at(Eigen::Index k) const;

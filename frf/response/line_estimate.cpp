@@ -74,4 +74,29 @@ LineEstimate estimate_line(const Eigen::MatrixXcd& R, const Eigen::MatrixXcd& Z,
   return line;
 }
 
+Eigen::MatrixXcd residual_of_Z(const Eigen::MatrixXcd& G) {
+  Eigen::MatrixXcd factor(G.rows(), G.rows() + G.cols());
+  factor.leftCols(G.rows()).setIdentity();
+  factor.rightCols(G.cols()) = -G;
+  return factor;
+}
+
+Eigen::MatrixXcd residual_covariance(const Eigen::MatrixXcd& G, const Eigen::MatrixXcd& scatter,
+                                     int dof) {
+  const Eigen::MatrixXcd factor = residual_of_Z(G);
+  const Eigen::MatrixXcd residual = factor * scatter * factor.adjoint() / static_cast<double>(dof);
+  return 0.5 * (residual + residual.adjoint());
+}
+
+LineNoise line_noise(const LineEstimate& estimate, const Eigen::MatrixXcd& scatter, int dof,
+                     const Eigen::VectorXd& periods) {
+  LineNoise noise;
+  noise.residual = residual_covariance(estimate.G, scatter, dof);
+  const Eigen::VectorXd weight = periods.cwiseInverse();
+  noise.input_part = estimate.Q.transpose() * weight.asDiagonal() * estimate.Q.conjugate();
+  noise.gain = noise.input_part.diagonal().real().transpose().replicate(estimate.G.rows(), 1);
+  noise.mean_of_periods = weight.mean();
+  return noise;
+}
+
 }  // namespace stageid

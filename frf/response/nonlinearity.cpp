@@ -57,7 +57,7 @@ void test_detection(const DetectionLines& detection, const std::vector<Eigen::In
                     const Eigen::VectorXd& linear_power, Eigen::Index b,
                     DetectedDistortion& found) {
   const Eigen::Index n_y = detection.noise.rows();
-  const auto K = static_cast<Eigen::Index>(lines.size());
+  const auto K = std::ssize(lines);
   for (Eigen::Index c = 0; c < detection.power.rows(); ++c) {
     double sum = 0.0;
     double excess = 0.0;
@@ -150,7 +150,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
   if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
     throw std::invalid_argument(why);
   const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLinesOfBand);
-  const auto bands = static_cast<Eigen::Index>(limits.size()) - 1;
+  const auto bands = std::ssize(limits) - 1;
   const Eigen::Index n_c = frf.response.rows();
   NonlinearityTest test;
   test.band_hz.resize(bands, 2);

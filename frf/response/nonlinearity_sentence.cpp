@@ -31,8 +31,8 @@ std::string decibels(double ratio) {
 }
 
 std::string pair_name(const FrfEstimate& frf, Eigen::Index c) {
-  return fmt::format("{} <- {}", frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
-                     frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]);
+  return fmt::format("{} <- {}", frf.outputs.name(c % frf.n_outputs()),
+                     frf.inputs.name(c / frf.n_outputs()));
 }
 
 std::string nonlinearity_sentence(const FrfEstimate& frf) {

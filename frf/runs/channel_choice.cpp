@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -20,31 +21,21 @@ bool contains(const Indices& list, Eigen::Index value) {
 
 Indices all_of(const ChannelList& channels) {
   Indices indices(channels.size());
-  for (std::size_t i = 0; i < channels.size(); ++i) indices[i] = static_cast<Eigen::Index>(i);
+  std::iota(indices.begin(), indices.end(), 0);
   return indices;
 }
 
-std::vector<std::string> names_of(const ChannelList& channels, const Indices& at) {
-  std::vector<std::string> names;
-  for (const Eigen::Index i : at) names.push_back(channels.names[static_cast<std::size_t>(i)]);
-  return names;
-}
-
 /// The actuators with the names of the excited channels; all actuators if a name does not match.
-Indices excited_actuators(const LogInfo& info, const Indices& excited) {
-  Indices found;
-  for (const std::string& name : names_of(info.excitation, excited)) {
-    const auto at = std::find(info.actuators.names.begin(), info.actuators.names.end(), name);
-    if (at == info.actuators.names.end()) return all_of(info.actuators);
-    found.push_back(at - info.actuators.names.begin());
-  }
+Indices estimated_actuators(const LogInfo& info, const Indices& excited) {
+  Indices found = excited_actuators(info, excited);
+  if (found.empty()) return all_of(info.actuators);
   std::sort(found.begin(), found.end());
   return found;
 }
 
 void check_counts(const LogInfo& info, const Indices& excited, std::size_t inputs,
                   std::size_t experiments, int realization) {
-  const std::string axes = fmt::format("{}", fmt::join(names_of(info.excitation, excited), ", "));
+  const std::string axes = fmt::format("{}", fmt::join(pick(info.excitation, excited).names, ", "));
   if (inputs > experiments) {
     throw std::invalid_argument(
         fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment per "
@@ -75,6 +66,12 @@ void check_counts(const LogInfo& info, const Indices& excited, std::size_t input
 
 }  // namespace
 
+const std::string& ChannelChoice::name(const LogInfo& info, Eigen::Index channel) const {
+  const auto c = static_cast<std::size_t>(channel);
+  return c < outputs.size() ? info.sensors.name(outputs[c])
+                            : info.actuators.name(estimated[c - outputs.size()]);
+}
+
 ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Index>& excited,
                               std::size_t experiments, int realization, const FrfOptions& options) {
   ChannelChoice choice;
@@ -82,18 +79,37 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
                        ? all_of(info.sensors)
                        : channel_positions(info.sensors, options.outputs, "outputs", "sensor");
   const Indices asked = channel_positions(info.actuators, options.inputs, "inputs", "actuator");
-  const Indices by_excitation = excited_actuators(info, excited);
+  const Indices by_excitation = estimated_actuators(info, excited);
   const bool part_of_the_excited =
       asked.size() < excited.size() && by_excitation.size() == excited.size() &&
       std::all_of(asked.begin(), asked.end(),
                   [&](Eigen::Index i) { return contains(by_excitation, i); });
   choice.estimated = asked.empty() || part_of_the_excited ? by_excitation : asked;
-  choice.inputs = names_of(info.actuators, asked.empty() ? by_excitation : asked);
+  choice.inputs = pick(info.actuators, asked.empty() ? by_excitation : asked).names;
   check_counts(info, excited, choice.estimated.size(), experiments, realization);
   for (const Eigen::Index i : all_of(info.actuators)) {
     if (!contains(choice.estimated, i)) choice.excluded.push_back(i);
   }
   return choice;
+}
+
+std::vector<Eigen::Index> actuators_of_excitation(const LogInfo& info) {
+  std::vector<Eigen::Index> actuators;
+  const auto& names = info.actuators.names;
+  for (const std::string& name : info.excitation.names) {
+    const auto at = std::find(names.begin(), names.end(), name);
+    actuators.push_back(at == names.end() ? -1 : at - names.begin());
+  }
+  return actuators;
+}
+
+std::vector<Eigen::Index> excited_actuators(const LogInfo& info,
+                                            const std::vector<Eigen::Index>& axes) {
+  const std::vector<Eigen::Index> actuators = actuators_of_excitation(info);
+  std::vector<Eigen::Index> found;
+  for (const Eigen::Index axis : axes) found.push_back(actuators[static_cast<std::size_t>(axis)]);
+  if (std::find(found.begin(), found.end(), -1) != found.end()) found.clear();
+  return found;
 }
 
 }  // namespace stageid

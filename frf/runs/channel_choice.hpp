@@ -15,6 +15,9 @@ struct ChannelChoice {
   std::vector<Eigen::Index> estimated;  ///< actuators of the estimate
   std::vector<Eigen::Index> excluded;   ///< all other actuators
   std::vector<std::string> inputs;      ///< requested names, all in `estimated`
+
+  /// Name of a channel of [outputs; estimated].
+  const std::string& name(const LogInfo& info, Eigen::Index channel) const;
 };
 
 /// Selects the channels, given the excited excitation channels.
@@ -26,5 +29,12 @@ struct ChannelChoice {
 ///         excited axes, or if there are more inputs than experiments.
 ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Index>& excited,
                               std::size_t experiments, int realization, const FrfOptions& options);
+
+/// For every excitation channel the actuator of its name, or -1.
+std::vector<Eigen::Index> actuators_of_excitation(const LogInfo& info);
+
+/// The same for these excitation channels alone; empty if a name is missing.
+std::vector<Eigen::Index> excited_actuators(const LogInfo& info,
+                                            const std::vector<Eigen::Index>& axes);
 
 }  // namespace stageid

@@ -1,6 +1,6 @@
 #include "frf/runs/drive_mask.hpp"
 
-#include <algorithm>
+#include "frf/runs/channel_choice.hpp"
 
 namespace stageid {
 
@@ -8,6 +8,7 @@ DriveMask::DriveMask(const Eigen::MatrixXd& period, const LogInfo& info)
     : own_(info.actuators.size()) {
   const Eigen::Index samples = period.rows();
   if (samples == 0) return;
+  const std::vector<Eigen::Index> actuators = actuators_of_excitation(info);
   any_.assign(static_cast<std::size_t>(samples), 0);
   for (Eigen::Index r = 0; r < period.cols(); ++r) {
     std::vector<char> changes(static_cast<std::size_t>(samples), 0);
@@ -17,11 +18,8 @@ DriveMask::DriveMask(const Eigen::MatrixXd& period, const LogInfo& info)
       changes[static_cast<std::size_t>(n)] = any_[static_cast<std::size_t>(n)] = 1;
       moves = true;
     }
-    const auto& names = info.actuators.names;
-    const auto at =
-        std::find(names.begin(), names.end(), info.excitation.names[static_cast<std::size_t>(r)]);
-    if (moves && at != names.end())
-      own_[static_cast<std::size_t>(at - names.begin())] = std::move(changes);
+    if (const Eigen::Index a = actuators[static_cast<std::size_t>(r)]; moves && a >= 0)
+      own_[static_cast<std::size_t>(a)] = std::move(changes);
   }
 }
 

@@ -26,11 +26,8 @@ double smallest_step(const Eigen::VectorXd& samples) {
 }
 
 Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) {
-  std::copy(samples.data(), samples.data() + samples.size(), dft.input().begin());
-  const auto spectrum = dft.forward();
-  Eigen::VectorXcd values(dft.half_size());
-  std::copy(spectrum.begin(), spectrum.end(), values.data());
-  return values / static_cast<double>(dft.length());
+  return Eigen::Map<const Eigen::VectorXcd>(dft.forward(samples).data(), dft.half_size()) /
+         static_cast<double>(dft.length());
 }
 
 }  // namespace
@@ -75,12 +72,9 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
     result.lines.push_back(l);
     result.only.push_back(only[static_cast<std::size_t>(l)]);
   }
-  result.values.setZero(period.cols(), static_cast<Eigen::Index>(result.lines.size()));
-  for (const Eigen::Index c : result.channels) {
-    for (Eigen::Index k = 0; k < result.values.cols(); ++k) {
-      result.values(c, k) = spectra(result.lines[static_cast<std::size_t>(k)], c);
-    }
-  }
+  result.values.setZero(period.cols(), std::ssize(result.lines));
+  for (const Eigen::Index c : result.channels)
+    result.values.row(c) = spectra(result.lines, c).transpose();
   return result;
 }
 

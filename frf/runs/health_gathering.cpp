@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
+#include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 
 namespace stageid {
@@ -14,7 +15,7 @@ namespace {
 /// At most kHealthLines of the lines: half of them with equal ratios, for the rigid body, half with equal spacing, for
 /// the flexible modes.
 std::vector<int> thinned(const std::vector<int>& lines) {
-  if (static_cast<Eigen::Index>(lines.size()) <= kHealthLines) return lines;
+  if (std::ssize(lines) <= kHealthLines) return lines;
   std::set<int> chosen;
   const auto half = static_cast<int>(kHealthLines / 2);
   const double first = lines.front();
@@ -79,15 +80,14 @@ void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
       return;  // damage in unused periods does not matter
     }
     if ((w.samples.marked != 0).any()) return;
-    start.resize(static_cast<Eigen::Index>(sensors.size()),
-                 static_cast<Eigen::Index>(lines.size()));
+    start.resize(std::ssize(sensors), std::ssize(lines));
     line_spectra(w.samples.sensors, sensors, lines, 0, w.dft, start);
   }
   recorder_ = StartRecorder(std::move(start));
 }
 
 void HealthPart::end() {
-  for (Eigen::Index c = sensors_; c < static_cast<Eigen::Index>(scan_.size()); ++c) {
+  for (Eigen::Index c = sensors_; c < std::ssize(scan_); ++c) {
     // An actuator that is constant in a run without its excitation has an open loop.
     ChannelScan& scan = scan_[static_cast<std::size_t>(c)];
     if (!drive_.excites(c - sensors_) && scan.high().value == scan.low().value)
@@ -100,27 +100,22 @@ void HealthPart::end() {
 void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
   scan_period(w.samples, drive_, scan_);
   if (recorder_.on() && known != nullptr) {
-    recorder_.take(known->values.topLeftCorner(static_cast<Eigen::Index>(start_sensors_.size()),
-                                               static_cast<Eigen::Index>(start_lines_.size())));
+    recorder_.take(
+        known->values.topLeftCorner(std::ssize(start_sensors_), std::ssize(start_lines_)));
   } else if (recorder_.on()) {
-    Eigen::MatrixXcd spectra(static_cast<Eigen::Index>(start_sensors_.size()),
-                             static_cast<Eigen::Index>(start_lines_.size()));
+    Eigen::MatrixXcd spectra(std::ssize(start_sensors_), std::ssize(start_lines_));
     line_spectra(w.samples.sensors, start_sensors_, start_lines_, 0, w.dft, spectra);
     recorder_.take(spectra);
   }
   if (lines_.empty() || periods_.size() >= most_periods_) return;
   const Eigen::Index n_y = w.samples.sensors.cols();
-  Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), static_cast<Eigen::Index>(lines_.size()));
+  Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), std::ssize(lines_));
   std::vector<char> is_known(static_cast<std::size_t>(Z.rows()), 0);
   if (known != nullptr) {
     std::vector<Eigen::Index> rows = known->sensors;
     for (const Eigen::Index a : known->actuators) rows.push_back(n_y + a);
     for (const Eigen::Index row : rows) is_known[static_cast<std::size_t>(row)] = 1;
-    const std::vector<Eigen::Index> columns = columns_of(lines_, known->lines);
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      for (std::size_t i = 0; i < rows.size(); ++i)
-        Z(rows[i], static_cast<Eigen::Index>(k)) =
-            known->values(static_cast<Eigen::Index>(i), columns[k]);
+    Z(rows, Eigen::all) = known->values(Eigen::all, columns_of(lines_, known->lines));
   }
   transform_others(w, is_known, Z);
   periods_.push_back(std::move(Z));
@@ -132,19 +127,36 @@ void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_k
   const std::vector<Eigen::Index> sensors = unknown_channels(is_known, 0, n_y);
   const std::vector<Eigen::Index> actuators =
       unknown_channels(is_known, n_y, w.samples.actuators.cols());
-  const auto some = static_cast<Eigen::Index>(sensors.size());
-  Eigen::MatrixXcd others(some + static_cast<Eigen::Index>(actuators.size()), Z.cols());
+  const auto some = std::ssize(sensors);
+  Eigen::MatrixXcd others(some + std::ssize(actuators), Z.cols());
   line_spectra(w.samples.sensors, sensors, lines_, 0, w.dft, others);
   line_spectra(w.samples.actuators, actuators, lines_, some, w.dft, others);
-  for (std::size_t i = 0; i < sensors.size(); ++i)
-    Z.row(sensors[i]) = others.row(static_cast<Eigen::Index>(i));
-  for (std::size_t i = 0; i < actuators.size(); ++i)
-    Z.row(n_y + actuators[i]) = others.row(some + static_cast<Eigen::Index>(i));
+  Z(sensors, Eigen::all) = others.topRows(some);
+  Z.bottomRows(Z.rows() - n_y)(actuators, Eigen::all) = others.bottomRows(others.rows() - some);
 }
 
 void HealthPart::leave_out() {
   for (ChannelScan& channel : scan_) channel.break_off();
   recorder_.give_up();
+}
+
+void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& w,
+                  HealthPart* health, const std::function<void(double bytes)>& read_done,
+                  const std::function<const KnownSpectra*(int period)>& take,
+                  const std::function<void(int period, const std::string& why)>& leave_out) {
+  if (health == nullptr) {
+    for_each_period(
+        run, w, read_done, [&](int p) { take(p); }, leave_out);
+    return;
+  }
+  health->begin(run, excitation);
+  health->slips_ = for_each_period(
+      run, w, read_done, [&](int p) { health->take(w, take(p)); },
+      [&](int p, const std::string& why) {
+        leave_out(p, why);
+        health->leave_out();
+      });
+  health->end();
 }
 
 HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realizations) {
@@ -181,26 +193,19 @@ void HealthGathering::excite(std::size_t realization, const std::vector<RunExcit
   excited_ = realization;
   Realization& one = realizations_[realization];
   RealizationRecord& record = one.record;
-  for (const RunExcitation& run : runs)
-    record.axes.insert(record.axes.end(), run.spectrum.channels.begin(),
-                       run.spectrum.channels.end());
-  std::sort(record.axes.begin(), record.axes.end());
-  record.axes.erase(std::unique(record.axes.begin(), record.axes.end()), record.axes.end());
+  record.axes = excited_axes(runs);
   record.zippered = runs.size() == 1 && runs.front().spectrum.is_zippered();
   one.lines = thinned(runs.front().spectrum.lines);
   for (HealthPart& part : one.parts) {
     part.lines_ = one.lines;
     if (!first) part.most_periods_ = kPeriodsOfOthers;
   }
-  const auto K = static_cast<Eigen::Index>(one.lines.size());
-  record.frequency_hz.resize(K);
+  record.frequency_hz = frequencies_hz(record_.info, one.lines);
   record.lines.resize(one.lines.size());
-  for (Eigen::Index k = 0; k < K; ++k) {
-    const int line = one.lines[static_cast<std::size_t>(k)];
-    record.frequency_hz[k] = line * record_.info.sample_rate_hz / record_.info.period_samples;
-    LineRecord& at = record.lines[static_cast<std::size_t>(k)];
-    at.R.setZero(static_cast<Eigen::Index>(record_.info.excitation.size()),
-                 static_cast<Eigen::Index>(runs.size()));
+  for (std::size_t k = 0; k < one.lines.size(); ++k) {
+    const int line = one.lines[k];
+    LineRecord& at = record.lines[k];
+    at.R.setZero(std::ssize(record_.info.excitation), std::ssize(runs));
     for (std::size_t e = 0; e < runs.size(); ++e) {
       const ExcitationSpectrum& spectrum = runs[e].spectrum;
       const auto found = std::lower_bound(spectrum.lines.begin(), spectrum.lines.end(), line);
@@ -221,13 +226,10 @@ void HealthGathering::add_start(HealthPart& part) {
   StartEvidence& evidence = record_.start;
   if (evidence.runs.empty()) {
     start_lines_ = part.start_lines_;
-    evidence.sensors = static_cast<Eigen::Index>(part.start_sensors_.size());
+    evidence.sensors = std::ssize(part.start_sensors_);
     evidence.transient_periods = part.start_transient_periods_;
     evidence.periods = part.start_.periods + (part.start_.start_used ? 1 : 0);
-    evidence.frequency_hz.resize(static_cast<Eigen::Index>(start_lines_.size()));
-    for (std::size_t k = 0; k < start_lines_.size(); ++k)
-      evidence.frequency_hz[static_cast<Eigen::Index>(k)] =
-          start_lines_[k] * record_.info.sample_rate_hz / record_.info.period_samples;
+    evidence.frequency_hz = frequencies_hz(record_.info, start_lines_);
   } else if (part.start_lines_ != start_lines_ ||
              part.start_.periods != evidence.runs.front().periods ||
              part.start_.start_used != evidence.runs.front().start_used) {
@@ -253,8 +255,7 @@ HealthRecord HealthGathering::finish() {
       record.periods.push_back(static_cast<int>(part.periods_.size()));
       columns += record.periods.back();
     }
-    for (LineRecord& line : record.lines)
-      line.Z.resize(static_cast<Eigen::Index>(record_.scan.size()), columns);
+    for (LineRecord& line : record.lines) line.Z.resize(std::ssize(record_.scan), columns);
     Eigen::Index column = 0;
     for (HealthPart& part : one.parts) {
       for (const Eigen::MatrixXcd& spectra : part.periods_) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,21 +28,23 @@ struct KnownSpectra {
 /// Contribution of one run to a HealthRecord.
 class HealthPart {
  public:
-  /// Call before the run's periods. @param excitation samples x channels, one period
-  void begin(const UsedRun& run, const Eigen::MatrixXd& excitation);
-  /// Call after begin() to examine the transient of the start on these lines of these sensors. Reads the last period
-  /// before the used ones, if there is one.
+  /// Call before read_periods() to examine the transient of the start on these lines of these sensors. Reads the last
+  /// period before the used ones, if there is one.
   void watch_start(const UsedRun& run, const std::vector<int>& lines,
                    const std::vector<Eigen::Index>& sensors, RunWorkspace& workspace);
-  /// Adds the clean period in workspace.samples. Channels that are not in `known` are transformed here.
-  void take(RunWorkspace& workspace, const KnownSpectra* known);
-  void leave_out();
-  void note(const std::vector<SampleSlip>& slips) { slips_ = slips; }
-  /// Call after the run's periods.
-  void end();
 
  private:
   friend class HealthGathering;
+  friend void read_periods(
+      const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& workspace,
+      HealthPart* health, const std::function<void(double bytes)>& read_done,
+      const std::function<const KnownSpectra*(int period)>& take,
+      const std::function<void(int period, const std::string& why)>& leave_out);
+  void begin(const UsedRun& run, const Eigen::MatrixXd& excitation);
+  /// Adds the clean period in workspace.samples. Channels that are not in `known` are transformed here.
+  void take(RunWorkspace& workspace, const KnownSpectra* known);
+  void leave_out();
+  void end();
   void transform_others(RunWorkspace& workspace, const std::vector<char>& is_known,
                         Eigen::MatrixXcd& Z) const;
 
@@ -57,6 +61,13 @@ class HealthPart {
   int start_transient_periods_ = 0;
   RunStart start_;
 };
+
+/// for_each_period(), whose periods `health` receives as well, if not null. take() returns the period's spectra, or null.
+/// @param excitation samples x channels, one period
+void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& workspace,
+                  HealthPart* health, const std::function<void(double bytes)>& read_done,
+                  const std::function<const KnownSpectra*(int period)>& take,
+                  const std::function<void(int period, const std::string& why)>& leave_out);
 
 /// A HealthRecord in progress, filled while the logs are read for another purpose.
 class HealthGathering {

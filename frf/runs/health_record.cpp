@@ -1,10 +1,8 @@
 #include "frf/runs/health_record.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <numeric>
 
-#include "excitation/threads/worker_pool.hpp"
 #include "frf/runs/byte_counter.hpp"
 #include "frf/runs/health_gathering.hpp"
 #include "frf/runs/run_periods.hpp"
@@ -14,6 +12,12 @@
 namespace stageid {
 namespace {
 
+std::size_t total_runs(const std::vector<RealizationRuns>& realizations) {
+  std::size_t runs = 0;
+  for (const RealizationRuns& realization : realizations) runs += realization.runs.size();
+  return runs;
+}
+
 /// Reads one set of logs.
 class RecordReading {
  public:
@@ -22,15 +26,10 @@ class RecordReading {
         bytes_(options, realizations_),
         gathering_(realizations_),
         watch_start_(options.method == FrfMethod::periodic),
-        sensors_(realizations_.front().runs.front().log->info().sensors.size()) {
+        sensors_(realizations_.front().runs.front().log->info().sensors.size()),
+        workers_(options.threads, total_runs(realizations_),
+                 realizations_.front().runs.front().log->info().period_samples) {
     std::iota(sensors_.begin(), sensors_.end(), 0);
-    std::size_t runs = 0;
-    for (const RealizationRuns& realization : realizations_) runs += realization.runs.size();
-    const int period = realizations_.front().runs.front().log->info().period_samples;
-    workers_ =
-        static_cast<int>(std::min(static_cast<std::size_t>(worker_count(options.threads)), runs));
-    for (int w = 0; w < workers_; ++w)
-      workspaces_.push_back(std::make_unique<RunWorkspace>(period, pool_));
   }
 
   HealthRecord read() {
@@ -62,31 +61,20 @@ class RecordReading {
     for (std::size_t m = first; m < last; ++m)
       for (std::size_t e = 0; e < realizations_[m].runs.size(); ++e)
         runs.push_back({&realizations_[m].runs[e], &gathering_.part(m, e)});
-    for_each_task(workers_, runs.size(), [&](int worker, std::size_t i) {
-      read_run(runs[i], *workspaces_[static_cast<std::size_t>(worker)]);
-    });
+    workers_.for_each(runs.size(), [&](RunWorkspace& w, std::size_t i) { read_run(runs[i], w); });
   }
 
   void read_excitation(std::size_t realization) {
-    const std::vector<UsedRun>& runs = realizations_[realization].runs;
-    std::vector<RunExcitation> excitation(runs.size());
-    for_each_task(workers_, runs.size(), [&](int worker, std::size_t e) {
-      excitation[e] =
-          read_run_excitation(runs[e], workspaces_[static_cast<std::size_t>(worker)]->dft);
-      excitation[e].period.resize(0, 0);  // saves memory: the samples of all runs are large
-    });
-    gathering_.excite(realization, excitation);
+    gathering_.excite(realization,
+                      workers_.read_excitation(realizations_[realization].runs, false));
   }
 
   void read_run(const Run& run, RunWorkspace& w) {
     const RunExcitation excitation = read_run_excitation(*run.used, w.dft);
-    run.part->begin(*run.used, excitation.period);
     if (watch_start_) run.part->watch_start(*run.used, excitation.spectrum.lines, sensors_, w);
-    run.part->note(for_each_period(
-        *run.used, w, [this](double bytes) { bytes_.add(bytes); },
-        [&](int) { run.part->take(w, nullptr); },
-        [&](int, const std::string&) { run.part->leave_out(); }));
-    run.part->end();
+    read_periods(
+        *run.used, excitation.period, w, run.part, [this](double bytes) { bytes_.add(bytes); },
+        [](int) { return nullptr; }, [](int, const std::string&) {});
   }
 
   std::vector<RealizationRuns> realizations_;
@@ -94,9 +82,7 @@ class RecordReading {
   HealthGathering gathering_;
   bool watch_start_;  // lpm models the transient
   std::vector<Eigen::Index> sensors_;
-  int workers_ = 1;
-  MatrixPool pool_;
-  std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
+  RunWorkers workers_;
 };
 
 }  // namespace

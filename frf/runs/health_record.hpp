@@ -33,7 +33,7 @@ struct RealizationRecord {
   std::vector<Eigen::Index> axes;  ///< excitation channels that are excited, ascending
   bool zippered = false;           ///< one experiment excites them all, each on its own lines
 
-  Eigen::Index experiments() const noexcept { return static_cast<Eigen::Index>(periods.size()); }
+  Eigen::Index experiments() const noexcept { return std::ssize(periods); }
   /// Degrees of freedom of the scatter between periods: sum_e (P_e - 1).
   int scatter_dof() const noexcept;
   /// Mean over the periods of every experiment: rows x E.
@@ -66,8 +66,8 @@ struct HealthRecord : RealizationRecord {
     differences = std::move(other.differences);
   }
 
-  Eigen::Index n_y() const noexcept { return static_cast<Eigen::Index>(info.sensors.size()); }
-  Eigen::Index n_u() const noexcept { return static_cast<Eigen::Index>(info.actuators.size()); }
+  Eigen::Index n_y() const noexcept { return std::ssize(info.sensors); }
+  Eigen::Index n_u() const noexcept { return std::ssize(info.actuators); }
 };
 
 /// Largest number of lines of the checks, sufficient for the rigid body and the modes.

@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "frf/runs/channel_choice.hpp"
 #include "frf/runs/excitation_spectrum.hpp"
 #include "frf/runs/run_spectra.hpp"
+#include "frf/runs/run_table.hpp"
 
 namespace stageid {
 
@@ -22,7 +24,7 @@ class RealizationSpectra {
   void add(std::size_t experiment, RunSpectra&& spectra);
 
   int realization() const noexcept { return realization_; }
-  Eigen::Index experiments() const noexcept { return static_cast<Eigen::Index>(runs_.size()); }
+  Eigen::Index experiments() const noexcept { return std::ssize(runs_); }
 
   /// At line k, one column per experiment: R (axes x E) and Z = [Y; U] (n_y + n_u x E).
   Eigen::MatrixXcd excitation(Eigen::Index k) const;
@@ -46,5 +48,11 @@ class RealizationSpectra {
   std::vector<Eigen::MatrixXcd> excitation_;
   std::vector<RunSpectra> runs_;
 };
+
+/// Refuses inputs that are constant throughout a realization. They make U singular on every line, and this error
+/// names the channel instead of a line.
+/// @throws std::invalid_argument naming the first such channel
+void refuse_constant_inputs(const RealizationRuns& realization, const RealizationSpectra& spectra,
+                            const ChannelChoice& channels);
 
 }  // namespace stageid

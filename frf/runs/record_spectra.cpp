@@ -8,7 +8,6 @@
 
 #include "frf/periods/glitch_detection.hpp"
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/runs/transient_model.hpp"
 
@@ -37,11 +36,11 @@ class RecordMeasurement {
         choice_(choice),
         w_(workspace),
         N_(workspace.dft.length()),
-        outputs_(static_cast<Eigen::Index>(channels.outputs.size())),
-        n_(outputs_ + static_cast<Eigen::Index>(channels.estimated.size())) {
+        outputs_(std::ssize(channels.outputs)),
+        n_(outputs_ + std::ssize(channels.estimated)) {
     const int segments = (used.periods + kLongest - 1) / kLongest;
     longest_ = (used.periods + segments - 1) / segments;
-    const auto excluded = static_cast<Eigen::Index>(channels.excluded.size());
+    const auto excluded = std::ssize(channels.excluded);
     segment_.samples.resize(N_ * longest_, n_ + excluded);
     w_.excluded_sum.setZero(N_, excluded);
   }
@@ -107,7 +106,7 @@ class RecordMeasurement {
         settle(part(begin, glitch.period));
         run_.drop(segment_.first + glitch.period,
                   fmt::format("a glitch: {} deviates by {:.3g} times the surrounding noise",
-                              channel_name(glitch.channel), glitch.ratio));
+                              channels_.name(used_.log->info(), glitch.channel), glitch.ratio));
         begin = glitch.period + 1;
       }
       settle(part(begin, end));
@@ -118,15 +117,6 @@ class RecordMeasurement {
   Segment part(int begin, int end) const {
     return {segment_.samples.middleRows(begin * N_, (end - begin) * N_), segment_.first + begin,
             end - begin};
-  }
-
-  const std::string& channel_name(Eigen::Index channel) const {
-    const LogInfo& info = used_.log->info();
-    return channel < outputs_
-               ? info.sensors.names[static_cast<std::size_t>(
-                     channels_.outputs[static_cast<std::size_t>(channel)])]
-               : info.actuators.names[static_cast<std::size_t>(
-                     channels_.estimated[static_cast<std::size_t>(channel - outputs_)])];
   }
 
   void drop_alone(const Segment& segment) {
@@ -200,18 +190,10 @@ RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
   measurement.add_excitation(excitation.period);
   const auto take = [&](int p) {
     measurement.take(p);
-    if (health != nullptr) health->take(w, nullptr);
+    return nullptr;
   };
-  const auto leave_out = [&](int p, const std::string& why) {
-    measurement.leave_out(p, why);
-    if (health != nullptr) health->leave_out();
-  };
-  if (health != nullptr) health->begin(used, excitation.period);
-  const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
-  if (health != nullptr) {
-    health->note(slips);
-    health->end();
-  }
+  read_periods(used, excitation.period, w, health, read_done, take,
+               [&](int p, const std::string& why) { measurement.leave_out(p, why); });
   return measurement.finish();
 }
 

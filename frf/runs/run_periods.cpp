@@ -60,8 +60,7 @@ class PeriodReading {
     noted.spoilt = slip.row > 0;
     if (own != nullptr) {
       const LogInfo& info = used_.log->info();
-      noted.channel = (slip.sensors ? info.sensors : info.actuators)
-                          .names[static_cast<std::size_t>(slip.channel)];
+      noted.channel = (slip.sensors ? info.sensors : info.actuators).name(slip.channel);
       own->lost += slip.lost;
       return noted;
     }

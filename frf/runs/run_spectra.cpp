@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 
 #include "frf/periods/outlier_detection.hpp"
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 
 namespace stageid {
@@ -26,18 +26,18 @@ class RunMeasurement {
     const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
     together_ = (used.periods + groups - 1) / groups;
     compare_ = choice == PeriodChoice::consistent && together_ >= 3;
-    const auto n_lines = static_cast<Eigen::Index>(lines.lines.size());
+    const auto n_lines = std::ssize(lines.lines);
     const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
     w_.spectra.resize(static_cast<std::size_t>(together_));
     for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
     if (compare_) w_.record.resize(static_cast<std::size_t>(together_));
     w_.deviation_re.resize(n);
     w_.deviation_im.resize(n);
-    w_.excluded_sum.setZero(w_.dft.length(), static_cast<Eigen::Index>(channels.excluded.size()));
+    w_.excluded_sum.setZero(w_.dft.length(), std::ssize(channels.excluded));
     run_.mean.setZero(n, n_lines);
     if (used.periods < 2) return;
     run_.slope.setZero(n, n_lines);
-    const auto outputs = static_cast<Eigen::Index>(channels.outputs.size());
+    const auto outputs = std::ssize(channels.outputs);
     run_.common_sum.setZero(outputs, noise_blocks(static_cast<Eigen::Index>(lines.excited)));
     run_.own_sum = run_.common_sum;
     run_.scatter_re = w_.pool.take(n * (n + 1) / 2, n_lines);
@@ -50,7 +50,7 @@ class RunMeasurement {
     Eigen::MatrixXcd& spectra = w_.spectra[waiting_.size()];
     line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
     line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
-                 static_cast<Eigen::Index>(channels_.outputs.size()), w_.dft, spectra);
+                 std::ssize(channels_.outputs), w_.dft, spectra);
     if (compare_) keep_samples();
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
@@ -66,9 +66,7 @@ class RunMeasurement {
     if (run_.periods == 0) return std::move(run_);
     run_.scatter_dof = run_.periods - 1;
     finish_slope();
-    const std::vector<int> excited(
-        lines_.lines.begin(), lines_.lines.begin() + static_cast<std::ptrdiff_t>(lines_.excited));
-    run_.excluded_power = excluded_power(excited, unmarked_, w_);
+    run_.excluded_power = excluded_power(lines_.excited_lines(), unmarked_, w_);
     return std::move(run_);
   }
 
@@ -76,7 +74,7 @@ class RunMeasurement {
   /// Stores the period in workspace.samples minus the first waiting one, which has the same excitation: the difference
   /// is noise, for which a float is accurate enough.
   void keep_samples() {
-    const auto n_y = static_cast<Eigen::Index>(channels_.outputs.size());
+    const auto n_y = std::ssize(channels_.outputs);
     Eigen::MatrixXd& first = w_.first_samples;
     Eigen::MatrixXf& kept = w_.record[waiting_.size()];
     kept.resize(w_.dft.length(), run_.mean.rows());
@@ -97,7 +95,8 @@ class RunMeasurement {
       const ComparedPeriods compared{
           std::span<const Eigen::MatrixXcd>(w_.spectra).first(waiting_.size()),
           std::span<const Eigen::MatrixXf>(w_.record).first(waiting_.size()), waiting_,
-          excited_frequency_hz(), used_.log->info().sample_rate_hz};
+          frequencies_hz(used_.log->info(), lines_.excited_lines()),
+          used_.log->info().sample_rate_hz};
       for (const PeriodOutlier& outlier : find_outliers(compared)) {
         in[outlier.period] = 0;
         run_.drop(waiting_[outlier.period], reason(outlier));
@@ -124,7 +123,7 @@ class RunMeasurement {
 
   /// Adds to common_sum and own_sum. Two periods share the scatter of each line equally.
   void compare_lines(const std::vector<const Eigen::MatrixXcd*>& periods) {
-    const auto P = static_cast<Eigen::Index>(periods.size());
+    const auto P = std::ssize(periods);
     if (P < 3) return;
     const Eigen::Index outputs = run_.common_sum.rows();
     const auto excited = static_cast<Eigen::Index>(lines_.excited);
@@ -192,24 +191,10 @@ class RunMeasurement {
     run_.scatter_im.col(k) = w_.scatter_im;
   }
 
-  Eigen::VectorXd excited_frequency_hz() const {
-    const LogInfo& info = used_.log->info();
-    Eigen::VectorXd frequency_hz(static_cast<Eigen::Index>(lines_.excited));
-    for (std::size_t k = 0; k < lines_.excited; ++k)
-      frequency_hz[static_cast<Eigen::Index>(k)] =
-          lines_.lines[k] * info.sample_rate_hz / info.period_samples;
-    return frequency_hz;
-  }
-
   std::string reason(const PeriodOutlier& outlier) const {
-    const LogInfo& info = used_.log->info();
-    const auto c = static_cast<std::size_t>(outlier.channel);
-    const std::size_t n_y = channels_.outputs.size();
-    const std::string& name =
-        c < n_y ? info.sensors.names[static_cast<std::size_t>(channels_.outputs[c])]
-                : info.actuators.names[static_cast<std::size_t>(channels_.estimated[c - n_y])];
     return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
-                       outlier.ratio, name, outlier.low_hz, outlier.high_hz);
+                       outlier.ratio, channels_.name(used_.log->info(), outlier.channel),
+                       outlier.low_hz, outlier.high_hz);
   }
 
   const UsedRun& used_;
@@ -234,28 +219,16 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   RunMeasurement measurement(used, lines, channels, choice, w);
   Fingerprint fingerprint;
   add_matrix(fingerprint, excitation_period);
+  std::optional<KnownSpectra> known;
   const auto take = [&](int p) {
     add_matrix(fingerprint, w.samples.actuators);
     add_matrix(fingerprint, w.samples.sensors);
-    const Eigen::MatrixXcd& spectra = measurement.take(p);
-    const KnownSpectra known{spectra, channels.outputs, channels.estimated, lines};
-    if (health != nullptr) health->take(w, &known);
+    known.emplace(KnownSpectra{measurement.take(p), channels.outputs, channels.estimated, lines});
+    return &*known;
   };
-  const auto leave_out = [&](int p, const std::string& why) {
-    measurement.leave_out(p, why);
-    if (health != nullptr) health->leave_out();
-  };
-  if (health != nullptr) {
-    const std::vector<int> excited(
-        lines.lines.begin(), lines.lines.begin() + static_cast<std::ptrdiff_t>(lines.excited));
-    health->begin(used, excitation_period);
-    health->watch_start(used, excited, channels.outputs, w);
-  }
-  const std::vector<SampleSlip> slips = for_each_period(used, w, read_done, take, leave_out);
-  if (health != nullptr) {
-    health->note(slips);
-    health->end();
-  }
+  if (health != nullptr) health->watch_start(used, lines.excited_lines(), channels.outputs, w);
+  read_periods(used, excitation_period, w, health, read_done, take,
+               [&](int p, const std::string& why) { measurement.leave_out(p, why); });
   RunSpectra run = measurement.finish();
   run.fingerprint = fingerprint.hex();
   return run;

@@ -58,6 +58,9 @@ Eigen::Index noise_block(Eigen::Index k, Eigen::Index lines);
 struct SpectrumLines {
   std::vector<int> lines;
   std::size_t excited = 0;
+  std::vector<int> excited_lines() const {
+    return {lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(excited)};
+  }
 };
 
 /// Reusable memory of one thread: a plan, one period of samples, one period's spectra.

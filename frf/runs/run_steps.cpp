@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "excitation/multisine/frequency_grid.hpp"
+#include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 
@@ -16,6 +19,40 @@ RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
                                             run.place(), excitation.period.rows(), dft.length()));
   }
   excitation.spectrum = excitation_spectrum(excitation.period, dft);
+  return excitation;
+}
+
+std::vector<Eigen::Index> excited_axes(const std::vector<RunExcitation>& runs) {
+  std::set<Eigen::Index> axes;
+  for (const RunExcitation& run : runs)
+    axes.insert(run.spectrum.channels.begin(), run.spectrum.channels.end());
+  return {axes.begin(), axes.end()};
+}
+
+Eigen::VectorXd frequencies_hz(const LogInfo& info, const std::vector<int>& lines) {
+  return FrequencyGrid(info.sample_rate_hz, info.period_samples, lines).frequency_hz();
+}
+
+RunWorkers::RunWorkers(int threads, std::size_t runs, int period_samples) {
+  const auto workers = std::min(static_cast<std::size_t>(worker_count(threads)), runs);
+  for (std::size_t w = 0; w < workers; ++w)
+    workspaces_.push_back(std::make_unique<RunWorkspace>(period_samples, pool_));
+}
+
+void RunWorkers::for_each(std::size_t count,
+                          const std::function<void(RunWorkspace&, std::size_t)>& work) {
+  for_each_task(static_cast<int>(workspaces_.size()), count, [&](int worker, std::size_t i) {
+    work(*workspaces_[static_cast<std::size_t>(worker)], i);
+  });
+}
+
+std::vector<RunExcitation> RunWorkers::read_excitation(const std::vector<UsedRun>& runs,
+                                                       bool keep_periods) {
+  std::vector<RunExcitation> excitation(runs.size());
+  for_each(runs.size(), [&](RunWorkspace& workspace, std::size_t e) {
+    excitation[e] = read_run_excitation(runs[e], workspace.dft);
+    if (!keep_periods) excitation[e].period.resize(0, 0);
+  });
   return excitation;
 }
 
@@ -40,7 +77,7 @@ void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index
                   Eigen::MatrixXcd& spectra) {
   constexpr Eigen::Index kTogether = 4;
   const double scale = 1.0 / static_cast<double>(dft.length());
-  const auto count = static_cast<Eigen::Index>(channels.size());
+  const auto count = std::ssize(channels);
   Eigen::MatrixXcd some(spectra.cols(), kTogether);
   for (Eigen::Index first = 0; first < count; first += kTogether) {
     const Eigen::Index n = std::min(kTogether, count - first);

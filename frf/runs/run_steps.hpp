@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <complex>
+#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,6 +28,29 @@ struct RunExcitation {
 
 /// @throws std::invalid_argument if the excitation is not one period of dft.length() samples
 RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft);
+
+/// The excitation channels that any of the runs excites, ascending.
+std::vector<Eigen::Index> excited_axes(const std::vector<RunExcitation>& runs);
+
+/// Frequencies of lines. @pre excited ones, ascending
+Eigen::VectorXd frequencies_hz(const LogInfo& info, const std::vector<int>& lines);
+
+/// Threads that each have a workspace, at most one per run of a log, because each contains a period of samples.
+class RunWorkers {
+ public:
+  RunWorkers(int threads, std::size_t runs, int period_samples);
+  MatrixPool& pool() noexcept { return pool_; }
+  /// Calls work(workspace, i) for i = 0 .. count - 1 as for_each_task() does.
+  void for_each(std::size_t count,
+                const std::function<void(RunWorkspace& workspace, std::size_t i)>& work);
+  /// @param keep_periods false saves memory: the samples of all runs are large
+  /// @throws the same as read_run_excitation()
+  std::vector<RunExcitation> read_excitation(const std::vector<UsedRun>& runs, bool keep_periods);
+
+ private:
+  MatrixPool pool_;
+  std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
+};
 
 /// Unscaled DFT of one column, on lines above zero; valid until the next call. @pre samples.rows() == dft.length()
 std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,

@@ -53,8 +53,7 @@ TransientModel::TransientModel(int period_samples, int periods,
   }
   const auto first = taken.begin() + static_cast<Eigen::Index>(excitation.lines.front());
   const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
-  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 <
-                          static_cast<Eigen::Index>(excitation.lines.size())) {
+  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 < std::ssize(excitation.lines)) {
     throw std::invalid_argument(
         fmt::format("{}: with a single period, method 'lpm' estimates the transient from unexcited "
                     "lines, but there are too few. Excite only odd lines, or measure two periods",
@@ -64,7 +63,7 @@ TransientModel::TransientModel(int period_samples, int periods,
     if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
   }
   window_ = kOrder + 1 + kResidualDof;
-  if (static_cast<Eigen::Index>(usable_.size()) < window_) {
+  if (std::ssize(usable_) < window_) {
     throw std::invalid_argument(
         fmt::format("{}: method 'lpm' needs {} bins between the lines, but this record of {} has "
                     "{}; measure more periods",
@@ -74,7 +73,7 @@ TransientModel::TransientModel(int period_samples, int periods,
 
 std::vector<Eigen::Index> TransientModel::window(Eigen::Index bin) const {
   const auto above = std::lower_bound(usable_.begin(), usable_.end(), bin) - usable_.begin();
-  const auto last_first = static_cast<Eigen::Index>(usable_.size()) - window_;
+  const auto last_first = std::ssize(usable_) - window_;
   const Eigen::Index first = std::clamp<Eigen::Index>(above - window_ / 2, 0, last_first);
   return {usable_.begin() + first, usable_.begin() + first + window_};
 }
@@ -119,7 +118,7 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
 }
 
 void TransientModel::separate(const Eigen::MatrixXcd& Z, RunSpectra& run) const {
-  const auto lines = static_cast<Eigen::Index>(excitation_.lines.size());
+  const auto lines = std::ssize(excitation_.lines);
   const Eigen::Index n = Z.rows();
   run.mean.resize(n, lines);
   run.scatter_re.setZero(n * (n + 1) / 2, lines);

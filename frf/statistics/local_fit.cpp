@@ -45,7 +45,7 @@ class Projection {
   }
   Eigen::MatrixXcd residual(const Eigen::MatrixXcd& Z) const { return Z - fitted(Z); }
   Eigen::MatrixXcd value(const Eigen::MatrixXcd& Z) const {
-    Eigen::MatrixXcd value(Z.rows(), static_cast<Eigen::Index>(groups_.size()));
+    Eigen::MatrixXcd value(Z.rows(), std::ssize(groups_));
     for (std::size_t g = 0; g < groups_.size(); ++g)
       value.col(static_cast<Eigen::Index>(g)) =
           Z.middleCols(groups_[g].first, groups_[g].Q.rows()) * groups_[g].weight;
@@ -67,7 +67,7 @@ class Projection {
 
 /// Residual degrees of freedom with `poles` poles, over all channels with independent noise.
 double degrees_of_freedom(const LocalProblem& problem, int poles) {
-  const auto groups = static_cast<Eigen::Index>(problem.groups.size());
+  const auto groups = std::ssize(problem.groups);
   return static_cast<double>(problem.tested_noise) *
              static_cast<double>(problem.r.size() - problem.K.rows() * groups) -
          static_cast<double>(poles);
@@ -203,7 +203,7 @@ class Fitting {
   }
 
   LocalFit fit(const Eigen::VectorXcd& d, const Projection& projection) const {
-    const auto groups = static_cast<Eigen::Index>(p_.groups.size());
+    const auto groups = std::ssize(p_.groups);
     LocalFit result;
     result.poles = static_cast<int>(d.size());
     result.value = projection.value(p_.Z);
@@ -291,7 +291,7 @@ double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fi
 /// its poles.
 Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitting,
                                const std::vector<LocalFit>& fits) {
-  Eigen::ArrayXd log_p(static_cast<Eigen::Index>(fits.size()));
+  Eigen::ArrayXd log_p(std::ssize(fits));
   for (Eigen::Index n = 0; n < log_p.size(); ++n) {
     const LocalFit& fit = fits[static_cast<std::size_t>(n)];
     const double cost = std::max(fitting.cost(fit), std::numeric_limits<double>::min());
@@ -336,7 +336,7 @@ LocalFit average_locally(const LocalProblem& problem, int most_poles) {
   const Eigen::Index B = problem.r.size();
   const Eigen::Index channels = problem.Z.rows();
   LocalFit mean;
-  mean.value.setZero(channels, static_cast<Eigen::Index>(problem.groups.size()));
+  mean.value.setZero(channels, std::ssize(problem.groups));
   mean.weight.setZero(B);
   mean.leverage.setZero(mean.value.cols());
   mean.residual.resize(channels, B * share.size());

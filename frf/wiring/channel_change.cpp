@@ -12,62 +12,58 @@ namespace {
 
 constexpr double kMicroseconds = 1e6;
 
-std::string with_deviation(double value, double deviation) {
-  return deviation > 0.0 ? fmt::format("{:.4g} +- {:.1g}", value, deviation)
-                         : fmt::format("{:.3g}", value);
-}
-
 Finding swap_finding(bool in_recording, bool of_sensors) {
-  Finding finding;
-  finding.cause = Cause::swapped;
-  if (in_recording) {
-    finding.what =
-        "recorded under each other's name: u = r - C y is satisfied if the two are exchanged";
-    finding.remedy = "exchange the two names in the channel list of the recorder";
-  } else {
-    finding.what = "cables exchanged: the rigid body fits if the two are exchanged";
-    finding.remedy =
-        of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
-                   : "exchange the two amplifiers' cables, or their positions in the stage file";
-  }
-  finding.figure = "exchanged";
-  return finding;
+  if (in_recording)
+    return {Severity::fault,
+            Cause::swapped,
+            "",
+            "recorded under each other's name: u = r - C y is satisfied if the two are exchanged",
+            "exchanged",
+            "exchange the two names in the channel list of the recorder"};
+  return {Severity::fault,
+          Cause::swapped,
+          "",
+          "cables exchanged: the rigid body fits if the two are exchanged",
+          "exchanged",
+          of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
+                     : "exchange the two amplifiers' cables, or their positions in the stage file"};
 }
 
 Finding gain_finding(const ChannelChange& change, bool in_recording) {
-  Finding finding;
   const double factor = std::abs(change.value);
-  const bool sign_only = change.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3);
-  finding.cause = sign_only ? Cause::sign : Cause::scale;
   const char* where = in_recording ? "in the recording" : "at the stage";
-  if (sign_only) {
-    finding.what = fmt::format("sign flipped {}", where);
-    finding.remedy = in_recording
-                         ? "change the sign of the channel in the scaling of the recorder"
-                         : "change the polarity of the channel, or its direction in the stage file";
-  } else {
-    finding.what =
-        fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where);
-    finding.remedy = fmt::format(
-        "divide the channel by the factor; check its unit and {}",
-        in_recording ? "the scaling of the recorder" : "its gain, or the mass in the stage file");
-  }
-  finding.figure = fmt::format("factor {}", with_deviation(change.value, change.deviation));
-  return finding;
+  const std::string figure =
+      fmt::format("factor {}", with_deviation(change.value, change.deviation, 3));
+  if (change.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3))
+    return {Severity::fault,
+            Cause::sign,
+            "",
+            fmt::format("sign flipped {}", where),
+            figure,
+            in_recording
+                ? "change the sign of the channel in the scaling of the recorder"
+                : "change the polarity of the channel, or its direction in the stage file"};
+  return {Severity::fault,
+          Cause::scale,
+          "",
+          fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where),
+          figure,
+          fmt::format("divide the channel by the factor; check its unit and {}",
+                      in_recording ? "the scaling of the recorder"
+                                   : "its gain, or the mass in the stage file")};
 }
 
 Finding skew_finding(const ChannelChange& change, bool in_recording) {
-  Finding finding;
-  finding.cause = Cause::skew;
-  finding.what =
+  return {
+      Severity::fault,
+      Cause::skew,
+      "",
       fmt::format("{} {} than the other channels", in_recording ? "recorded" : "acts or samples",
-                  change.value > 0.0 ? "later" : "earlier");
-  finding.figure = fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
-                                                       kMicroseconds * change.deviation));
-  finding.remedy = in_recording
-                       ? "sample all channels simultaneously, or shift this one back"
-                       : "sample all channels simultaneously, or fit with --delay per_channel";
-  return finding;
+                  change.value > 0.0 ? "later" : "earlier"),
+      fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
+                                          kMicroseconds * change.deviation, 3)),
+      in_recording ? "sample all channels simultaneously, or shift this one back"
+                   : "sample all channels simultaneously, or fit with --delay per_channel"};
 }
 
 }  // namespace
@@ -103,8 +99,8 @@ ChannelChange inverse(ChannelChange change) {
 std::string channel_names(const ChannelChange& change, const LogInfo& info) {
   const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
   if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";
-  const std::string& a = list.names[static_cast<std::size_t>(change.a)];
-  return change.b < 0 ? a : a + " " + list.names[static_cast<std::size_t>(change.b)];
+  const std::string& a = list.name(change.a);
+  return change.b < 0 ? a : a + " " + list.name(change.b);
 }
 
 Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording) {
@@ -112,7 +108,6 @@ Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_rec
                         ? swap_finding(in_recording, change.of_sensors)
                     : change.kind == ChannelChange::Kind::gain ? gain_finding(change, in_recording)
                                                                : skew_finding(change, in_recording);
-  finding.severity = Severity::fault;
   finding.channel = channel_names(change, info);
   return finding;
 }

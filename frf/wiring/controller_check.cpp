@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "frf/runs/channel_choice.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/wiring/feedback_check.hpp"
 
@@ -43,272 +44,6 @@ struct Candidate {
   double share = 0.0;  // of the misfit of the affected rows
 };
 
-class Search {
- public:
-  Search(HealthRecord& record, const NominalStage& nominal);
-  ControllerCheck run();
-  /// Whether there is nothing to search for.
-  bool holds();
-  double unexplained_motion() const;
-
- private:
-  void refresh();
-  std::optional<Candidate> best() const;
-  double row_cost(Index row) const;
-  bool sensors_follow() const;
-  bool commands_follow(Index first, Index rows) const;
-  /// Whether two signals of these actuators, functions of a line, are equal up to a factor.
-  template <typename One, typename Other>
-  bool proportional(Index first, Index rows, const One& one, const Other& other) const;
-  /// Tries E - d X with X of `direction`, rows x E.
-  template <typename Direction>
-  void try_direction(ChannelChange change, double cost, Index first, Index rows,
-                     const Direction& direction);
-  void try_swap(ChannelChange change, double cost, double after);
-  void try_whole_skews(Index actuator, double cost);
-  template <typename Term>
-  double sum_over_lines(const Term& term) const {
-    double sum = 0.0;
-    for (const Line& line : lines_) sum += term(line);
-    return sum;
-  }
-  void try_sensors();
-  void try_actuators();
-  std::vector<ControllerMisfit> misfits() const;
-  bool significant(Index row) const;
-
-  HealthRecord& record_;
-  std::vector<Eigen::MatrixXcd> R_;
-  std::vector<Line> lines_;
-  bool noise_known_;
-  double epsilon_;  // relative error of the model of the controller, of C y
-  double total_ = 0.0;
-  std::vector<Candidate> candidates_;
-};
-
-Search::Search(HealthRecord& record, const NominalStage& nominal)
-    : record_(record),
-      lines_(record.lines.size()),
-      noise_known_(record.scatter_dof() > 0),
-      epsilon_(noise_known_ ? nominal.controller_error
-                            : std::max(kEpsilonOnePeriod, nominal.controller_error)) {
-  std::string missing;
-  const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
-  const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
-  std::vector<Index> actuator_of_axis;
-  for (const Index axis : record.axes) {
-    const auto& names = record.info.actuators.names;
-    actuator_of_axis.push_back(
-        std::find(names.begin(), names.end(),
-                  record.info.excitation.names[static_cast<std::size_t>(axis)]) -
-        names.begin());
-  }
-  for (std::size_t k = 0; k < lines_.size(); ++k) {
-    const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
-    lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
-    lines_[k].known =
-        frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
-    lines_[k].F = lines_[k].known ? Eigen::MatrixXcd(nominal.controller(frequency_hz)(u, y))
-                                  : Eigen::MatrixXcd::Zero(record.n_u(), record.n_y());
-    Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
-    for (std::size_t a = 0; a < actuator_of_axis.size(); ++a)
-      R.row(actuator_of_axis[a]) = record.lines[k].R.row(record.axes[a]);
-    R_.push_back(std::move(R));
-  }
-}
-
-void Search::refresh() {
-  total_ = 0.0;
-  for (std::size_t k = 0; k < lines_.size(); ++k) {
-    Line& line = lines_[k];
-    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
-    const Eigen::MatrixXcd controlled = line.F * Z.topRows(record_.n_y());
-    line.Y = record_.mean(Z.topRows(record_.n_y()));
-    line.U = record_.mean(Z.bottomRows(record_.n_u()));
-    line.E = line.U - R_[k] - line.F * line.Y;
-    line.variance = record_.variance_of_mean(Z.bottomRows(record_.n_u()) - controlled);
-    const auto squares = [&](const Eigen::MatrixXcd& X) {
-      return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
-    };
-    line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
-                   kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(R_[k])))
-                      .cwiseMax(1e-300)
-                      .cwiseInverse();
-    if (!line.known) {  // no evidence on this line
-      line.E.setZero();
-      line.variance.setZero();
-      line.weight.setZero();
-    }
-    total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
-  }
-}
-
-double Search::row_cost(Index row) const {
-  return sum_over_lines(
-      [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
-}
-
-template <typename One, typename Other>
-bool Search::proportional(Index first, Index rows, const One& one, const Other& other) const {
-  double along = 0.0;
-  double of_one = 0.0;
-  double of_other = 0.0;
-  for (const Line& line : lines_) {
-    const Eigen::MatrixXcd A = one(line).middleRows(first, rows);
-    const Eigen::MatrixXcd B = other(line).middleRows(first, rows);
-    const auto w = line.weight.segment(first, rows);
-    along += (w.asDiagonal() * A.conjugate().cwiseProduct(B).real()).sum();
-    of_one += (w.asDiagonal() * A.cwiseAbs2()).sum();
-    of_other += (w.asDiagonal() * B.cwiseAbs2()).sum();
-  }
-  return along * along > 0.5 * of_one * of_other;
-}
-
-/// Whether u of these actuators is r - C y up to a factor. Otherwise an actuator with other motion would be explained
-/// by a factor that makes it vanish.
-bool Search::commands_follow(Index first, Index rows) const {
-  return proportional(
-      first, rows, [](const Line& line) { return line.U; },
-      [](const Line& line) { return Eigen::MatrixXcd(line.U - line.E); });
-}
-
-/// The same for all sensors: whether C y is r - u up to a factor.
-bool Search::sensors_follow() const {
-  const auto controlled = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
-  return proportional(0, record_.n_u(), controlled, [&](const Line& line) {
-    return Eigen::MatrixXcd(controlled(line) + line.E);
-  });
-}
-
-template <typename Direction>
-void Search::try_direction(ChannelChange change, double cost, Index first, Index rows,
-                           const Direction& direction) {
-  double along = 0.0;
-  double length = 0.0;
-  for (const Line& line : lines_) {
-    const Eigen::MatrixXcd X = direction(line);
-    const auto w = line.weight.segment(first, rows);
-    along +=
-        (w.asDiagonal() * X.cwiseProduct(line.E.middleRows(first, rows).conjugate()).real()).sum();
-    length += (w.asDiagonal() * X.cwiseAbs2()).sum();
-  }
-  if (!(length > 0.0)) return;
-  const double d = along / length;
-  const double deviation = 1.0 / std::sqrt(2.0 * length);
-  if (std::abs(d) < kDeviations * deviation) return;
-  if (change.kind == ChannelChange::Kind::gain) {
-    // The true signal is (1 + d) times the recorded one.
-    change.value = 1.0 / (1.0 + d);
-    change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
-    if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGain) return;
-  } else {
-    change.value = d;
-    change.deviation = deviation;
-    if (!noise_known_ || std::abs(d) < kLeastControllerSkew_s) return;
-  }
-  candidates_.push_back({change, along * d, along * d / cost});
-}
-
-void Search::try_swap(ChannelChange change, double cost, double after) {
-  if (cost - after > kDeviations * kDeviations)
-    candidates_.push_back({change, cost - after, (cost - after) / cost});
-}
-
-/// Tries large skews, beyond the linear range of a small one.
-void Search::try_whole_skews(Index a, double cost) {
-  if (!noise_known_) return;
-  for (double samples = -kLargestSkew; samples <= kLargestSkew; samples += kSkewStep) {
-    const double skew_s = samples / record_.info.sample_rate_hz;
-    double length = 0.0;
-    const double after = sum_over_lines([&](const Line& line) {
-      const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
-      length += line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
-      return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
-    });
-    if (after > (1.0 - kLeastShare) * cost || !(length > 0.0)) continue;
-    ChannelChange change{ChannelChange::Kind::skew, false, a};
-    change.value = skew_s;
-    change.deviation = 1.0 / std::sqrt(2.0 * length);
-    try_swap(change, cost, after);
-  }
-}
-
-void Search::try_sensors() {
-  using Kind = ChannelChange::Kind;
-  const Index n_u = record_.n_u();
-  const std::complex<double> j(0.0, 1.0);
-  const auto of = [](const Line& line, Index s) {
-    return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
-  };
-  const auto all = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
-  if (sensors_follow()) try_direction({Kind::gain, true}, total_, 0, n_u, all);
-  try_direction({Kind::skew, true}, total_, 0, n_u, [&](const Line& line) {
-    return Eigen::MatrixXcd(j * line.omega_rad_s * all(line));
-  });
-  for (Index s = 0; s < record_.n_y(); ++s) {
-    try_direction({Kind::gain, true, s}, total_, 0, n_u,
-                  [&](const Line& line) { return of(line, s); });
-    try_direction({Kind::skew, true, s}, total_, 0, n_u, [&](const Line& line) {
-      return Eigen::MatrixXcd(j * line.omega_rad_s * of(line, s));
-    });
-    for (Index t = 0; t < s; ++t)
-      try_swap({Kind::swap, true, t, s}, total_, sum_over_lines([&](const Line& line) {
-                 const Eigen::MatrixXcd changed =
-                     line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
-                 return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
-               }));
-  }
-}
-
-void Search::try_actuators() {
-  using Kind = ChannelChange::Kind;
-  const std::complex<double> j(0.0, 1.0);
-  const Index n_u = record_.n_u();
-  if (commands_follow(0, n_u))
-    try_direction({Kind::gain, false}, total_, 0, n_u,
-                  [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
-  try_direction({Kind::skew, false}, total_, 0, n_u,
-                [&](const Line& line) { return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U); });
-  for (Index a = 0; a < n_u; ++a) {
-    const double cost = row_cost(a);
-    if (!(cost > 0.0) || !significant(a)) continue;
-    if (commands_follow(a, 1))
-      try_direction({Kind::gain, false, a}, cost, a, 1,
-                    [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });
-    try_direction({Kind::skew, false, a}, cost, a, 1, [&](const Line& line) {
-      return Eigen::MatrixXcd(-j * line.omega_rad_s * line.U.row(a));
-    });
-    try_whole_skews(a, cost);
-    for (Index b = 0; b < a; ++b) {
-      const double cost_b = row_cost(b);
-      const auto exchanged = [](Index row, Index with) {
-        return [row, with](const Line& line) {
-          return line.weight[row] *
-                 (line.E.row(row) + line.U.row(with) - line.U.row(row)).squaredNorm();
-        };
-      };
-      const double after_a = sum_over_lines(exchanged(a, b));
-      const double after_b = sum_over_lines(exchanged(b, a));
-      // Both rows must improve, or one must be explained completely while the other hardly gets worse (three exchanged
-      // channels are corrected one by one).
-      const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
-      const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
-                       (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
-      if (!both && !one) continue;
-      try_swap({Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
-    }
-  }
-}
-
-std::optional<Candidate> Search::best() const {
-  const Candidate* most = nullptr;
-  for (const Candidate& candidate : candidates_)
-    if (candidate.share >= kLeastShare &&
-        (most == nullptr || candidate.explained > most->explained))
-      most = &candidate;
-  return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
-}
-
 /// Combines a change with an earlier one of the same channel.
 bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
   for (ChannelChange& earlier : changes) {
@@ -333,98 +68,331 @@ bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChan
          });
 }
 
-bool Search::holds() {
-  refresh();
-  for (Index a = 0; a < record_.n_u(); ++a) {
+class Search {
+ public:
+  Search(HealthRecord& record, const NominalStage& nominal)
+      : record_(record),
+        lines_(record.lines.size()),
+        noise_known_(record.scatter_dof() > 0),
+        epsilon_(noise_known_ ? nominal.controller_error
+                              : std::max(kEpsilonOnePeriod, nominal.controller_error)) {
+    std::string missing;
+    const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
+    const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
+    const std::vector<Index> excited = excited_actuators(record.info, record.axes);
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
+      lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
+      lines_[k].known =
+          frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
+      lines_[k].F = lines_[k].known ? Eigen::MatrixXcd(nominal.controller(frequency_hz)(u, y))
+                                    : Eigen::MatrixXcd::Zero(record.n_u(), record.n_y());
+      Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
+      for (std::size_t a = 0; a < excited.size(); ++a)
+        R.row(excited[a]) = record.lines[k].R.row(record.axes[a]);
+      R_.push_back(std::move(R));
+    }
+  }
+
+  ControllerCheck run() {
+    ControllerCheck check;
+    refresh();
+    for (int i = 0; i < kMostChanges; ++i) {
+      candidates_.clear();
+      try_sensors();
+      try_actuators();
+      const std::optional<Candidate> chosen = best();
+      if (!chosen || exchanged_before(chosen->change, check.changes)) break;
+      undo(chosen->change, record_);
+      if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
+      refresh();
+    }
+    check.misfits = misfits();
+    // Then another controller, or a setpoint, is the cause.
+    if (!check.misfits.empty() && check.misfits.front().of_all) {
+      for (auto change = check.changes.rbegin(); change != check.changes.rend(); ++change)
+        undo(inverse(*change), record_);
+      check.changes.clear();
+      refresh();
+      check.misfits = misfits();
+    }
+    return check;
+  }
+
+  /// Whether there is nothing to search for.
+  bool holds() {
+    refresh();
+    for (Index a = 0; a < record_.n_u(); ++a) {
+      double evidence = 0.0;
+      for (const Line& line : lines_) {
+        const auto E = static_cast<int>(line.E.cols());
+        evidence -= log_tail_of_f(line.weight[a] * line.E.row(a).squaredNorm() / E, E,
+                                  std::max(1, record_.scatter_dof()));
+      }
+      if (tail_of_evidence(evidence, std::ssize(lines_)) <
+          kFeedbackSignificance / static_cast<double>(record_.n_u()))
+        return false;
+    }
+    return true;
+  }
+
+  double unexplained_motion() const {
+    double unexplained = 0.0;
+    double controlled = 0.0;
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      if (!lines_[k].known) continue;
+      const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+      const Eigen::MatrixXcd by_controller = lines_[k].F * Z.topRows(record_.n_y());
+      unexplained += record_.scatter(Z.bottomRows(record_.n_u()) - by_controller).trace().real();
+      controlled += record_.scatter(by_controller).trace().real();
+    }
+    return controlled > 0.0 ? unexplained / controlled : 1.0;
+  }
+
+ private:
+  void refresh() {
+    total_ = 0.0;
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      Line& line = lines_[k];
+      const Eigen::MatrixXcd& Z = record_.lines[k].Z;
+      const Eigen::MatrixXcd controlled = line.F * Z.topRows(record_.n_y());
+      line.Y = record_.mean(Z.topRows(record_.n_y()));
+      line.U = record_.mean(Z.bottomRows(record_.n_u()));
+      line.E = line.U - R_[k] - line.F * line.Y;
+      line.variance = record_.variance_of_mean(Z.bottomRows(record_.n_u()) - controlled);
+      const auto squares = [&](const Eigen::MatrixXcd& X) {
+        return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
+      };
+      line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
+                     kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(R_[k])))
+                        .cwiseMax(1e-300)
+                        .cwiseInverse();
+      if (!line.known) {  // no evidence on this line
+        line.E.setZero();
+        line.variance.setZero();
+        line.weight.setZero();
+      }
+      total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
+    }
+  }
+
+  std::optional<Candidate> best() const {
+    const Candidate* most = nullptr;
+    for (const Candidate& candidate : candidates_)
+      if (candidate.share >= kLeastShare &&
+          (most == nullptr || candidate.explained > most->explained))
+        most = &candidate;
+    return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
+  }
+
+  double row_cost(Index row) const {
+    return sum_over_lines(
+        [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
+  }
+
+  /// The same for all sensors: whether C y is r - u up to a factor.
+  bool sensors_follow() const {
+    const auto controlled = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
+    return proportional(0, record_.n_u(), controlled, [&](const Line& line) {
+      return Eigen::MatrixXcd(controlled(line) + line.E);
+    });
+  }
+
+  /// Whether u of these actuators is r - C y up to a factor. Otherwise an actuator with other motion would be explained
+  /// by a factor that makes it vanish.
+  bool commands_follow(Index first, Index rows) const {
+    return proportional(
+        first, rows, [](const Line& line) { return line.U; },
+        [](const Line& line) { return Eigen::MatrixXcd(line.U - line.E); });
+  }
+
+  /// Whether two signals of these actuators, functions of a line, are equal up to a factor.
+  template <typename One, typename Other>
+  bool proportional(Index first, Index rows, const One& one, const Other& other) const {
+    double along = 0.0;
+    double of_one = 0.0;
+    double of_other = 0.0;
+    for (const Line& line : lines_) {
+      const Eigen::MatrixXcd A = one(line).middleRows(first, rows);
+      const Eigen::MatrixXcd B = other(line).middleRows(first, rows);
+      const auto w = line.weight.segment(first, rows);
+      along += (w.asDiagonal() * A.conjugate().cwiseProduct(B).real()).sum();
+      of_one += (w.asDiagonal() * A.cwiseAbs2()).sum();
+      of_other += (w.asDiagonal() * B.cwiseAbs2()).sum();
+    }
+    return along * along > 0.5 * of_one * of_other;
+  }
+
+  /// Tries E - d X with X of `direction`, rows x E.
+  template <typename Direction>
+  void try_direction(ChannelChange change, double cost, Index first, Index rows,
+                     const Direction& direction) {
+    double along = 0.0;
+    double length = 0.0;
+    for (const Line& line : lines_) {
+      const Eigen::MatrixXcd X = direction(line);
+      const auto w = line.weight.segment(first, rows);
+      along += (w.asDiagonal() * X.cwiseProduct(line.E.middleRows(first, rows).conjugate()).real())
+                   .sum();
+      length += (w.asDiagonal() * X.cwiseAbs2()).sum();
+    }
+    if (!(length > 0.0)) return;
+    const double d = along / length;
+    const double deviation = 1.0 / std::sqrt(2.0 * length);
+    if (std::abs(d) < kDeviations * deviation) return;
+    if (change.kind == ChannelChange::Kind::gain) {
+      // The true signal is (1 + d) times the recorded one.
+      change.value = 1.0 / (1.0 + d);
+      change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
+      if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGain) return;
+    } else {
+      change.value = d;
+      change.deviation = deviation;
+      if (!noise_known_ || std::abs(d) < kLeastControllerSkew_s) return;
+    }
+    candidates_.push_back({change, along * d, along * d / cost});
+  }
+
+  void try_swap(ChannelChange change, double cost, double after) {
+    if (cost - after > kDeviations * kDeviations)
+      candidates_.push_back({change, cost - after, (cost - after) / cost});
+  }
+
+  /// Tries large skews, beyond the linear range of a small one.
+  void try_whole_skews(Index a, double cost) {
+    if (!noise_known_) return;
+    for (double samples = -kLargestSkew; samples <= kLargestSkew; samples += kSkewStep) {
+      const double skew_s = samples / record_.info.sample_rate_hz;
+      double length = 0.0;
+      const double after = sum_over_lines([&](const Line& line) {
+        const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
+        length +=
+            line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
+        return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
+      });
+      if (after > (1.0 - kLeastShare) * cost || !(length > 0.0)) continue;
+      ChannelChange change{ChannelChange::Kind::skew, false, a};
+      change.value = skew_s;
+      change.deviation = 1.0 / std::sqrt(2.0 * length);
+      try_swap(change, cost, after);
+    }
+  }
+
+  template <typename Term>
+  double sum_over_lines(const Term& term) const {
+    double sum = 0.0;
+    for (const Line& line : lines_) sum += term(line);
+    return sum;
+  }
+  /// A skew of s acts along j omega s times the direction of a gain. @param a -1: all channels of the kind
+  template <typename Direction>
+  void try_gain_and_skew(bool of_sensors, Index a, bool follows, double cost, Index first,
+                         Index rows, const Direction& direction) {
+    if (follows)
+      try_direction({ChannelChange::Kind::gain, of_sensors, a}, cost, first, rows, direction);
+    try_direction({ChannelChange::Kind::skew, of_sensors, a}, cost, first, rows,
+                  [&](const Line& line) {
+                    const std::complex<double> j_omega(0.0, line.omega_rad_s);
+                    return Eigen::MatrixXcd(j_omega * direction(line));
+                  });
+  }
+
+  void try_sensors() {
+    const Index n_u = record_.n_u();
+    try_gain_and_skew(true, -1, sensors_follow(), total_, 0, n_u,
+                      [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); });
+    for (Index s = 0; s < record_.n_y(); ++s) {
+      try_gain_and_skew(true, s, true, total_, 0, n_u, [&](const Line& line) {
+        return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
+      });
+      for (Index t = 0; t < s; ++t)
+        try_swap({ChannelChange::Kind::swap, true, t, s}, total_,
+                 sum_over_lines([&](const Line& line) {
+                   const Eigen::MatrixXcd changed =
+                       line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
+                   return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
+                 }));
+    }
+  }
+
+  void try_actuators() {
+    const Index n_u = record_.n_u();
+    try_gain_and_skew(false, -1, commands_follow(0, n_u), total_, 0, n_u,
+                      [](const Line& line) { return Eigen::MatrixXcd(-line.U); });
+    for (Index a = 0; a < n_u; ++a) {
+      const double cost = row_cost(a);
+      if (!(cost > 0.0) || !significant(a)) continue;
+      try_gain_and_skew(false, a, commands_follow(a, 1), cost, a, 1,
+                        [&](const Line& line) { return Eigen::MatrixXcd(-line.U.row(a)); });
+      try_whole_skews(a, cost);
+      for (Index b = 0; b < a; ++b) {
+        const double cost_b = row_cost(b);
+        const auto exchanged = [](Index row, Index with) {
+          return [row, with](const Line& line) {
+            return line.weight[row] *
+                   (line.E.row(row) + line.U.row(with) - line.U.row(row)).squaredNorm();
+          };
+        };
+        const double after_a = sum_over_lines(exchanged(a, b));
+        const double after_b = sum_over_lines(exchanged(b, a));
+        // Both rows must improve, or one must be explained completely while the other hardly gets worse (three exchanged
+        // channels are corrected one by one).
+        const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
+        const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
+                         (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
+        if (!both && !one) continue;
+        try_swap({ChannelChange::Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
+      }
+    }
+  }
+
+  std::vector<ControllerMisfit> misfits() const {
+    std::vector<ControllerMisfit> found;
+    Index driven = 0;
+    for (Index a = 0; a < record_.n_u(); ++a) {
+      double misfit = 0.0;
+      double controlled = 0.0;
+      double moved = 0.0;
+      for (const Line& line : lines_) {
+        misfit += line.E.row(a).squaredNorm();
+        controlled += (line.F.row(a) * line.Y).squaredNorm();
+        moved += line.U.row(a).squaredNorm();
+      }
+      if (controlled > 0.0) ++driven;
+      const bool is_controlled = controlled > kFeedbackRounding * kFeedbackRounding * moved;
+      const double whole = is_controlled ? controlled : moved;
+      const double relative = std::sqrt(misfit / std::max(whole, 1e-300));
+      if (relative > kLeastMisfit && significant(a))
+        found.push_back({a, relative, is_controlled, false});
+    }
+    const bool of_all = 2 * std::ssize(found) > driven && found.size() > 1;
+    for (ControllerMisfit& misfit : found) misfit.of_all = of_all;
+    return found;
+  }
+
+  bool significant(Index row) const {
+    if (!noise_known_) return true;
     double evidence = 0.0;
     for (const Line& line : lines_) {
-      const auto E = static_cast<int>(line.E.cols());
-      evidence -= log_tail_of_f(line.weight[a] * line.E.row(a).squaredNorm() / E, E,
-                                std::max(1, record_.scatter_dof()));
+      const double mean_square = line.E.row(row).squaredNorm() / static_cast<double>(line.E.cols());
+      if (line.variance[row] > 0.0)
+        evidence -= log_tail_of_f(mean_square / line.variance[row], static_cast<int>(line.E.cols()),
+                                  record_.scatter_dof());
+      else if (mean_square > 0.0)
+        evidence += 1e3;
     }
-    if (tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
-        kFeedbackSignificance / static_cast<double>(record_.n_u()))
-      return false;
+    return tail_of_evidence(evidence, std::ssize(lines_)) <
+           kFeedbackSignificance / static_cast<double>(record_.n_u());
   }
-  return true;
-}
 
-double Search::unexplained_motion() const {
-  double unexplained = 0.0;
-  double controlled = 0.0;
-  for (std::size_t k = 0; k < lines_.size(); ++k) {
-    if (!lines_[k].known) continue;
-    const Eigen::MatrixXcd& Z = record_.lines[k].Z;
-    const Eigen::MatrixXcd by_controller = lines_[k].F * Z.topRows(record_.n_y());
-    unexplained += record_.scatter(Z.bottomRows(record_.n_u()) - by_controller).trace().real();
-    controlled += record_.scatter(by_controller).trace().real();
-  }
-  return controlled > 0.0 ? unexplained / controlled : 1.0;
-}
-
-ControllerCheck Search::run() {
-  ControllerCheck check;
-  refresh();
-  for (int i = 0; i < kMostChanges; ++i) {
-    candidates_.clear();
-    try_sensors();
-    try_actuators();
-    const std::optional<Candidate> chosen = best();
-    if (!chosen || exchanged_before(chosen->change, check.changes)) break;
-    undo(chosen->change, record_);
-    if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
-    refresh();
-  }
-  check.misfits = misfits();
-  // Then another controller, or a setpoint, is the cause.
-  if (!check.misfits.empty() && check.misfits.front().of_all) {
-    for (auto change = check.changes.rbegin(); change != check.changes.rend(); ++change)
-      undo(inverse(*change), record_);
-    check.changes.clear();
-    refresh();
-    check.misfits = misfits();
-  }
-  return check;
-}
-
-bool Search::significant(Index row) const {
-  if (!noise_known_) return true;
-  double evidence = 0.0;
-  for (const Line& line : lines_) {
-    const double mean_square = line.E.row(row).squaredNorm() / static_cast<double>(line.E.cols());
-    if (line.variance[row] > 0.0)
-      evidence -= log_tail_of_f(mean_square / line.variance[row], static_cast<int>(line.E.cols()),
-                                record_.scatter_dof());
-    else if (mean_square > 0.0)
-      evidence += 1e3;
-  }
-  return tail_of_evidence(evidence, static_cast<Index>(lines_.size())) <
-         kFeedbackSignificance / static_cast<double>(record_.n_u());
-}
-
-std::vector<ControllerMisfit> Search::misfits() const {
-  std::vector<ControllerMisfit> found;
-  Index driven = 0;
-  for (Index a = 0; a < record_.n_u(); ++a) {
-    double misfit = 0.0;
-    double controlled = 0.0;
-    double moved = 0.0;
-    for (const Line& line : lines_) {
-      misfit += line.E.row(a).squaredNorm();
-      controlled += (line.F.row(a) * line.Y).squaredNorm();
-      moved += line.U.row(a).squaredNorm();
-    }
-    if (controlled > 0.0) ++driven;
-    const bool is_controlled = controlled > kFeedbackRounding * kFeedbackRounding * moved;
-    const double whole = is_controlled ? controlled : moved;
-    const double relative = std::sqrt(misfit / std::max(whole, 1e-300));
-    if (relative > kLeastMisfit && significant(a))
-      found.push_back({a, relative, is_controlled, false});
-  }
-  const bool of_all = 2 * static_cast<Index>(found.size()) > driven && found.size() > 1;
-  for (ControllerMisfit& misfit : found) misfit.of_all = of_all;
-  return found;
-}
+  HealthRecord& record_;
+  std::vector<Eigen::MatrixXcd> R_;
+  std::vector<Line> lines_;
+  bool noise_known_;
+  double epsilon_;  // relative error of the model of the controller, of C y
+  double total_ = 0.0;
+  std::vector<Candidate> candidates_;
+};
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frf/periods/health_finding.hpp"
+#include "frf/runs/channel_choice.hpp"
 #include "frf/runs/health_record.hpp"
 #include "frf/wiring/nominal_stage.hpp"
 
@@ -44,6 +45,10 @@ class Examination {
     findings_.push_back({severity, cause, std::move(channel), std::move(what), std::move(figure),
                          std::move(remedy)});
   }
+  /// A property that this log cannot show.
+  void find_unchecked(Cause cause, std::string what, std::string remedy) {
+    find(Severity::unchecked, cause, "", std::move(what), "", std::move(remedy));
+  }
   const std::string& name(Eigen::Index channel) const;  // of [sensors; actuators]
   bool spoilt(Eigen::Index channel) const {
     return std::find(spoilt_.begin(), spoilt_.end(), channel) != spoilt_.end();
@@ -51,7 +56,9 @@ class Examination {
   bool found(Cause cause) const;
   void find_clipped(Eigen::Index channel, double log_p);
   bool find_suspected(Eigen::Index first, Eigen::Index count);
-  std::vector<Eigen::Index> excited_actuators() const;
+  std::vector<Eigen::Index> excited_actuators() const {
+    return stageid::excited_actuators(record_.info, record_.axes);
+  }
   bool expected_to_respond(Eigen::Index sensor, bool& known) const;
   bool expected_above_noise(Eigen::Index sensor) const;
   bool controlled(Eigen::Index actuator, bool& known) const;

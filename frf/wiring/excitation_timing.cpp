@@ -11,6 +11,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "excitation/multisine/dft.hpp"
+#include "frf/runs/channel_choice.hpp"
 
 namespace stageid {
 namespace {
@@ -29,19 +30,6 @@ struct Entry {
   std::complex<double> controlled;  // -C y over r
 };
 
-/// Indices of the excited axes in the actuators; empty if a name is missing.
-std::vector<Index> actuators_of(const HealthRecord& record) {
-  std::vector<Index> found;
-  const auto& names = record.info.actuators.names;
-  for (const Index axis : record.axes) {
-    const auto at = std::find(names.begin(), names.end(),
-                              record.info.excitation.names[static_cast<std::size_t>(axis)]);
-    if (at == names.end()) return {};
-    found.push_back(at - names.begin());
-  }
-  return found;
-}
-
 /// Whether the controller between the recorded channels is known.
 bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& nominal,
                std::vector<Index>& u, std::vector<Index>& y) {
@@ -54,94 +42,87 @@ bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& no
 
 class Alignment {
  public:
-  Alignment(const HealthRecord& record, const std::optional<NominalStage>& nominal);
-  std::optional<ExcitationDelay> find() const;
+  Alignment(const HealthRecord& record, const std::optional<NominalStage>& nominal)
+      : period_(record.info.period_samples), experiments_(record.experiments()) {
+    const std::vector<Index> actuators = excited_actuators(record.info, record.axes);
+    if (actuators.empty()) return;
+    std::vector<Index> u;
+    std::vector<Index> y;
+    controller_known_ = knows_all(record, nominal, u, y);
+    const Index K = record.frequency_hz.size();
+    for (Index k = 0; k < K; ++k) {
+      const double frequency_hz = record.frequency_hz[k];
+      if (!controller_known_ && frequency_hz < 0.5 * record.frequency_hz[K - 1]) continue;
+      const LineRecord& line = record.lines[static_cast<std::size_t>(k)];
+      const Eigen::MatrixXcd Z = record.mean(line.Z);
+      const Eigen::MatrixXcd U = Z.bottomRows(record.n_u());
+      Eigen::MatrixXcd controlled = Eigen::MatrixXcd::Zero(U.rows(), U.cols());
+      if (controller_known_)
+        controlled = nominal->controller(frequency_hz)(u, y) * Z.topRows(record.n_y());
+      const int at = static_cast<int>(
+          std::lround(frequency_hz * record.info.period_samples / record.info.sample_rate_hz));
+      for (Index e = 0; e < experiments_; ++e)
+        for (std::size_t a = 0; a < actuators.size(); ++a) {
+          const std::complex<double> r = line.R(record.axes[a], e);
+          if (std::abs(r) == 0.0) continue;
+          entries_.push_back({e, at, U(actuators[a], e) / r, controlled(actuators[a], e) / r});
+        }
+    }
+  }
+
+  std::optional<ExcitationDelay> find() const {
+    if (std::ssize(entries_) < kFewestLines * experiments_) return std::nullopt;
+    const int samples = best();
+    if (samples == 0) return std::nullopt;
+    const Eigen::VectorXd as_recorded = misfit_of_r(0);
+    const Eigen::VectorXd aligned = misfit_of_r(samples);
+    if (!(aligned.sum() * kLeastReduction < as_recorded.sum())) return std::nullopt;
+    if ((aligned.array() > as_recorded.array()).any()) return std::nullopt;
+    // Without a controller, or with little gain in the band, both are the same.
+    const double of_actuators = misfit_of_u(samples);
+    if (of_actuators * kClearly < aligned.sum()) return std::nullopt;
+    return ExcitationDelay{samples, std::sqrt(as_recorded.sum() / std::max(1e-300, aligned.sum())),
+                           of_actuators > kClearly * aligned.sum()};
+  }
 
  private:
   std::complex<double> turned(int line, double samples) const {
     return std::polar(1.0, 2.0 * std::numbers::pi * line * samples / period_);
   }
-  Eigen::VectorXd misfit_of_r(int samples) const;
-  double misfit_of_u(int samples) const;
-  int best() const;
+  /// Misfit per experiment.
+  Eigen::VectorXd misfit_of_r(int samples) const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(experiments_);
+    for (const Entry& at : entries_)
+      sum[at.experiment] += std::norm(at.u - at.controlled - turned(at.line, samples));
+    return sum;
+  }
+
+  double misfit_of_u(int samples) const {
+    double sum = 0.0;
+    for (const Entry& at : entries_)
+      sum += std::norm(turned(at.line, -samples) * at.u - at.controlled - 1.0);
+    return sum;
+  }
+
+  /// Shift with the largest cross-correlation.
+  int best() const {
+    RealDft dft(period_);
+    Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(dft.half_size());
+    for (const Entry& at : entries_) {
+      const std::complex<double> v = at.u - at.controlled;
+      if (std::abs(v) > 0.0) spectrum[at.line] += std::conj(v) / std::abs(v);
+    }
+    const Eigen::VectorXd correlation = dft.inverse(spectrum);
+    Index peak = 0;
+    correlation.maxCoeff(&peak);
+    return static_cast<int>(peak <= period_ / 2 ? peak : peak - period_);
+  }
 
   int period_;
   Index experiments_;
   bool controller_known_ = false;
   std::vector<Entry> entries_;
 };
-
-Alignment::Alignment(const HealthRecord& record, const std::optional<NominalStage>& nominal)
-    : period_(record.info.period_samples), experiments_(record.experiments()) {
-  const std::vector<Index> actuators = actuators_of(record);
-  if (actuators.empty()) return;
-  std::vector<Index> u;
-  std::vector<Index> y;
-  controller_known_ = knows_all(record, nominal, u, y);
-  const Index K = record.frequency_hz.size();
-  for (Index k = 0; k < K; ++k) {
-    const double frequency_hz = record.frequency_hz[k];
-    if (!controller_known_ && frequency_hz < 0.5 * record.frequency_hz[K - 1]) continue;
-    const LineRecord& line = record.lines[static_cast<std::size_t>(k)];
-    const Eigen::MatrixXcd Z = record.mean(line.Z);
-    const Eigen::MatrixXcd U = Z.bottomRows(record.n_u());
-    Eigen::MatrixXcd controlled = Eigen::MatrixXcd::Zero(U.rows(), U.cols());
-    if (controller_known_)
-      controlled = nominal->controller(frequency_hz)(u, y) * Z.topRows(record.n_y());
-    const int at = static_cast<int>(
-        std::lround(frequency_hz * record.info.period_samples / record.info.sample_rate_hz));
-    for (Index e = 0; e < experiments_; ++e)
-      for (std::size_t a = 0; a < actuators.size(); ++a) {
-        const std::complex<double> r = line.R(record.axes[a], e);
-        if (std::abs(r) == 0.0) continue;
-        entries_.push_back({e, at, U(actuators[a], e) / r, controlled(actuators[a], e) / r});
-      }
-  }
-}
-
-/// Misfit per experiment.
-Eigen::VectorXd Alignment::misfit_of_r(int samples) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(experiments_);
-  for (const Entry& at : entries_)
-    sum[at.experiment] += std::norm(at.u - at.controlled - turned(at.line, samples));
-  return sum;
-}
-
-double Alignment::misfit_of_u(int samples) const {
-  double sum = 0.0;
-  for (const Entry& at : entries_)
-    sum += std::norm(turned(at.line, -samples) * at.u - at.controlled - 1.0);
-  return sum;
-}
-
-/// Shift with the largest cross-correlation.
-int Alignment::best() const {
-  RealDft dft(period_);
-  Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(dft.half_size());
-  for (const Entry& at : entries_) {
-    const std::complex<double> v = at.u - at.controlled;
-    if (std::abs(v) > 0.0) spectrum[at.line] += std::conj(v) / std::abs(v);
-  }
-  const Eigen::VectorXd correlation = dft.inverse(spectrum);
-  Index peak = 0;
-  correlation.maxCoeff(&peak);
-  return static_cast<int>(peak <= period_ / 2 ? peak : peak - period_);
-}
-
-std::optional<ExcitationDelay> Alignment::find() const {
-  if (static_cast<Index>(entries_.size()) < kFewestLines * experiments_) return std::nullopt;
-  const int samples = best();
-  if (samples == 0) return std::nullopt;
-  const Eigen::VectorXd as_recorded = misfit_of_r(0);
-  const Eigen::VectorXd aligned = misfit_of_r(samples);
-  if (!(aligned.sum() * kLeastReduction < as_recorded.sum())) return std::nullopt;
-  if ((aligned.array() > as_recorded.array()).any()) return std::nullopt;
-  // Without a controller, or with little gain in the band, both are the same.
-  const double of_actuators = misfit_of_u(samples);
-  if (of_actuators * kClearly < aligned.sum()) return std::nullopt;
-  return ExcitationDelay{samples, std::sqrt(as_recorded.sum() / std::max(1e-300, aligned.sum())),
-                         of_actuators > kClearly * aligned.sum()};
-}
 
 }  // namespace
 
@@ -160,23 +141,19 @@ std::optional<ExcitationDelay> align_excitation(HealthRecord& record,
 Finding to_finding(const ExcitationDelay& delay) {
   const std::string samples = counted(std::abs(delay.samples), "sample");
   const bool late = delay.samples > 0;
-  Finding finding;
-  finding.severity = Severity::doubt;
-  finding.cause = Cause::excitation_timing;
-  finding.channel = "excitation";
-  if (delay.certain) {
-    finding.what = fmt::format("the excitation was recorded {} {}; the FRF is unaffected", samples,
-                               late ? "late" : "early");
-    finding.remedy = "correct the time stamps of the excitation";
-  } else {
-    finding.what = fmt::format(
-        "the excitation was recorded {} {} than all actuators; if only the excitation is affected, "
-        "the FRF is correct",
-        samples, late ? "later" : "earlier");
-    finding.remedy = "give the stage file of this log (--stage), whose controller resolves this";
-  }
-  finding.figure = fmt::format("u matches it {:.2g} times better when shifted", delay.misfit);
-  return finding;
+  return {Severity::doubt,
+          Cause::excitation_timing,
+          "excitation",
+          delay.certain
+              ? fmt::format("the excitation was recorded {} {}; the FRF is unaffected", samples,
+                            late ? "late" : "early")
+              : fmt::format("the excitation was recorded {} {} than all actuators; if only the "
+                            "excitation is affected, the FRF is correct",
+                            samples, late ? "later" : "earlier"),
+          fmt::format("u matches it {:.2g} times better when shifted", delay.misfit),
+          delay.certain
+              ? "correct the time stamps of the excitation"
+              : "give the stage file of this log (--stage), whose controller resolves this"};
 }
 
 }  // namespace stageid

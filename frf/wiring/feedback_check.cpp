@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "acquisition/files/counted.hpp"
+#include "frf/runs/channel_choice.hpp"
 #include "frf/statistics/distributions.hpp"
-#include "frf/wiring/injection_check.hpp"
 
 namespace stageid {
 namespace {
@@ -16,9 +16,7 @@ namespace {
 using Index = Eigen::Index;
 
 std::string why_not(const HealthRecord& record, const std::vector<Index>& actuators) {
-  for (const Index axis : record.axes)
-    if (actuators[static_cast<std::size_t>(axis)] < 0)
-      return "an excitation that is added at the actuators and has their names";
+  if (actuators.empty()) return kNamedExcitation;
   if (record.n_y() == 0 || record.lines.empty()) return "sensors and excited lines";
   if (record.experiments() <= record.n_y())
     return fmt::format("more experiments than the {} sensors of the log", record.n_y());
@@ -26,11 +24,35 @@ std::string why_not(const HealthRecord& record, const std::vector<Index>& actuat
   return "";
 }
 
+constexpr double kExact = 1e-5;  // of the actuator's rms
+
+/// R of excitation channel `r`, repeated for every period, all lines in one column: the same order as Z.
+Eigen::VectorXcd over_periods(const HealthRecord& record, Index r) {
+  Index columns = 0;
+  for (const int periods : record.periods) columns += periods;
+  Eigen::VectorXcd all(columns * std::ssize(record.lines));
+  Index at = 0;
+  for (const LineRecord& line : record.lines)
+    for (Index e = 0; e < record.experiments(); ++e)
+      for (int p = 0; p < record.periods[static_cast<std::size_t>(e)]; ++p)
+        all[at++] = line.R(r, e);
+  return all;
+}
+
+Eigen::VectorXcd over_periods_of_actuator(const HealthRecord& record, Index a) {
+  Index columns = record.lines.empty() ? 0 : record.lines.front().Z.cols();
+  Eigen::VectorXcd all(columns * std::ssize(record.lines));
+  for (std::size_t k = 0; k < record.lines.size(); ++k)
+    all.segment(columns * static_cast<Index>(k), columns) =
+        record.lines[k].Z.row(record.n_y() + a).transpose();
+  return all;
+}
+
 }  // namespace
 
 FeedbackCheck check_feedback(const HealthRecord& record) {
   FeedbackCheck check;
-  const std::vector<Index> actuators = actuators_of_excitation(record.info);
+  const std::vector<Index> actuators = excited_actuators(record.info, record.axes);
   check.unchecked = why_not(record, actuators);
   if (!check.unchecked.empty()) return check;
   check.experiments = static_cast<int>(record.experiments());
@@ -42,8 +64,8 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
     Eigen::MatrixXcd D = record.mean(line.Z.bottomRows(n_u));
     const Eigen::VectorXd rounding =
         kFeedbackRounding * kFeedbackRounding * D.cwiseAbs2().rowwise().mean();
-    for (const Index axis : record.axes)
-      D.row(actuators[static_cast<std::size_t>(axis)]) -= line.R.row(axis);
+    for (std::size_t a = 0; a < actuators.size(); ++a)
+      D.row(actuators[a]) -= line.R.row(record.axes[a]);
     const Eigen::MatrixXcd Y = record.mean(line.Z.topRows(record.n_y()));
     // Units of sensors differ, so rows are scaled to one before the rank is determined.
     const Eigen::VectorXd size = Y.rowwise().norm().cwiseMax(1e-300);
@@ -72,14 +94,30 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
   check.relative = std::sqrt(misfit.sum() / fed_back.sum());
   for (Index a = 0; a < n_u; ++a) {
     const double relative = fed_back[a] > 0.0 ? std::sqrt(misfit[a] / fed_back[a]) : 0.0;
-    if (relative < kLeastMisfit ||
-        tail_of_evidence(evidence[a], static_cast<Index>(record.lines.size())) >
-            kFeedbackSignificance / static_cast<double>(n_u))
+    if (relative < kLeastMisfit || tail_of_evidence(evidence[a], std::ssize(record.lines)) >
+                                       kFeedbackSignificance / static_cast<double>(n_u))
       continue;
     check.inconsistent.push_back(a);
     check.worst = std::max(check.worst, relative);
   }
   return check;
+}
+
+std::vector<MappedExcitation> find_mapped_excitation(const HealthRecord& record) {
+  std::vector<MappedExcitation> found;
+  for (Index a = 0; a < record.n_u(); ++a) {
+    const Eigen::VectorXcd U = over_periods_of_actuator(record, a);
+    const double power = U.squaredNorm();
+    if (!(power > 0.0)) continue;
+    for (const Index r : record.axes) {
+      const Eigen::VectorXcd R = over_periods(record, r);
+      const double factor = R.dot(U).real() / R.squaredNorm();
+      if (!((U - factor * R).squaredNorm() <= kExact * kExact * power)) continue;
+      found.push_back({a, r, factor});
+      break;
+    }
+  }
+  return found;
 }
 
 }  // namespace stageid

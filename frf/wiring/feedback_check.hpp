@@ -14,6 +14,10 @@ inline constexpr double kLeastMisfit = 0.05;
 inline constexpr double kFeedbackSignificance = 1e-4;
 inline constexpr double kFeedbackRounding = 1e-9;
 
+/// What these checks need.
+inline constexpr const char* kNamedExcitation =
+    "an excitation that is added at the actuators and has their names";
+
 /// Properties of the controller that follow from the data alone.
 struct FeedbackCheck {
   std::string unchecked;  ///< the missing data; empty: it was checked
@@ -30,5 +34,17 @@ struct FeedbackCheck {
 /// over the lines, 1e-4 over all actuators, and 5 % of u - r. F itself, and hence names, signs, scales and timing of
 /// the channels, cannot be checked without a controller.
 FeedbackCheck check_feedback(const HealthRecord& record);
+
+/// An actuator whose record equals an excitation channel times a factor.
+struct MappedExcitation {
+  Eigen::Index actuator = 0;
+  Eigen::Index excitation = 0;
+  double factor = 1.0;
+};
+
+/// Finds actuators that equal an excitation channel up to a factor, on every line of every period of every experiment,
+/// to 1e-5 of their rms. In a closed loop, such a record is the signal before the summation point and does not contain
+/// the controller's output. Fed-back noise leaves more; rounding to float32 leaves 1e-7.
+std::vector<MappedExcitation> find_mapped_excitation(const HealthRecord& record);
 
 }  // namespace stageid

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "frf/response/noise_covariance.hpp"
+#include "frf/response/line_estimate.hpp"
 
 namespace stageid {
 namespace {
@@ -49,8 +49,8 @@ std::vector<PlantLine> plant_lines(const HealthRecord& record, const NominalStag
     if (frequency_hz < nominal.free_from_hz) continue;
     const LineRecord& at = record.lines[static_cast<std::size_t>(k)];
     const Eigen::MatrixXcd Z = at.Z(rows, Eigen::all);
-    const LineEstimate estimate = estimate_line(at.R(record.axes, Eigen::all), record.mean(Z),
-                                                static_cast<Index>(outputs.size()));
+    const LineEstimate estimate =
+        estimate_line(at.R(record.axes, Eigen::all), record.mean(Z), std::ssize(outputs));
     if (estimate.status != LineStatus::good) continue;
     PlantLine line;
     line.omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;

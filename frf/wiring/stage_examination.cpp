@@ -6,7 +6,6 @@
 #include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
 #include "frf/wiring/feedback_check.hpp"
-#include "frf/wiring/injection_check.hpp"
 #include "frf/wiring/rigid_body_check.hpp"
 #include "frf/wiring/skew_check.hpp"
 
@@ -40,8 +39,7 @@ bool Examination::expected_to_respond(Index sensor, bool& known) const {
 }
 
 std::string Examination::why_no_nominal(bool all_sensors) const {
-  if (excited_actuators().empty())
-    return "an excitation that is added at the actuators and has their names";
+  if (excited_actuators().empty()) return kNamedExcitation;
   std::string missing;
   if (positions_in(nominal_->actuators, record_.info.actuators.names, missing).empty() ||
       positions_in(nominal_->sensors, record_.info.sensors.names, missing).empty())
@@ -62,8 +60,7 @@ void Examination::check_injection() {
     bool known = false;
     const bool fed_back = controlled(m.actuator, known);
     if (known && !fed_back) continue;  // its loop is open
-    const std::string& excitation =
-        record_.info.excitation.names[static_cast<std::size_t>(m.excitation)];
+    const std::string& excitation = record_.info.excitation.name(m.excitation);
     const std::string figure = std::abs(m.factor - 1.0) < 1e-5
                                    ? std::string("identical")
                                    : fmt::format("factor {:.6g}", m.factor);
@@ -124,18 +121,18 @@ void Examination::check_recording() {
   }
   const char* what = "names, signs, scales and timing of the recorded channels (u = r - C y)";
   if (const std::string why = why_no_nominal(true); !why.empty()) {
-    find(Severity::unchecked, Cause::controller, "", what, "", "needs " + why);
+    find_unchecked(Cause::controller, what, "needs " + why);
     return;
   }
   if (!nominal_->controller) {
-    find(Severity::unchecked, Cause::controller, "", what, "",
-         "needs the controller, which belongs to the stage ('controller: peer'): --stage FILE with "
-         "a controller file");
+    find_unchecked(Cause::controller, what,
+                   "needs the controller, which belongs to the stage ('controller: peer'): "
+                   "--stage FILE with a controller file");
     return;
   }
   if (!spoilt_.empty()) {
-    find(Severity::unchecked, Cause::controller, "", what, "",
-         fmt::format("needs channel {} without faults", name(spoilt_.front())));
+    find_unchecked(Cause::controller, what,
+                   fmt::format("needs channel {} without faults", name(spoilt_.front())));
     return;
   }
   const ControllerCheck check = check_controller(record_, *nominal_);
@@ -163,47 +160,37 @@ void Examination::check_recording() {
          "switch off the source that drives it, or record it as excitation");
   }
   if (record_.scatter_dof() == 0)
-    find(Severity::unchecked, Cause::skew, "", "timing skew of the recorded channels", "",
-         "needs two periods per run");
+    find_unchecked(Cause::skew, "timing skew of the recorded channels",
+                   "needs two periods per run");
 }
 
 void Examination::check_stage() {
   const char* what = "wiring between recorder and stage (rigid body against geometry and mass)";
   if (!nominal_) return;  // reported already
-  std::string why = why_no_nominal(false);
-  if (why.empty() && !nominal_->rigid_body)
-    why = "geometry and mass: a stage file, or 'stage: FILE' in the controller file";
+  const auto needs = [&](const std::string& missing) {
+    find_unchecked(Cause::rigid_body, what, "needs " + missing);
+  };
+  if (const std::string why = why_no_nominal(false); !why.empty()) return needs(why);
+  if (!nominal_->rigid_body)
+    return needs("geometry and mass: a stage file, or 'stage: FILE' in the controller file");
   std::vector<Index> outputs;
-  if (why.empty()) {
-    for (Index s = 0; s < record_.n_y(); ++s) {
-      bool known = false;
-      if (!spoilt(s) && expected_to_respond(s, known)) outputs.push_back(s);
-    }
+  for (Index s = 0; s < record_.n_y(); ++s) {
+    bool known = false;
+    if (!spoilt(s) && expected_to_respond(s, known)) outputs.push_back(s);
   }
+  if (outputs.empty()) return needs("a sensor that responds to the excited axes");
   const std::vector<Index> inputs = excited_actuators();
-  if (!why.empty() || outputs.empty()) {
-    find(
-        Severity::unchecked, Cause::rigid_body, "", what, "",
-        "needs " + (why.empty() ? std::string("a sensor that responds to the excited axes") : why));
-    return;
-  }
   for (const Index a : inputs)
     if (spoilt(record_.n_y() + a)) return;
-  if (found(Cause::excluded)) {
-    find(Severity::unchecked, Cause::rigid_body, "", what, "",
-         "needs an excitation of every actuator that moves; otherwise Y U^-1 differs from the "
-         "plant");
-    return;
-  }
-  if (record_.zippered) {
-    find(Severity::unchecked, Cause::rigid_body, "", what, "",
-         "needs all axes excited on the same lines; use a scheme other than zippered");
-    return;
-  }
+  if (found(Cause::excluded))
+    return needs(
+        "an excitation of every actuator that moves; otherwise Y U^-1 differs from the plant");
+  if (record_.zippered)
+    return needs("all axes excited on the same lines; use a scheme other than zippered");
   const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);
   const RigidBodyCheck check = check_rigid_body(lines, outputs, inputs);
   if (!check.unchecked.empty()) {
-    find(Severity::unchecked, Cause::rigid_body, "", what, "", "there are " + check.unchecked);
+    find_unchecked(Cause::rigid_body, what, "there are " + check.unchecked);
     return;
   }
   for (const Index a : check.dead_actuators)
@@ -221,8 +208,8 @@ void Examination::check_stage() {
   for (const ChannelChange& change : skew.changes)
     findings_.push_back(to_finding(change, record_.info, false));
   if (!skew.unchecked.empty())
-    find(Severity::unchecked, Cause::skew, "", "timing skew between recorder and stage", "",
-         "needs " + skew.unchecked + "; fit --delay per_channel estimates it");
+    find_unchecked(Cause::skew, "timing skew between recorder and stage",
+                   "needs " + skew.unchecked + "; fit --delay per_channel estimates it");
 }
 
 }  // namespace stageid

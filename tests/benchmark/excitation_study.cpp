@@ -25,7 +25,7 @@
 #include "acquisition/slog/slog_writer.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "frf/response/relative_variance.hpp"
+#include "frf/response/confidence.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/config/stage_config.hpp"

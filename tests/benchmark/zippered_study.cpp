@@ -25,7 +25,7 @@
 #include <string_view>
 #include <vector>
 
-#include "frf/health/interpolation_check.hpp"
+#include "frf/health/estimate_check.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
 namespace {

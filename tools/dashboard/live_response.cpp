@@ -11,7 +11,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
-#include "frf/plant/zippered_lines.hpp"
+#include "frf/plant/zippered_fit.hpp"
 #include "tools/report/report_json.hpp"
 #include "tools/terminal/exit_code.hpp"
 

@@ -9,7 +9,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/key_suggestion.hpp"
-#include "frf/plant/zippered_lines.hpp"
+#include "frf/plant/zippered_fit.hpp"
 #include "tools/config/config_reader.hpp"
 #include "tools/config/strict_yaml.hpp"
 #include "tools/experiment/config_plan.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "frf/health/settling_check.hpp"
+#include "frf/health/estimate_check.hpp"
 #include "frf/response/nonlinearity.hpp"
 #include "frf/response/nonlinearity_sentence.hpp"
 #include "tools/terminal/console.hpp"

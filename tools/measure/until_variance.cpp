@@ -12,7 +12,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
-#include "frf/response/relative_variance.hpp"
+#include "frf/response/confidence.hpp"
 #include "tools/dashboard/live_response.hpp"
 
 namespace stageid {

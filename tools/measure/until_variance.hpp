@@ -10,7 +10,7 @@
 namespace stageid {
 
 /// Decides when an experiment can end. It estimates the response from the log during the measurement, as `stageid frf`
-/// does, and compares its mean relative variance (relative_variance.hpp) with the requested one. The larger of noise
+/// does, and compares its mean relative variance (confidence.hpp) with the requested one. The larger of noise
 /// and total variance is used, as far as they are known.
 class UntilVariance {
  public:

@@ -1,6 +1,6 @@
 // A linear plant in poor records is not called nonlinear: realizations of unequal noise keep the rate of false alarms,
 // and transients and drifts are identified.
-#include "frf/health/settling_check.hpp"
+#include "frf/health/estimate_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,10 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 #include <string>
 
-#include "frf/health/experiment_noise_check.hpp"
+#include "frf/health/estimate_check.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/covariance_smoothing.hpp"
 #include "tests/support/stages/closed_loop.hpp"
@@ -24,8 +23,7 @@ constexpr int kSeeds = 150;
 /// 48 lines; correlated noise at the sensors, with ten times the power in the second experiment.
 LoopExperiment uneven(AxisScheme scheme, int realizations, int periods) {
   LoopExperiment x{.realizations = realizations, .periods = periods, .scheme = scheme};
-  x.lines.resize(48);
-  std::iota(x.lines.begin(), x.lines.end(), 4);
+  x.lines = test::line_range(4, 51, 1);
   x.noise_factor.resize(2, 2);
   x.noise_factor << 0.01, 0.0, std::complex<double>(0.005, 0.006), 0.007;
   x.noise_scale = {1.0, std::sqrt(10.0), 1.0};
@@ -148,8 +146,7 @@ TEST(ExperimentNoise, NamesTheNoisyOneOfTwoAndTheLogStaysLinear) {
   int nonlinear = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     LoopExperiment x{.axes = 2, .realizations = 3, .periods = 4, .seed = seed};
-    x.lines.resize(96);
-    std::iota(x.lines.begin(), x.lines.end(), 4);
+    x.lines = test::line_range(4, 99, 1);
     x.noise_factor = 0.001 * Eigen::MatrixXcd::Identity(2, 2);
     MemoryLog log = test::simulate_log(test::small_stage(), x);
     x.noise_factor *= 5.0;
@@ -169,8 +166,7 @@ TEST(ExperimentNoise, NamesTheNoisyOneOfTwoAndTheLogStaysLinear) {
 TEST(ExperimentNoise, SlowNoiseIsTheSameInAllExperiments) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     LoopExperiment x{.axes = 2, .realizations = 2, .periods = 8, .seed = seed};
-    x.lines.resize(96);
-    std::iota(x.lines.begin(), x.lines.end(), 4);
+    x.lines = test::line_range(4, 99, 1);
     MemoryLog log = test::simulate_log(test::small_stage(), x);
     test::ComplexNoise random(seed);
     for (LogSamples& record : log.records)

@@ -9,7 +9,6 @@
 #include "frf/health/data_health.hpp"
 #include "frf/health/health_measures.hpp"
 #include "frf/wiring/feedback_check.hpp"
-#include "frf/wiring/injection_check.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
@@ -22,13 +21,12 @@ using test::MemoryLog;
 using testing::HasSubstr;
 using testing::Not;
 
-std::vector<int> odd_lines(int last) { return test::line_range(1, last, 2); }
-
-MemoryLog closed_loop_log(std::uint64_t seed = 1, double noise = 1e-3) {
+MemoryLog closed_loop_log(std::uint64_t seed = 1, double noise = 1e-3,
+                          const test::ClosedLoop& loop = test::small_stage()) {
   LoopExperiment x{.periods = 3, .seed = seed};
-  x.lines = odd_lines(60);
+  x.lines = test::line_range(1, 60, 2);
   x.noise_factor = noise * Eigen::MatrixXcd::Identity(2, 2);
-  return test::simulate_log(test::small_stage(), x);
+  return test::simulate_log(loop, x);
 }
 
 /// The loop of test::small_stage().
@@ -62,18 +60,27 @@ const Finding* first_with(const std::vector<Finding>& findings, Cause cause) {
   return at == findings.end() ? nullptr : &*at;
 }
 
+/// Expects a finding of this cause. @param channel empty: any
+void expect_finding(const std::vector<Finding>& findings, Cause cause, Severity severity,
+                    const std::string& channel, const std::string& what) {
+  const Finding* finding = first_with(findings, cause);
+  ASSERT_NE(finding, nullptr);
+  EXPECT_EQ(finding->severity, severity);
+  if (!channel.empty()) {
+    EXPECT_EQ(finding->channel, channel);
+  }
+  EXPECT_THAT(finding->what, HasSubstr(what));
+}
+
 TEST(MappedExcitation, IsNamedAndNotCalledDead) {
   for (const double factor : {1.0, -2.5}) {
     MemoryLog log = closed_loop_log();
     map_excitation(log, 0, factor);
     for (const auto& nominal : {std::optional<NominalStage>(), std::optional(small_nominal())}) {
       const std::vector<Finding> found = health_of(log, nominal);
-      const Finding* finding = first_with(found, Cause::injection);
-      ASSERT_NE(finding, nullptr);
-      EXPECT_EQ(finding->severity, Severity::fault);
-      EXPECT_EQ(finding->channel, "a1");
-      EXPECT_THAT(finding->what, HasSubstr("equals the excitation a1"));
-      EXPECT_THAT(finding->remedy, HasSubstr("after the summation point"));
+      expect_finding(found, Cause::injection, Severity::fault, "a1", "equals the excitation a1");
+      EXPECT_THAT(first_with(found, Cause::injection)->remedy,
+                  HasSubstr("after the summation point"));
       EXPECT_EQ(first_with(found, Cause::dead), nullptr);
       EXPECT_EQ(std::count_if(found.begin(), found.end(),
                               [](const Finding& f) { return f.severity == Severity::fault; }),
@@ -163,11 +170,7 @@ TEST(SilentAxis, IsNamedThoughItsExcitationIsRecorded) {
   MemoryLog log = chirp_log(1);
   add_noise_to_actuators(log, 1e-4);
   const std::vector<Finding> found = health_of(log);
-  const Finding* finding = first_with(found, Cause::excitation);
-  ASSERT_NE(finding, nullptr);
-  EXPECT_EQ(finding->severity, Severity::fault);
-  EXPECT_EQ(finding->channel, "a2");
-  EXPECT_THAT(finding->what, HasSubstr("does not reach the stage"));
+  expect_finding(found, Cause::excitation, Severity::fault, "a2", "does not reach the stage");
 }
 
 TEST(SilentStage, IsNoCaseOfDeadSensors) {
@@ -200,11 +203,7 @@ TEST(MovingSetpoint, IsNotADeadSensor) {
   nominal.rigid_body = [](double) { return Eigen::MatrixXcd(Eigen::MatrixXcd::Ones(2, 3)); };
   const std::vector<Finding> found = health_of(log, nominal);
   EXPECT_EQ(first_with(found, Cause::dead), nullptr);
-  const Finding* finding = first_with(found, Cause::incoherent);
-  ASSERT_NE(finding, nullptr);
-  EXPECT_EQ(finding->severity, Severity::fault);
-  EXPECT_EQ(finding->channel, "z1");
-  EXPECT_THAT(finding->what, HasSubstr("moving setpoint"));
+  expect_finding(found, Cause::incoherent, Severity::fault, "z1", "moving setpoint");
 }
 
 // A factor would explain a part of what differs.
@@ -217,10 +216,8 @@ TEST(AnotherController, IsNoWrongScale) {
   };
   const std::vector<Finding> found = health_of(log, nominal);
   EXPECT_EQ(first_with(found, Cause::scale), nullptr);
-  const Finding* finding = first_with(found, Cause::controller);
-  ASSERT_NE(finding, nullptr);
-  EXPECT_THAT(finding->what, HasSubstr("different controller"));
-  EXPECT_THAT(finding->what, HasSubstr("setpoint"));
+  expect_finding(found, Cause::controller, Severity::doubt, "", "different controller");
+  expect_finding(found, Cause::controller, Severity::doubt, "", "setpoint");
 }
 
 /// The sensors show only noise, and u = r - C y.
@@ -280,20 +277,13 @@ TEST(Feedback, IsOneFunctionOfTheSensorsInASoundLog) {
 
 // The controller of one experiment has half the gain.
 TEST(Feedback, OfAnotherControllerInOneExperimentIsNot) {
-  LoopExperiment x{.periods = 3};
-  x.lines = odd_lines(60);
-  x.noise_factor = 1e-3 * Eigen::MatrixXcd::Identity(2, 2);
-  MemoryLog log = test::simulate_log(test::small_stage(), x);
+  MemoryLog log = closed_loop_log();
   test::ClosedLoop other = test::small_stage();
   other.controller = [](double omega) {
     return Eigen::MatrixXcd(0.5 * test::small_stage().controller(omega));
   };
-  log.records[2] = test::simulate_log(other, x).records[2];
-  const std::vector<Finding> found = health_of(log);
-  const Finding* finding = first_with(found, Cause::controller);
-  ASSERT_NE(finding, nullptr);
-  EXPECT_EQ(finding->severity, Severity::doubt);
-  EXPECT_THAT(finding->what, HasSubstr("not one linear function"));
+  log.records[2] = closed_loop_log(1, 1e-3, other).records[2];
+  expect_finding(health_of(log), Cause::controller, Severity::doubt, "", "not one linear function");
 }
 
 TEST(Feedback, SaysWhatItNeeds) {

@@ -1,4 +1,4 @@
-#include "frf/wiring/repetition_check.hpp"
+#include "frf/wiring/timing_check.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,8 +17,7 @@ MemoryLog log_of(const LoopExperiment& x) { return test::simulate_log(test::smal
 
 LoopExperiment experiment(int periods, double noise) {
   LoopExperiment x{.period_samples = 500, .realizations = 1, .periods = periods};
-  x.lines.clear();
-  for (int line = 5; line < 180; line += 2) x.lines.push_back(line);
+  x.lines = test::line_range(5, 179, 2);
   x.noise_factor = noise * Eigen::MatrixXcd::Identity(2, 2);
   return x;
 }

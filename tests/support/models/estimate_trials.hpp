@@ -48,4 +48,14 @@ inline Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_s
   return trials;
 }
 
+/// Mean over lines and entries of |G - truth|^2 over the stated variance; 1 if the variance is right.
+inline double error_over_variance(const FrfEstimate& frf, const SampledPlant& plant) {
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd G = plant.response(frf.omega_rad_s()[k], frf.sample_rate_hz);
+    sum += ((frf.at(k) - G).reshaped().array().abs2() / frf.noise_variance.col(k).array()).mean();
+  }
+  return sum / static_cast<double>(frf.lines());
+}
+
 }  // namespace stageid::test

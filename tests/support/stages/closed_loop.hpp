@@ -43,6 +43,13 @@ struct LoopExperiment {
   std::vector<double> noise_scale{};  ///< of v, an experiment; empty: 1
 };
 
+/// First, first + step, ..., last.
+inline std::vector<int> line_range(int first, int last, int step) {
+  std::vector<int> lines;
+  for (int l = first; l <= last; l += step) lines.push_back(l);
+  return lines;
+}
+
 /// Circular complex Gaussian, E|w|^2 = 1, and phases; the same numbers with every standard library.
 class ComplexNoise {
  public:

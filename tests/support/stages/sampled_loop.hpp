@@ -119,11 +119,4 @@ inline MemoryLog simulate_sampled_log(const SampledPlant& plant, const LoopExper
   return log;
 }
 
-/// First, first + step, ..., last.
-inline std::vector<int> line_range(int first, int last, int step) {
-  std::vector<int> lines;
-  for (int l = first; l <= last; l += step) lines.push_back(l);
-  return lines;
-}
-
 }  // namespace stageid::test

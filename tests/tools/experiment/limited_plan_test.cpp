@@ -10,7 +10,7 @@
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
-#include "frf/response/relative_variance.hpp"
+#include "frf/response/confidence.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/experiment/config_plan.hpp"
 
