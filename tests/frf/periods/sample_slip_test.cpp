@@ -13,7 +13,7 @@
 #include "frf/periods/period_slip.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/logs/told_findings.hpp"
-#include "tests/support/stages/sampled_loop.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 namespace stageid {
 namespace test_sample_slip {
@@ -72,18 +72,6 @@ std::vector<Finding> told(const HealthRecord& record) {
   return test::told(check_health(record, std::nullopt));
 }
 
-/// Mean over lines and entries of |G - truth|^2 over the stated variance; 1 if the variance is right.
-double chi_square(const FrfEstimate& frf, const Case& c) {
-  double sum = 0.0;
-  for (Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd truth =
-        c.plant.response(2.0 * std::numbers::pi * frf.frequency_hz[k], c.x.sample_rate_hz);
-    const Eigen::VectorXcd off = frf.response.col(k) - truth.reshaped();
-    sum += (off.cwiseAbs2().array() / frf.noise_variance.col(k).array()).mean();
-  }
-  return sum / static_cast<double>(frf.lines());
-}
-
 TEST(SampleSlip, CleanRunsHaveNone) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const Case c(seed);
@@ -136,7 +124,7 @@ TEST(SampleSlip, OneLostSampleIsToldWithItsRowAndTheRestIsUsed) {
     EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0) << seed;
     exact += std::abs(static_cast<double>(slip.row) - static_cast<double>(row)) <= 20.0 ? 1 : 0;
     EXPECT_LE(both.frf.dropped_periods.size(), 1U) << seed;
-    const double ratio = chi_square(both.frf, c);
+    const double ratio = test::error_over_variance(both.frf, c.plant);
     EXPECT_LT(ratio, 1.6) << seed;
     EXPECT_GT(ratio, 0.6) << seed;
   }
@@ -161,7 +149,7 @@ TEST(SampleSlip, SeveralLostOrDoubledSamplesOfAllOrOneKindOfChannels) {
       EXPECT_EQ(slip.sensors, kind.sensors) << kind.count << " " << seed;
       EXPECT_EQ(slip.actuators, kind.actuators) << kind.count << " " << seed;
       EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0);
-      EXPECT_LT(chi_square(both.frf, c), 1.6) << kind.count << " " << seed;
+      EXPECT_LT(test::error_over_variance(both.frf, c.plant), 1.6) << kind.count << " " << seed;
     }
   }
 }
@@ -186,7 +174,8 @@ TEST(SampleSlip, OneChannelMayLoseSamplesAlone) {
         EXPECT_EQ(slip.lost, count) << seed;
         EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(row), 200.0) << seed;
         EXPECT_NE(to_string(slip).find(of_sensor ? " of z2 " : " of a2 "), std::string::npos);
-        EXPECT_LT(chi_square(both.frf, c), 1.6) << of_sensor << " " << count << " " << seed;
+        EXPECT_LT(test::error_over_variance(both.frf, c.plant), 1.6)
+            << of_sensor << " " << count << " " << seed;
         EXPECT_EQ(told(both.health).size(), 1U) << text(told(both.health));
       }
 }
@@ -205,7 +194,7 @@ TEST(SampleSlip, IsTheSameForBothMethodsAndForTheRecordAlone) {
   const FrfAndHealth lpm =
       estimate_plant_frf_and_health({&c.log}, {.transient_periods = 1, .method = FrfMethod::lpm});
   EXPECT_EQ(rows(lpm.health), one);
-  EXPECT_LT(chi_square(lpm.frf, c), 1.6);
+  EXPECT_LT(test::error_over_variance(lpm.frf, c.plant), 1.6);
 }
 
 }  // namespace test_sample_slip

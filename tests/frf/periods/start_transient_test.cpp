@@ -168,40 +168,36 @@ std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool ne
   return check_start_transient(evidence);
 }
 
-TEST(StartTransient, ASteadyChangeIsADrift) {
-  int named = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const std::vector<Finding> found = of_change([](int p) { return 3.0 * p; }, seed);
-    named += found.size() == 1 && found[0].cause == Cause::drift;
-    EXPECT_TRUE(std::none_of(found.begin(), found.end(), [](const Finding& f) {
-      return f.severity == Severity::fault;
-    })) << seed;
-  }
-  EXPECT_GE(named, 19);
-}
+struct Change {
+  const char* name;
+  double (*at)(int p);
+  bool new_phases;
+  Cause cause;
+};
 
-TEST(StartTransient, ADecayIsNoDrift) {
-  for (const double q : {0.2, 0.5, 0.7}) {
-    int named = 0;
-    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-      const std::vector<Finding> found =
-          of_change([q](int p) { return 30.0 * std::pow(q, p); }, seed);
-      named += found.size() == 1 && found[0].cause == Cause::unsettled;
-    }
-    EXPECT_GE(named, 19) << q;
-  }
-}
+class ChangeOfPeriods : public testing::TestWithParam<Change> {};
 
 // A loop that oscillates and comes to rest is not linear: no phase of one period follows from that of the last.
-TEST(StartTransient, ADecayWithoutACommonRatioIsALimitCycle) {
+TEST_P(ChangeOfPeriods, IsNamed) {
   int named = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const std::vector<Finding> found =
-        of_change([](int p) { return 30.0 * std::pow(0.5, p); }, seed, true);
-    named += found.size() == 1 && found[0].cause == Cause::limit_cycle;
+    const std::vector<Finding> found = of_change(GetParam().at, seed, GetParam().new_phases);
+    named += found.size() == 1 && found[0].cause == GetParam().cause;
+    EXPECT_TRUE(GetParam().cause != Cause::drift || !any_fault(found)) << seed;
   }
   EXPECT_GE(named, 19);
 }
+
+INSTANTIATE_TEST_SUITE_P(
+    StartTransient, ChangeOfPeriods,
+    testing::Values(
+        Change{"Steady", [](int p) { return 3.0 * p; }, false, Cause::drift},
+        Change{"FastDecay", [](int p) { return 30.0 * std::pow(0.2, p); }, false, Cause::unsettled},
+        Change{"Decay", [](int p) { return 30.0 * std::pow(0.5, p); }, false, Cause::unsettled},
+        Change{"SlowDecay", [](int p) { return 30.0 * std::pow(0.7, p); }, false, Cause::unsettled},
+        Change{"WithoutACommonRatio", [](int p) { return 30.0 * std::pow(0.5, p); }, true,
+               Cause::limit_cycle}),
+    [](const auto& change) { return change.param.name; });
 
 // A mode that rings below the first line does no harm to the others, but a loop that oscillates there does.
 TEST(StartTransient, AtAnEndOfTheLinesOnlyALimitCycleIsAFault) {

@@ -133,8 +133,11 @@ TEST(Detection, ACubicTermAtMinus60DecibelIsFoundOnOddLines) {
   const double rms =
       std::sqrt(y.colwise().squaredNorm().maxCoeff() / static_cast<double>(y.rows()));
   const double cubic = 1e-3 / (std::sqrt(15.0) * rms * rms);  // rms of y^3 is sqrt(15) rms^3
+  const MemoryLog quiet = test::simulate_sampled_log(stage(), x, 1e-5 * rms);
+  EXPECT_GT(estimate_plant_frf({&quiet}).nonlinearity.p_value.minCoeff(), 1e-4);
   const MemoryLog log = test::simulate_sampled_log(stage(), x, 1e-5 * rms, cubic);
   const NonlinearityTest found = estimate_plant_frf({&log}).nonlinearity;
+  EXPECT_LT(found.distortion.maxCoeff(), 0.1);
   EXPECT_LT(found.p_value.rowwise().minCoeff().maxCoeff(), 1e-6);
   EXPECT_LT(found.odd.p_value.rowwise().minCoeff().minCoeff(), 1e-6);
   EXPECT_GT(found.even.p_value.minCoeff(), 1e-4);

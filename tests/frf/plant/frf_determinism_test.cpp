@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "frf/plant/plant_frf.hpp"
+#include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
@@ -14,9 +15,7 @@ using testing::Not;
 
 MemoryLog noisy_log() {
   LoopExperiment x{.realizations = 3, .periods = 4, .scheme = test::AxisScheme::orthogonal};
-  for (int line = 1; line < 120; line += 2) x.lines.push_back(line);
-  std::sort(x.lines.begin(), x.lines.end());
-  x.lines.erase(std::unique(x.lines.begin(), x.lines.end()), x.lines.end());
+  x.lines = test::line_range(1, 119, 2);
   x.noise_factor = 0.1 * Eigen::MatrixXcd::Identity(2, 2);
   return test::simulate_log(test::small_stage(), x);
 }
@@ -28,16 +27,8 @@ TEST(FrfDeterminism, AnyNumberOfThreadsGivesTheSameBits) {
   };
   const FrfEstimate one = estimate(1);
   for (const int threads : {2, 3, 7, 0}) {
-    const FrfEstimate many = estimate(threads);
-    EXPECT_EQ(one.response, many.response);
-    EXPECT_EQ(one.noise_variance, many.noise_variance);
-    EXPECT_EQ(one.total_variance, many.total_variance);
-    EXPECT_EQ(one.covariance, many.covariance);
-    EXPECT_EQ(one.residual_covariance_re, many.residual_covariance_re);
-    EXPECT_EQ(one.input_factor, many.input_factor);
-    EXPECT_EQ(one.residual_covariance_im, many.residual_covariance_im);
-    EXPECT_EQ(one.input_condition, many.input_condition);
-    EXPECT_EQ(one.provenance_json, many.provenance_json);
+    SCOPED_TRACE(threads);
+    test::expect_same(one, estimate(threads));
   }
 }
 
@@ -58,11 +49,7 @@ TEST(FrfDeterminism, AResumedExperimentIsTheUninterruptedOne) {
                    whole.records[run]);
     resumed.log_runs.back().started_utc = "2031-01-01T00:00:00Z";
   }
-  const FrfEstimate a = estimate_plant_frf({&whole});
-  const FrfEstimate b = estimate_plant_frf({&resumed});
-  EXPECT_EQ(a.response, b.response);
-  EXPECT_EQ(a.noise_variance, b.noise_variance);
-  EXPECT_EQ(a.provenance_json, b.provenance_json);
+  test::expect_same(estimate_plant_frf({&whole}), estimate_plant_frf({&resumed}));
 }
 
 TEST(FrfDeterminism, ProvenanceNamesFileHashAndOptionsButNoPlaceOrThread) {

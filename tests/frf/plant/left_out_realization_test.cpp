@@ -4,6 +4,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/health_record.hpp"
+#include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
@@ -20,8 +21,7 @@ constexpr int kExperiments = 2;
 /// Three realizations of two runs; the marked runs have no usable period.
 MemoryLog log_with_marked_runs(const std::vector<std::size_t>& marked_runs) {
   LoopExperiment x{.axes = kExperiments, .realizations = 3, .periods = 4};
-  x.lines.clear();
-  for (int line = 1; line < 120; line += 2) x.lines.push_back(line);
+  x.lines = test::line_range(1, 119, 2);
   x.noise_factor = 0.1 * Eigen::MatrixXcd::Identity(2, 2);
   MemoryLog log = test::simulate_log(test::small_stage(), x);
   for (const std::size_t run : marked_runs) log.records[run].marked.setOnes();
@@ -98,13 +98,7 @@ TEST(LeftOutRealization, HealthLooksAtTheNextOne) {
     const HealthRecord both = estimate_plant_frf_and_health({&log}, {.threads = threads}).health;
     for (const HealthRecord& record : {alone, both}) {
       EXPECT_EQ(record.realization, 1);
-      EXPECT_EQ(record.periods, want.periods);
-      EXPECT_EQ(record.axes, want.axes);
-      ASSERT_EQ(record.lines.size(), want.lines.size());
-      for (std::size_t k = 0; k < want.lines.size(); ++k) {
-        EXPECT_EQ(record.lines[k].R, want.lines[k].R);
-        EXPECT_EQ(record.lines[k].Z, want.lines[k].Z);
-      }
+      test::expect_same(record, want);
       // Two of three realizations' four runs and the clean one of the first.
       EXPECT_EQ(record.scan[0].samples(), 5 * 4 * log.log_info.period_samples);
     }

@@ -30,9 +30,9 @@ fs::path shared_data() { return fs::path(STAGEID_SOURCE_DIR) / ".." / "shared" /
 Eigen::MatrixXcd plain_estimate(const LogReader& log, const std::vector<int>& lines) {
   const LogInfo& info = log.info();
   const Eigen::Index n = info.period_samples;
-  const auto n_y = static_cast<Eigen::Index>(info.sensors.size());
-  const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
-  const auto n_lines = static_cast<Eigen::Index>(lines.size());
+  const auto n_y = std::ssize(info.sensors);
+  const auto n_u = std::ssize(info.actuators);
+  const auto n_lines = std::ssize(lines);
   const auto n_runs = static_cast<Eigen::Index>(log.runs().size());
   const Eigen::Index realizations = n_runs / n_u;
   RealDft dft(info.period_samples);
@@ -52,8 +52,7 @@ Eigen::MatrixXcd plain_estimate(const LogReader& log, const std::vector<int>& li
           period += all.col(c).segment((info.transient_periods + p) * n, n) /
                     static_cast<double>(periods);
         }
-        std::copy_n(period.data(), n, dft.input().begin());
-        const auto spectrum = dft.forward();
+        const auto spectrum = dft.forward(period);
         for (std::size_t k = 0; k < lines.size(); ++k) {
           Z[k](c, e) = spectrum[static_cast<std::size_t>(lines[k])];
         }
@@ -91,7 +90,7 @@ TEST(SharedData, TheForeignLogGivesThePlantItWasMadeWith) {
   const Hdf5File file = Hdf5File::open(folder / "truth.h5");
   const std::vector<double> frequency = file.read_reals("/frequency_hz");
   const std::vector<std::complex<double>> data = file.read_complex("/response_sampled");
-  ASSERT_EQ(frf.lines(), static_cast<Eigen::Index>(frequency.size()));
+  ASSERT_EQ(frf.lines(), std::ssize(frequency));
   ASSERT_EQ(frf.n_outputs(), 4);
   ASSERT_EQ(frf.n_inputs(), 13);
   Eigen::MatrixXcd truth(52, frf.lines());

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "frf/plant/plant_frf.hpp"
-#include "tests/support/stages/sampled_loop.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 namespace stageid {
 namespace test_leaked_noise {
@@ -132,12 +132,7 @@ double error_over_variance(std::uint64_t seed) {
   x.seed = seed;
   const MemoryLog log = test::simulate_sampled_log(plant, x, 1e-3);
   const FrfEstimate frf = estimate_plant_frf({&log}, {.threads = 1});
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd G = plant.response(test::omega_of(x, k), x.sample_rate_hz);
-    sum += ((frf.at(k) - G).reshaped().array().abs2() / frf.noise_variance.col(k).array()).mean();
-  }
-  return sum / static_cast<double>(frf.lines());
+  return test::error_over_variance(frf, plant);
 }
 
 // A random force of 1 s moves the stage slowly: every period of 0.5 s ends elsewhere than it begins.

@@ -92,30 +92,6 @@ TEST(Nonlinearity, OnALinearPlantFalseAlarmsAreNominal) {
   EXPECT_NEAR(at_1_percent / static_cast<double>(tests), 0.01, 0.008);
 }
 
-// A cubic sensor, its distortion 1e-3 of the signal at its largest output.
-TEST(Nonlinearity, ACubicTermAtMinus60DecibelIsFound) {
-  const test::SampledPlant plant =
-      test::sampled_plant(2, 2, {{12.3, 0.1}, {37.0, 0.1}}, 200.0, 0.5);
-  LoopExperiment x{.sample_rate_hz = 200.0, .period_samples = 400, .axes = 2};
-  x.lines = test::line_range(11, 101, 2);
-  x.realizations = 4;
-  x.periods = 4;
-  x.transient_periods = 3;
-  const MemoryLog linear = test::simulate_sampled_log(plant, x, 1e-5);
-  const Eigen::MatrixXd& y = linear.records[0].sensors;
-  const double rms =
-      std::sqrt(y.colwise().squaredNorm().maxCoeff() / static_cast<double>(y.rows()));
-  // rms of y^3 is sqrt(15) rms^3 for Gaussian y.
-  const double cubic = 1e-3 / (std::sqrt(15.0) * rms * rms);
-  const double noise = 1e-5 * rms;
-  const MemoryLog quiet = test::simulate_sampled_log(plant, x, noise);
-  const MemoryLog distorted = test::simulate_sampled_log(plant, x, noise, cubic);
-  EXPECT_GT(nonlinearity_test(estimate_plant_frf({&quiet})).p_value.minCoeff(), 1e-4);
-  const NonlinearityTest found = nonlinearity_test(estimate_plant_frf({&distorted}));
-  EXPECT_LT(found.p_value.rowwise().minCoeff().maxCoeff(), 1e-6);
-  EXPECT_LT(found.distortion.maxCoeff(), 0.1);
-}
-
 // Without noise, F exceeds 1e16 at the largest distortion; this is strong evidence, not none.
 TEST(Nonlinearity, WithoutNoiseEveryBandThatIsDistortedIsNonlinear) {
   const test::SampledPlant plant =

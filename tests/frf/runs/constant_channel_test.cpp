@@ -19,8 +19,7 @@ using testing::HasSubstr;
 
 MemoryLog noisy_log() {
   LoopExperiment x{.realizations = 2, .periods = 3};
-  x.lines.clear();
-  for (int line = 1; line < 60; line += 2) x.lines.push_back(line);
+  x.lines = test::line_range(1, 59, 2);
   x.noise_factor = 1e-3 * Eigen::MatrixXcd::Identity(2, 2);
   return test::simulate_log(test::small_stage(), x);
 }

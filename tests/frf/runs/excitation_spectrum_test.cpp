@@ -19,7 +19,7 @@ std::vector<int> odd_lines(int last) {
 
 Eigen::MatrixXd multisine(const std::vector<int>& lines, const Eigen::VectorXd& amplitude) {
   test::ComplexNoise random(9);
-  Eigen::MatrixXcd spectrum(1, static_cast<Eigen::Index>(lines.size()));
+  Eigen::MatrixXcd spectrum(1, std::ssize(lines));
   for (Eigen::Index k = 0; k < spectrum.cols(); ++k) spectrum(0, k) = amplitude[k] * random.phase();
   RealDft dft(kPeriod);
   return test::synthesize(spectrum, lines, dft);

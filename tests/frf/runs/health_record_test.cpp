@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "frf/plant/plant_frf.hpp"
+#include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid {
@@ -14,8 +15,7 @@ using test::MemoryLog;
 /// Three actuators, of which two are excited; two sensors; a marked period.
 MemoryLog recorded_log() {
   LoopExperiment x{.axes = 2, .realizations = 2, .periods = 4};
-  x.lines.clear();
-  for (int line = 1; line < 120; line += 2) x.lines.push_back(line);
+  x.lines = test::line_range(1, 119, 2);
   x.noise_factor = 0.1 * Eigen::MatrixXcd::Identity(2, 2);
   MemoryLog log = test::simulate_log(test::small_stage(), x);
   log.records[1].marked[2 * log.log_info.period_samples + 17] = 1;
@@ -23,26 +23,10 @@ MemoryLog recorded_log() {
 }
 
 void expect_equal(const HealthRecord& a, const HealthRecord& b) {
-  EXPECT_EQ(a.realization, b.realization);
-  EXPECT_EQ(a.periods, b.periods);
-  EXPECT_EQ(a.frequency_hz, b.frequency_hz);
-  EXPECT_EQ(a.axes, b.axes);
+  test::expect_same(a, b);
   EXPECT_EQ(a.health.marked, b.health.marked);
-  ASSERT_EQ(a.lines.size(), b.lines.size());
-  for (std::size_t k = 0; k < a.lines.size(); ++k) {
-    EXPECT_EQ(a.lines[k].R, b.lines[k].R);
-    EXPECT_EQ(a.lines[k].Z, b.lines[k].Z);
-  }
   ASSERT_EQ(a.others.size(), b.others.size());
-  for (std::size_t m = 0; m < a.others.size(); ++m) {
-    EXPECT_EQ(a.others[m].realization, b.others[m].realization);
-    EXPECT_EQ(a.others[m].periods, b.others[m].periods);
-    ASSERT_EQ(a.others[m].lines.size(), b.others[m].lines.size());
-    for (std::size_t k = 0; k < a.others[m].lines.size(); ++k) {
-      EXPECT_EQ(a.others[m].lines[k].R, b.others[m].lines[k].R);
-      EXPECT_EQ(a.others[m].lines[k].Z, b.others[m].lines[k].Z);
-    }
-  }
+  for (std::size_t m = 0; m < a.others.size(); ++m) test::expect_same(a.others[m], b.others[m]);
   ASSERT_EQ(a.scan.size(), b.scan.size());
   for (std::size_t c = 0; c < a.scan.size(); ++c) {
     EXPECT_EQ(a.scan[c].samples(), b.scan[c].samples());
@@ -93,9 +77,7 @@ TEST(HealthRecord, IsTheSameFromTheReadingOfTheEstimate) {
   for (const int threads : {1, 2, 5}) {
     const FrfAndHealth both = estimate_plant_frf_and_health({&log}, {.threads = threads});
     expect_equal(both.health, alone);
-    EXPECT_EQ(both.frf.response, estimate.response);
-    EXPECT_EQ(both.frf.noise_variance, estimate.noise_variance);
-    EXPECT_EQ(both.frf.provenance_json, estimate.provenance_json);
+    test::expect_same(both.frf, estimate);
   }
 }
 
