@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <sstream>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/output_file.hpp"
@@ -11,63 +13,28 @@
 namespace stageid {
 namespace {
 
-struct Dataset {
-  const char* name;
-  std::size_t axes;  ///< 0: texts
-};
+/// Words separated by blanks.
+std::vector<std::string> words_in(const char* text) {
+  std::istringstream stream(text);
+  return {std::istream_iterator<std::string>(stream), {}};
+}
 
-constexpr Dataset kDatasets[] = {{"frequency_hz", 1},
-                                 {"response", 3},
-                                 {"inputs", 0},
-                                 {"outputs", 0},
-                                 {"noise_variance", 3},
-                                 {"total_variance", 3},
-                                 {"covariance", 3},
-                                 {"residual_covariance", 3},
-                                 {"input_factor", 3},
-                                 {"input_condition", 1},
-                                 {"interpolation_misfit", 1},
-                                 {"excluded_channels", 0},
-                                 {"excluded_power", 1},
-                                 {"provenance", 0},
-                                 {"detection_frequency_hz", 1},
-                                 {"detection_line", 1},
-                                 {"detection_groups", 0},
-                                 {"detection_runs", 1},
-                                 {"detection_power", 3},
-                                 {"detection_noise", 2},
-                                 {"detection_linear_power", 3},
-                                 {"nonlinearity_band_hz", 2},
-                                 {"nonlinearity_p_value", 3},
-                                 {"nonlinearity_distortion", 3},
-                                 {"nonlinearity_settled_p_value", 1},
-                                 {"nonlinearity_even_p_value", 3},
-                                 {"nonlinearity_even_level", 3},
-                                 {"nonlinearity_odd_p_value", 3},
-                                 {"nonlinearity_odd_level", 3},
-                                 {"dropped_periods", 2},
-                                 {"dropped_reasons", 0},
-                                 {"left_out_realizations", 1},
-                                 {"left_out_reasons", 0}};
+/// The datasets by their number of axes; 0: texts.
+constexpr const char* kDatasets[] = {
+    "inputs outputs excluded_channels provenance detection_groups dropped_reasons "
+    "left_out_reasons",
+    "frequency_hz input_condition interpolation_misfit excluded_power detection_frequency_hz "
+    "detection_line detection_runs nonlinearity_settled_p_value left_out_realizations",
+    "detection_noise nonlinearity_band_hz dropped_periods",
+    "response noise_variance total_variance covariance residual_covariance input_factor "
+    "detection_power detection_linear_power nonlinearity_p_value nonlinearity_distortion "
+    "nonlinearity_even_p_value nonlinearity_even_level nonlinearity_odd_p_value "
+    "nonlinearity_odd_level"};
 
-constexpr const char* kAttributes[] = {"@format",
-                                       "@format_version",
-                                       "@sample_rate_hz",
-                                       "@hold",
-                                       "@compensated",
-                                       "@method",
-                                       "@covariance_lines",
-                                       "@delay_s",
-                                       "@realizations",
-                                       "@periods",
-                                       "@experiments",
-                                       "@noise_dof",
-                                       "@total_dof",
-                                       "@correlated_lines",
-                                       "@experiment_noise_ratio",
-                                       "inputs@unit",
-                                       "outputs@unit",
-                                       "detection_noise@dof"};
+constexpr const char* kAttributes =
+    "@format @format_version @sample_rate_hz @hold @compensated @method @covariance_lines "
+    "@delay_s @realizations @periods @experiments @noise_dof @total_dof @correlated_lines "
+    "@experiment_noise_ratio inputs@unit outputs@unit detection_noise@dof";
 
 /// Name of the MATLAB variable: hold for "@hold", inputs_unit for "inputs@unit".
 std::string identifier(std::string name) {
@@ -79,17 +46,18 @@ std::string identifier(std::string name) {
 /// Whether shapes are those of MATLAB; attributes are then variables.
 bool from_matlab(const ArrayList& list) { return list.find("@format") == nullptr; }
 
-NamedArray with_axes(const ArrayList& list, NamedArray array, const Dataset& dataset, bool matlab) {
-  array.name = dataset.name;
-  if (array.is_text() != (dataset.axes == 0))
+NamedArray with_axes(const ArrayList& list, NamedArray array, const std::string& name,
+                     std::size_t axes, bool matlab) {
+  array.name = name;
+  if (array.is_text() != (axes == 0))
     throw FormatError(
-        list.file, dataset.name,
+        list.file, name,
         array.is_text() ? "contains text; expected numbers" : "contains numbers; expected text");
-  if (dataset.axes <= 1) {
+  if (axes <= 1) {
     array.shape = {array.size()};
-  } else if (matlab && dataset.axes == 3) {
+  } else if (matlab && axes == 3) {
     // MATLAB drops trailing axes of length one; the last axis is that of the lines.
-    while (array.shape.size() < dataset.axes) array.shape.push_back(1);
+    while (array.shape.size() < axes) array.shape.push_back(1);
     if (array.shape.size() == 3) array = permuted(array, {2, 0, 1});
   }
   return array;
@@ -106,10 +74,11 @@ ArrayList arrays_of_frf(const FrfEstimate& frf, const std::filesystem::path& bes
 FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& beside) {
   const bool matlab = from_matlab(list);
   ArrayList ours{list.file, {}};
-  for (const Dataset& dataset : kDatasets)
-    if (const NamedArray* array = list.find(dataset.name))
-      ours.arrays.push_back(with_axes(list, *array, dataset, matlab));
-  for (const char* attribute : kAttributes)
+  for (std::size_t axes = 0; axes < std::size(kDatasets); ++axes)
+    for (const std::string& name : words_in(kDatasets[axes]))
+      if (const NamedArray* array = list.find(name))
+        ours.arrays.push_back(with_axes(list, *array, name, axes, matlab));
+  for (const std::string& attribute : words_in(kAttributes))
     if (const NamedArray* array = list.find(matlab ? identifier(attribute) : attribute)) {
       NamedArray copy = *array;
       copy.name = attribute;

@@ -6,65 +6,73 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
+#include <type_traits>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
-
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/terminal/text_lines.hpp"
 
 namespace stageid {
 namespace {
 
-/// The names of the columns of a channel.
-struct Titles {
-  std::string real, imaginary, noise_variance, total_variance;
-};
+/// Calls visit(part, matrix, square) for the columns of a channel that have values: the part of their title, and
+/// whether they have the square of its unit.
+template <typename Frf, typename Visit>
+void for_each_column(Frf& frf, Visit visit) {
+  visit("real", frf.response.real(), false);
+  visit("imaginary", frf.response.imag(), false);
+  if (frf.noise_variance.size() > 0) visit("noise_variance", frf.noise_variance, true);
+  if (frf.total_variance.size() > 0) visit("total_variance", frf.total_variance, true);
+}
 
-Titles titles_of(const FrfEstimate& frf, std::size_t i, std::size_t j) {
-  const std::string channel = frf.outputs.names[i] + "/" + frf.inputs.names[j];
-  const std::string unit = frf.outputs.units[i] + "/" + frf.inputs.units[j];
-  const auto title = [&](const char* part, const std::string& of) {
-    return fmt::format("{} {} [{}]", part, channel, of);
-  };
-  const std::string square = fmt::format("({})^2", unit);
-  return {title("real", unit), title("imaginary", unit), title("noise_variance", square),
-          title("total_variance", square)};
+std::string title_of(const FrfEstimate& frf, Eigen::Index channel, const char* part, bool square) {
+  const Eigen::Index i = channel % frf.n_outputs(), j = channel / frf.n_outputs();
+  const std::string unit = frf.outputs.unit(i) + "/" + frf.inputs.unit(j);
+  return fmt::format("{} {}/{} [{}]", part, frf.outputs.name(i), frf.inputs.name(j),
+                     square ? fmt::format("({})^2", unit) : unit);
 }
 
 std::string head_of(const FrfEstimate& frf) {
   std::string text = "frequency_hz";
-  for (std::size_t j = 0; j < frf.inputs.size(); ++j)
-    for (std::size_t i = 0; i < frf.outputs.size(); ++i) {
-      const Titles titles = titles_of(frf, i, j);
-      text += fmt::format(",{},{}", csv_field(titles.real), csv_field(titles.imaginary));
-      if (frf.noise_variance.size() > 0)
-        text.append(1, ',').append(csv_field(titles.noise_variance));
-      if (frf.total_variance.size() > 0)
-        text.append(1, ',').append(csv_field(titles.total_variance));
-    }
+  for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
+    for_each_column(frf, [&](const char* part, const auto& /*values*/, bool square) {
+      text.append(1, ',').append(csv_field(title_of(frf, c, part, square)));
+    });
   return text;
 }
 
-/// Properties that are not in the columns, so that the table can be read without a map.
+/// Calls visit(key, value) for the properties that are not in the columns, so that the table can be read without a
+/// map.
+template <typename Frf, typename Visit>
+void for_each_property(Frf& frf, Visit visit) {
+  visit("outputs", frf.outputs.names);
+  visit("output_units", frf.outputs.units);
+  visit("inputs", frf.inputs.names);
+  visit("input_units", frf.inputs.units);
+  visit("sample_rate_hz", frf.sample_rate_hz);
+  visit("hold", frf.hold);
+  visit("compensated", frf.compensated);
+  visit("delay_s", frf.delay_s);
+  visit("realizations", frf.realizations);
+  visit("periods", frf.periods);
+  visit("experiments", frf.experiments);
+  visit("noise_dof", frf.noise_dof);
+  visit("total_dof", frf.total_dof);
+  visit("correlated_lines", frf.correlated_lines);
+}
+
 std::string description_of(const FrfEstimate& frf) {
-  const nlohmann::ordered_json json = {{"format", "stageid-frf"},
-                                       {"outputs", frf.outputs.names},
-                                       {"output_units", frf.outputs.units},
-                                       {"inputs", frf.inputs.names},
-                                       {"input_units", frf.inputs.units},
-                                       {"sample_rate_hz", frf.sample_rate_hz},
-                                       {"hold", to_string(frf.hold)},
-                                       {"compensated", to_string(frf.compensated)},
-                                       {"delay_s", frf.delay_s},
-                                       {"realizations", frf.realizations},
-                                       {"periods", frf.periods},
-                                       {"experiments", frf.experiments},
-                                       {"noise_dof", frf.noise_dof},
-                                       {"total_dof", frf.total_dof},
-                                       {"correlated_lines", frf.correlated_lines}};
+  nlohmann::ordered_json json;
+  json["format"] = "stageid-frf";
+  for_each_property(frf, [&json](const char* key, const auto& value) {
+    if constexpr (std::is_enum_v<std::decay_t<decltype(value)>>)
+      json[key] = to_string(value);
+    else
+      json[key] = value;
+  });
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
@@ -96,28 +104,15 @@ bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   return plain && frf.outputs.size() > 0;
 }
 
-template <typename Value>
-void take(const nlohmann::json& json, const char* key, Value& value) {
-  if (json.contains(key)) value = json.at(key).get<Value>();
-}
-
 /// @throws nlohmann::json::exception for other types
 void read_description(const nlohmann::json& json, FrfEstimate& frf) {
-  take(json, "outputs", frf.outputs.names);
-  take(json, "output_units", frf.outputs.units);
-  take(json, "inputs", frf.inputs.names);
-  take(json, "input_units", frf.inputs.units);
-  take(json, "sample_rate_hz", frf.sample_rate_hz);
-  take(json, "delay_s", frf.delay_s);
-  take(json, "realizations", frf.realizations);
-  take(json, "periods", frf.periods);
-  take(json, "experiments", frf.experiments);
-  take(json, "noise_dof", frf.noise_dof);
-  take(json, "total_dof", frf.total_dof);
-  take(json, "correlated_lines", frf.correlated_lines);
-  frf.hold = from_word<Hold>(json.value("hold", "")).value_or(Hold::none);
-  frf.compensated =
-      from_word<Compensation>(json.value("compensated", "")).value_or(Compensation::none);
+  for_each_property(frf, [&json](const char* key, auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_enum_v<Value>)
+      value = from_word<Value>(json.value(key, "")).value_or(Value{});
+    else if (json.contains(key))
+      value = json.at(key).get<Value>();
+  });
 }
 
 /// The comment that describes the table; empty if there is none.
@@ -189,16 +184,10 @@ FrfEstimate read_frf_csv(const std::filesystem::path& file) {
   frf.response.resize(channels, frf.lines());
   if (has("noise_variance")) frf.noise_variance.resize(channels, frf.lines());
   if (has("total_variance")) frf.total_variance.resize(channels, frf.lines());
-  for (Eigen::Index c = 0; c < channels; ++c) {
-    const Titles titles = titles_of(frf, static_cast<std::size_t>(c % frf.n_outputs()),
-                                    static_cast<std::size_t>(c / frf.n_outputs()));
-    frf.response.row(c).real() = column(titles.real).transpose();
-    frf.response.row(c).imag() = column(titles.imaginary).transpose();
-    if (frf.noise_variance.size() > 0)
-      frf.noise_variance.row(c) = column(titles.noise_variance).transpose();
-    if (frf.total_variance.size() > 0)
-      frf.total_variance.row(c) = column(titles.total_variance).transpose();
-  }
+  for (Eigen::Index c = 0; c < channels; ++c)
+    for_each_column(frf, [&](const char* part, auto&& values, bool square) {
+      values.row(c) = column(title_of(frf, c, part, square)).transpose();
+    });
   try {
     check(frf);
   } catch (const std::invalid_argument& error) {
@@ -215,11 +204,10 @@ std::string frf_csv(const FrfEstimate& frf) {
       head_of(frf));
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     text += fmt::format("{}", frf.frequency_hz[k]);
-    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
-      text += fmt::format(",{},{}", frf.response(c, k).real(), frf.response(c, k).imag());
-      for (const Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance})
-        if (variance->size() > 0) text += fmt::format(",{}", (*variance)(c, k));
-    }
+    for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
+      for_each_column(frf, [&](const char* /*part*/, const auto& values, bool /*square*/) {
+        text += fmt::format(",{}", values(c, k));
+      });
     text += '\n';
   }
   return text;

@@ -46,6 +46,10 @@ std::size_t NamedArray::size() const {
   return std::visit([](const auto& list) { return list.size(); }, values);
 }
 
+bool NamedArray::is_vector() const noexcept {
+  return shape.size() <= 1 + static_cast<std::size_t>(std::count(shape.begin(), shape.end(), 1U));
+}
+
 const NamedArray* ArrayList::find(const std::string& name) const {
   std::string wanted = name.starts_with('/') ? name.substr(1) : name;
   const auto search = [&]() -> const NamedArray* {
@@ -76,11 +80,9 @@ const NamedArray& ArrayList::at(const std::string& name) const {
 }
 
 NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axes) {
-  std::vector<std::size_t> sorted = axes;
-  std::sort(sorted.begin(), sorted.end());
   std::vector<std::size_t> all(array.shape.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  if (sorted != all)
+  if (!std::is_permutation(axes.begin(), axes.end(), all.begin(), all.end()))
     throw std::invalid_argument(
         fmt::format("{}: {} are not a permutation of the {} axes of the array", array.name,
                     fmt::join(axes, ", "), all.size()));

@@ -3,6 +3,7 @@
 #include <complex>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -23,6 +24,7 @@ struct NamedArray {
   bool is_text() const noexcept { return values.index() == 2; }
   bool is_complex() const noexcept { return values.index() == 1; }
   std::size_t size() const;
+  bool is_vector() const noexcept;  ///< at most one axis has a length other than one
 };
 
 /// A variable that cannot be read, for listings and errors.
@@ -55,6 +57,11 @@ NamedArray reversed(const NamedArray& array);
 std::vector<double> real_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array);
+
+/// Reads a file in a child process (in_child), for the libraries that crash on damaged files.
+/// @throws FileError, FormatError
+ArrayList arrays_in_child(const std::filesystem::path& file,
+                          const std::function<ArrayList(const std::filesystem::path&)>& read);
 
 /// Every dataset and attribute of an HDF5 file; integers as doubles. Datasets that are neither numbers nor lists of
 /// texts are skipped.

@@ -3,17 +3,12 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
-#include "tools/exchange/arrays/arrays_in_child.hpp"
 #include "tools/exchange/arrays/named_array.hpp"
 
 namespace stageid {
 namespace {
 
 constexpr int kDeepest = 20;  // deeper groups are not expected
-
-std::vector<std::size_t> sizes(const std::vector<hsize_t>& shape) {
-  return {shape.begin(), shape.end()};
-}
 
 void read_attributes(const Hdf5File& file, const std::string& object, ArrayList& list) {
   for (const std::string& name : file.attributes(object)) {
@@ -31,7 +26,8 @@ void read_attributes(const Hdf5File& file, const std::string& object, ArrayList&
 }
 
 void read_dataset(const Hdf5File& file, const std::string& dataset, ArrayList& list) {
-  NamedArray array{dataset.substr(1), sizes(file.shape(dataset)), {}};
+  const std::vector<hsize_t> shape = file.shape(dataset);
+  NamedArray array{dataset.substr(1), {shape.begin(), shape.end()}, {}};
   switch (file.kind(dataset)) {
     case Hdf5Kind::real:
     case Hdf5Kind::integer:
@@ -66,18 +62,14 @@ void read_object(const Hdf5File& file, const std::string& object, int depth, Arr
 void write_attribute(Hdf5File& file, const NamedArray& array, std::size_t at) {
   const std::string object = fmt::format("/{}", array.name.substr(0, at));
   const std::string name = array.name.substr(at + 1);
-  const bool single = array.shape.empty();
-  if (const auto* texts = std::get_if<std::vector<std::string>>(&array.values)) {
-    if (single)
-      file.write_attribute(object, name, texts->at(0));
+  const auto write = [&](const auto& values) {
+    if (array.shape.empty())
+      file.write_attribute(object, name, values.at(0));
     else
-      file.write_attribute(object, name, *texts);
-  } else if (const auto* reals = std::get_if<std::vector<double>>(&array.values)) {
-    if (single)
-      file.write_attribute(object, name, reals->at(0));
-    else
-      file.write_attribute(object, name, *reals);
-  }
+      file.write_attribute(object, name, values);
+  };
+  if (array.is_text()) write(std::get<2>(array.values));
+  if (!array.is_text() && !array.is_complex()) write(std::get<0>(array.values));
 }
 
 void write_dataset(Hdf5File& file, const NamedArray& array) {
@@ -88,12 +80,12 @@ void write_dataset(Hdf5File& file, const NamedArray& array) {
       file.create_group(group);
   const std::string dataset = fmt::format("/{}", array.name);
   const std::vector<hsize_t> shape(array.shape.begin(), array.shape.end());
-  if (const auto* reals = std::get_if<std::vector<double>>(&array.values))
-    file.write_reals(dataset, shape, reals->data());
-  else if (const auto* complex = std::get_if<std::vector<std::complex<double>>>(&array.values))
-    file.write_complex(dataset, shape, complex->data());
+  if (array.is_text())
+    file.write_texts(dataset, std::get<2>(array.values));
+  else if (array.is_complex())
+    file.write_complex(dataset, shape, std::get<1>(array.values).data());
   else
-    file.write_texts(dataset, std::get<std::vector<std::string>>(array.values));
+    file.write_reals(dataset, shape, std::get<0>(array.values).data());
 }
 
 }  // namespace

@@ -16,10 +16,42 @@ namespace {
 
 enum class Form : unsigned char { real_imaginary, magnitude_angle, decibel_angle };
 
+/// Parameters by the quantities of outputs and inputs whose ratio is their unit: one for all ports, or one per port.
+struct Parameters {
+  char letter;
+  std::string_view outputs, inputs;
+  const char* note;  ///< how the reference resistance is removed
+
+  std::string_view output(std::size_t port) const { return of(outputs, port); }
+  std::string_view input(std::size_t port) const { return of(inputs, port); }
+  bool two_ports() const { return outputs.size() == 2; }
+
+ private:
+  static std::string_view of(std::string_view quantities, std::size_t port) {
+    return quantities.substr(quantities.size() == 1 ? 0 : port, 1);
+  }
+};
+
+constexpr Parameters kParameters[] = {
+    {'S', "1", "1", ""},
+    {'Z', "V", "A", "multiplied by the reference resistance {} ohm: V/A (ohm)"},
+    {'Y', "A", "V", "divided by the reference resistance {} ohm: A/V (S)"},
+    {'H', "VA", "AV",
+     "rescaled by the reference resistance {} ohm: h11 in V/A (ohm), h22 in A/V (S)"},
+    {'G', "AV", "VA",
+     "rescaled by the reference resistance {} ohm: g11 in A/V (S), g22 in V/A (ohm)"}};
+
+/// Null if unknown.
+const Parameters* parameters_of(std::string_view word) {
+  for (const Parameters& known : kParameters)
+    if (word == std::string_view(&known.letter, 1)) return &known;
+  return nullptr;
+}
+
 struct Options {
   double unit_hz = 1e9;
   Form form = Form::magnitude_angle;
-  char parameters = 'S';
+  const Parameters* parameters = &kParameters[0];
   double reference_ohm = 50.0;
 };
 
@@ -59,8 +91,8 @@ Options read_options(const TextLines& lines, std::string_view line) {
       options.form = kForms.at(word);
     else if (word == "R")
       options.reference_ohm = read_reference(lines, words);
-    else if (word.size() == 1 && std::string("SYZGH").find(word) != std::string::npos)
-      options.parameters = word.front();
+    else if (const Parameters* parameters = parameters_of(word))
+      options.parameters = parameters;
     else
       lines.fail(
           fmt::format("unknown Touchstone option '{}'. Use HZ, KHZ, MHZ or GHZ, S, Y, Z, G "
@@ -68,53 +100,6 @@ Options read_options(const TextLines& lines, std::string_view line) {
                       word));
   }
   return options;
-}
-
-/// Quantities of outputs and inputs whose ratio has the unit of the parameters.
-struct Quantities {
-  std::vector<std::string> outputs, inputs;  ///< V or A; S: 1
-
-  /// Version 1 divides an impedance by the reference resistance and multiplies an admittance by it.
-  int power_of_ohm(Eigen::Index output, Eigen::Index input) const {
-    const std::string& o = outputs.at(static_cast<std::size_t>(output));
-    const std::string& i = inputs.at(static_cast<std::size_t>(input));
-    return o == i ? 0 : o == "V" ? 1 : -1;
-  }
-};
-
-Quantities quantities_of(const TextLines& lines, char parameters, int ports) {
-  const auto all = [ports](const char* unit) {
-    return std::vector<std::string>(static_cast<std::size_t>(ports), unit);
-  };
-  const bool hybrid = parameters == 'H' || parameters == 'G';
-  if (hybrid && ports != 2)
-    lines.fail(fmt::format(
-        "{} parameters need two ports, the file name declares {}; name a two-port file .s2p",
-        parameters, ports));
-  switch (parameters) {
-    case 'Z':
-      return {all("V"), all("A")};
-    case 'Y':
-      return {all("A"), all("V")};
-    case 'H':
-      return {{"V", "A"}, {"A", "V"}};
-    case 'G':
-      return {{"A", "V"}, {"V", "A"}};
-    default:
-      return {all("1"), all("1")};
-  }
-}
-
-std::string note_of(const Options& options) {
-  static const std::map<char, const char*> kTaken = {
-      {'Z', "multiplied by the reference resistance {} ohm: V/A (ohm)"},
-      {'Y', "divided by the reference resistance {} ohm: A/V (S)"},
-      {'H', "rescaled by the reference resistance {} ohm: h11 in V/A (ohm), h22 in A/V (S)"},
-      {'G', "rescaled by the reference resistance {} ohm: g11 in A/V (S), g22 in V/A (ohm)"}};
-  const auto found = kTaken.find(options.parameters);
-  if (found == kTaken.end()) return {};
-  return fmt::format("{} parameters {}", options.parameters,
-                     fmt::format(fmt::runtime(found->second), options.reference_ohm));
 }
 
 std::complex<double> value_of(double a, double b, Form form) {
@@ -171,16 +156,21 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
       append_numbers(lines, line, numbers);
     }
   }
-  const Quantities quantities = quantities_of(lines, options.parameters, ports);
+  const Parameters& parameters = *options.parameters;
+  if (parameters.two_ports() && ports != 2)
+    lines.fail(fmt::format(
+        "{} parameters need two ports, the file name declares {}; name a two-port file .s2p",
+        parameters.letter, ports));
   const auto n = static_cast<Eigen::Index>(ports);
   const std::size_t step = 1 + 2 * static_cast<std::size_t>(n * n);
   const std::size_t count = lines_of(lines, numbers, step, ports);
   FrfEstimate frf;
-  for (int port = 1; port <= ports; ++port) {
-    frf.inputs.names.push_back(fmt::format("port{}", port));
-    frf.inputs.units.push_back(quantities.inputs.at(static_cast<std::size_t>(port - 1)));
+  for (std::size_t port = 0; port < static_cast<std::size_t>(ports); ++port) {
+    frf.inputs.names.push_back(fmt::format("port{}", port + 1));
+    frf.inputs.units.emplace_back(parameters.input(port));
+    frf.outputs.units.emplace_back(parameters.output(port));
   }
-  frf.outputs = {frf.inputs.names, quantities.outputs};
+  frf.outputs.names = frf.inputs.names;
   frf.frequency_hz.resize(static_cast<Eigen::Index>(count));
   frf.response.resize(n * n, static_cast<Eigen::Index>(count));
   for (std::size_t k = 0; k < count; ++k) {
@@ -190,12 +180,17 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
       const std::size_t at = k * step + 1 + 2 * static_cast<std::size_t>(q);
       // Row by row, except for two ports: 11, 21, 12, 22.
       const Eigen::Index channel = ports == 2 ? q : q / n + n * (q % n);
-      frf.response(channel, line) =
-          value_of(numbers[at], numbers[at + 1], options.form) *
-          std::pow(options.reference_ohm, quantities.power_of_ohm(channel % n, channel / n));
+      const std::string& output = frf.outputs.unit(channel % n);
+      // Version 1 divides an impedance by the reference resistance and multiplies an admittance by it.
+      const int power_of_ohm = output == frf.inputs.unit(channel / n) ? 0 : output == "V" ? 1 : -1;
+      frf.response(channel, line) = value_of(numbers[at], numbers[at + 1], options.form) *
+                                    std::pow(options.reference_ohm, power_of_ohm);
     }
   }
-  return {std::move(frf), note_of(options)};
+  if (parameters.letter == 'S') return {std::move(frf), ""};
+  return {std::move(frf),
+          fmt::format("{} parameters {}", parameters.letter,
+                      fmt::format(fmt::runtime(parameters.note), options.reference_ohm))};
 }
 
 }  // namespace stageid

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/matlab/mat_variable.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -27,13 +28,11 @@ void put(std::string& out, const void* data, std::size_t bytes) {
   if (bytes > 0) out.append(static_cast<const char*>(data), bytes);
 }
 
-void put_word(std::string& out, std::uint32_t word) { put(out, &word, sizeof(word)); }
-
 void put_data(std::string& out, DataType type, const void* data, std::size_t bytes) {
   const bool small = bytes > 0 && bytes <= 4;  // then it is part of the tag
-  put_word(out, static_cast<std::uint32_t>(type) |
-                    (small ? static_cast<std::uint32_t>(bytes) << 16U : 0U));
-  if (!small) put_word(out, static_cast<std::uint32_t>(bytes));
+  append_raw(out, static_cast<std::uint32_t>(type) |
+                      (small ? static_cast<std::uint32_t>(bytes) << 16U : 0U));
+  if (!small) append_raw(out, static_cast<std::uint32_t>(bytes));
   put(out, data, bytes);
   out.append((kAlignment - out.size() % kAlignment) % kAlignment, '\0');
 }
@@ -42,9 +41,9 @@ void put_data(std::string& out, DataType type, const void* data, std::size_t byt
 template <typename Content>
 void put_matrix(std::string& out, const std::string& name, ArrayClass kind, std::uint32_t flags,
                 const std::vector<std::size_t>& shape, Content content) {
-  put_word(out, static_cast<std::uint32_t>(DataType::matrix));
+  append_raw(out, static_cast<std::uint32_t>(DataType::matrix));
   const std::size_t length_at = out.size();
-  put_word(out, 0);
+  append_raw(out, std::uint32_t{0});
   const std::uint32_t head[2] = {static_cast<std::uint32_t>(kind) | flags, 0};
   put_data(out, DataType::uint32, head, sizeof(head));
   const std::vector<std::int32_t> extents(shape.begin(), shape.end());

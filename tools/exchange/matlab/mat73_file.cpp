@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <fstream>
 
@@ -17,10 +18,6 @@ namespace {
 
 constexpr hsize_t kUserBlock = 512;
 constexpr const char* kReferences = "#refs#";
-
-std::vector<hsize_t> reversed_shape(const std::vector<std::size_t>& shape) {
-  return {shape.rbegin(), shape.rend()};
-}
 
 Hdf5Handle complex_type() {
   Hdf5Handle type(H5Tcreate(H5T_COMPOUND, 2 * sizeof(double)), H5Tclose);
@@ -72,11 +69,10 @@ struct Mat73File::State {
   /// An empty array is stored as its shape.
   void put_dataset(hid_t parent, const std::string& name, std::string_view kind,
                    const std::vector<std::size_t>& shape, hid_t type, const void* data) const {
-    bool empty = false;
-    for (const std::size_t extent : shape) empty = empty || extent == 0;
+    const bool empty = std::find(shape.begin(), shape.end(), 0U) != shape.end();
     const std::vector<std::uint64_t> extents(shape.begin(), shape.end());
-    const std::vector<hsize_t> stored =
-        empty ? std::vector<hsize_t>{shape.size()} : reversed_shape(shape);
+    std::vector<hsize_t> stored(shape.rbegin(), shape.rend());
+    if (empty) stored = {shape.size()};
     const Hdf5Handle space =
         made(H5Screate_simple(static_cast<int>(stored.size()), stored.data(), nullptr), H5Sclose);
     const hid_t stored_type = empty ? H5T_NATIVE_UINT64 : type;

@@ -3,10 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
+#include <optional>
 
+#include "acquisition/files/output_file.hpp"
 #include "excitation/words/words.hpp"
-#include "tools/exchange/arrays/named_array.hpp"
+#include "tools/exchange/matlab/mat_variable.hpp"
 
 namespace stageid {
 
@@ -29,9 +30,6 @@ inline constexpr std::array kWords<MatVersion> = {"5", "7.3"};
 class MatWriter {
  public:
   MatWriter(const std::filesystem::path& file, MatVersion version);
-  ~MatWriter();
-  MatWriter(const MatWriter&) = delete;
-  MatWriter& operator=(const MatWriter&) = delete;
 
   /// All fields of a struct must be in one list.
   void add(const ArrayList& list);
@@ -39,8 +37,9 @@ class MatWriter {
   void close();
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  MatVersion version_;
+  OutputFile output_;
+  std::optional<Mat73File> hdf5_;
 };
 
 /// Writes a file in one call.

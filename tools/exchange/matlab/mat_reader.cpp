@@ -1,19 +1,23 @@
 #include <fmt/format.h>
 #include <matio.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
-#include <limits>
 #include <memory>
+#include <new>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_library.hpp"
-#include "tools/exchange/arrays/arrays_in_child.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
-#include "tools/exchange/matlab/mat_objects.hpp"
 #include "tools/terminal/output_paths.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -23,47 +27,162 @@ namespace {
 using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
+/// Text in front of the variables of a version 5 file.
+constexpr std::size_t kHeadBytes = 128;
+/// Structures, cells and objects nested deeper are not followed.
+constexpr int kDeepest = 20;
+
 /// 1 GiB of real numbers: the limit for a full matrix from a sparse one.
 constexpr std::size_t kMostFullNumbers = std::size_t{1} << 27;
 
-template <typename Number>
-void append_numbers(const void* data, std::size_t count, std::vector<double>& out) {
-  for (std::size_t k = 0; k < count; ++k) {
-    Number value;
-    std::memcpy(&value, static_cast<const char*>(data) + k * sizeof(Number), sizeof(Number));
-    out.push_back(static_cast<double>(value));
+// Objects, which libmatio does not report by name --------------------------------------------------
+
+/// Description of a MATLAB object (table, timetable, datetime, string, ...) of this class; "" if unknown.
+UnreadVariable unread_object(const std::string& name, const std::string& object_class) {
+  return {
+      name, fmt::format("MATLAB object{}", object_class.empty() ? "" : " (" + object_class + ")"),
+      fmt::format("Save its contents as arrays in MATLAB, for example x = {0}.COLUMN of a table, "
+                  "or struct({0})",
+                  name.empty() ? "T" : name)};
+}
+
+constexpr std::uint32_t kMatrix = 14, kCompressed = 15;
+constexpr std::uint32_t kOpaqueClass = 17;
+
+std::uint32_t word_at(std::string_view bytes, std::size_t at, bool big_endian) {
+  return raw_number<std::uint32_t>(bytes.data() + at, big_endian);
+}
+
+/// The elements of a variable, up to the first incomplete one.
+class Elements {
+ public:
+  Elements(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
+
+  std::optional<std::string_view> next() {
+    if (at_ + 8 > bytes_.size()) return std::nullopt;
+    const std::uint32_t type = word_at(bytes_, at_, big_endian_);
+    // Up to four bytes of data are in the tag itself, their number in its upper half.
+    const std::size_t small = type >> 16U;
+    const std::size_t size = small > 0 ? small : word_at(bytes_, at_ + 4, big_endian_);
+    const std::size_t start = at_ + (small > 0 ? 4 : 8);
+    if (small > 4 || size > bytes_.size() - start) return std::nullopt;
+    at_ = small > 0 ? at_ + 8 : start + (size + 7) / 8 * 8;
+    return bytes_.substr(start, size);
+  }
+
+ private:
+  std::string_view bytes_;
+  bool big_endian_;
+  std::size_t at_ = 0;
+};
+
+/// The first bytes of a deflated variable, which contain names and classes.
+std::string inflated_begin(std::string_view deflated) {
+  std::array<char, 1024> begin{};
+  z_stream stream = {};
+  if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
+  // zlib does not write to its input; its interface merely lacks const.
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(deflated.data()));
+  stream.avail_in = static_cast<uInt>(deflated.size());
+  stream.next_out = reinterpret_cast<Bytef*>(begin.data());
+  stream.avail_out = static_cast<uInt>(begin.size());
+  inflate(&stream, Z_SYNC_FLUSH);
+  const std::size_t size = begin.size() - stream.avail_out;
+  inflateEnd(&stream);
+  return {begin.data(), size};
+}
+
+std::optional<UnreadVariable> object_of(std::string_view variable, bool big_endian) {
+  if (variable.size() < 8 || word_at(variable, 0, big_endian) != kMatrix) return std::nullopt;
+  Elements elements(variable.substr(8), big_endian);
+  const auto flags = elements.next();
+  if (!flags || flags->size() < 4 || (word_at(*flags, 0, big_endian) & 0xffU) != kOpaqueClass)
+    return std::nullopt;
+  const auto name = elements.next();
+  elements.next();  // the object system: MCOS or java
+  const auto object_class = elements.next();
+  if (!name || !object_class) return std::nullopt;
+  return unread_object(std::string(*name), std::string(*object_class));
+}
+
+bool is_read(const ArrayList& list, const std::string& name) {
+  const auto matches = [&](const auto& item) {
+    return item.name == name || (item.name.size() > name.size() && item.name.starts_with(name) &&
+                                 item.name[name.size()] == '/');
+  };
+  return std::any_of(list.arrays.begin(), list.arrays.end(), matches) ||
+         std::any_of(list.unread.begin(), list.unread.end(), matches);
+}
+
+/// Compares the arrays read from a version 7.3 file with its content; objects and function handles are added to
+/// `list.unread`.
+/// @throws FormatError naming a variable or a field that is in the file and could not be read
+void require_all_of(const Hdf5File& file, const std::string& group, int depth, ArrayList& list) {
+  if (depth > kDeepest) return;
+  for (const std::string& child : file.children(group)) {
+    if (child.starts_with('#')) continue;  // targets of references, and the data of objects
+    const std::string object = fmt::format("{}/{}", group == "/" ? "" : group, child);
+    const std::string name = object.substr(1);
+    const std::string kind = file.has_attribute(object, "MATLAB_class")
+                                 ? file.read_text_attribute(object, "MATLAB_class")
+                                 : "";
+    if (kind == "function_handle") {
+      list.unread.push_back({name, "function handle", "Save its values as an array"});
+    } else if (file.has_attribute(object, "MATLAB_object_decode") && !is_read(list, name)) {
+      list.unread.push_back(unread_object(name, kind));
+    } else if (file.is_group(object) && !file.has_attribute(object, "MATLAB_sparse")) {
+      require_all_of(file, object, depth + 1, list);
+    } else if (!is_read(list, name) && !file.has_attribute(object, "MATLAB_empty") &&
+               !(depth > 0 && is_read(list, group.substr(1) + "/0/" + child))) {
+      throw FormatError(list.file, name,
+                        "its data cannot be read; the file is damaged. Save it again in MATLAB, "
+                        "for example with -v7");
+    }
   }
 }
 
+/// The objects among the variables of a version 5 file.
+/// Source: MAT-File Format (MathWorks), array class 17 (opaque): flags, name, "MCOS", class.
+std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
+  const std::string content = read_whole_file(path);
+  std::vector<UnreadVariable> objects;
+  if (!content.starts_with("MATLAB 5.0") || content.size() < kHeadBytes) return objects;
+  const bool big_endian = content[126] == 'M';
+  std::size_t at = kHeadBytes;
+  while (at + 8 <= content.size()) {
+    const std::uint32_t type = word_at(content, at, big_endian);
+    const std::size_t size = word_at(content, at + 4, big_endian);
+    const std::string_view element =
+        std::string_view(content).substr(at, 8 + std::min(size, content.size() - at - 8));
+    const auto object = type == kCompressed
+                            ? object_of(inflated_begin(element.substr(8)), big_endian)
+                            : object_of(element, big_endian);
+    if (object) objects.push_back(*object);
+    at += element.size();
+  }
+  return objects;
+}
+
+// Variables ---------------------------------------------------------------------------------------
+
+constexpr std::pair<matio_types, NumberType> kNumberTypes[] = {
+    {MAT_T_DOUBLE, kNumberType<double>},       {MAT_T_SINGLE, kNumberType<float>},
+    {MAT_T_INT64, kNumberType<std::int64_t>},  {MAT_T_UINT64, kNumberType<std::uint64_t>},
+    {MAT_T_INT32, kNumberType<std::int32_t>},  {MAT_T_UINT32, kNumberType<std::uint32_t>},
+    {MAT_T_INT16, kNumberType<std::int16_t>},  {MAT_T_UINT16, kNumberType<std::uint16_t>},
+    {MAT_T_UTF16, kNumberType<std::uint16_t>}, {MAT_T_INT8, kNumberType<std::int8_t>},
+    {MAT_T_UINT8, kNumberType<std::uint8_t>},  {MAT_T_UTF8, kNumberType<std::uint8_t>}};
+
 /// False if the type is not numeric.
 bool read_numbers(matio_types type, const void* data, std::size_t count, std::vector<double>& out) {
-  out.reserve(count);
-  switch (type) {
-    case MAT_T_DOUBLE:
-      return append_numbers<double>(data, count, out), true;
-    case MAT_T_SINGLE:
-      return append_numbers<float>(data, count, out), true;
-    case MAT_T_INT64:
-      return append_numbers<std::int64_t>(data, count, out), true;
-    case MAT_T_UINT64:
-      return append_numbers<std::uint64_t>(data, count, out), true;
-    case MAT_T_INT32:
-      return append_numbers<std::int32_t>(data, count, out), true;
-    case MAT_T_UINT32:
-      return append_numbers<std::uint32_t>(data, count, out), true;
-    case MAT_T_INT16:
-      return append_numbers<std::int16_t>(data, count, out), true;
-    case MAT_T_UINT16:
-    case MAT_T_UTF16:
-      return append_numbers<std::uint16_t>(data, count, out), true;
-    case MAT_T_INT8:
-      return append_numbers<std::int8_t>(data, count, out), true;
-    case MAT_T_UINT8:
-    case MAT_T_UTF8:
-      return append_numbers<std::uint8_t>(data, count, out), true;
-    default:
-      return false;
+  for (const auto& [known, number] : kNumberTypes) {
+    if (known != type) continue;
+    out.reserve(count);
+    for (std::size_t k = 0; k < count; ++k)
+      out.push_back(number.read(static_cast<const char*>(data) + k * number.width, false));
+    return true;
   }
+  return false;
 }
 
 class Reader {
@@ -84,7 +203,7 @@ class Reader {
         return read_sparse(variable, name);
       case MAT_C_OBJECT:
       case MAT_C_OPAQUE:
-        return;  // named by objects_of_v5() and require_all_of_v73()
+        return;  // named by objects_of_v5() and require_all_of()
       case MAT_C_FUNCTION:
         list_.unread.push_back({name, "function handle", "Save its values as an array"});
         return;
@@ -166,9 +285,8 @@ class Reader {
       if (count > 0 && (!read_numbers(variable.data_type, parts->Re, count, real) ||
                         !read_numbers(variable.data_type, parts->Im, count, imaginary)))
         return;
-      std::vector<std::complex<double>> values(count);
+      auto& values = stored.values.emplace<1>(count);
       for (std::size_t k = 0; k < count; ++k) values[k] = {real[k], imaginary[k]};
-      stored.values = std::move(values);
     }
     list_.arrays.push_back(reversed(stored));
   }
@@ -193,21 +311,19 @@ class Reader {
          !read_numbers(variable.data_type, complex ? parts->Re : sparse->data, count, real) ||
          (complex && !read_numbers(variable.data_type, parts->Im, count, imaginary))))
       damaged(name);
-    std::vector<std::complex<double>> values(rows * columns);
-    for (std::size_t c = 0; c < columns; ++c)
-      for (std::size_t k = sparse->jc[c]; k < sparse->jc[c + 1]; ++k) {
-        if (k >= count || k >= sparse->nir || sparse->ir[k] >= rows) damaged(name);
-        values[sparse->ir[k] * columns + c] = {real[k], complex ? imaginary[k] : 0.0};
-      }
     NamedArray out{name, {rows, columns}, {}};
-    if (complex) {
-      out.values = std::move(values);
-    } else {
-      std::vector<double> numbers;
-      numbers.reserve(values.size());
-      for (const std::complex<double>& value : values) numbers.push_back(value.real());
-      out.values = std::move(numbers);
-    }
+    const auto place = [&](auto& values, auto value) {
+      for (std::size_t c = 0; c < columns; ++c)
+        for (std::size_t k = sparse->jc[c]; k < sparse->jc[c + 1]; ++k) {
+          if (k >= count || k >= sparse->nir || sparse->ir[k] >= rows) damaged(name);
+          values[sparse->ir[k] * columns + c] = value(k);
+        }
+    };
+    if (complex)
+      place(out.values.emplace<1>(rows * columns),
+            [&](std::size_t k) { return std::complex<double>(real[k], imaginary[k]); });
+    else
+      place(out.values.emplace<0>(rows * columns), [&](std::size_t k) { return real[k]; });
     list_.arrays.push_back(std::move(out));
   }
 
@@ -237,13 +353,10 @@ void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes)
   const bool big_endian = head[126] == 'M';
   std::uintmax_t at = kHeadBytes;
   while (at < file_bytes) {
-    unsigned char tag[8] = {};
+    char tag[8] = {};
     stream.seekg(static_cast<std::streamoff>(at));
-    stream.read(reinterpret_cast<char*>(tag), sizeof(tag));
-    std::uint32_t bytes = 0;
-    for (unsigned k = 0; k < 4; ++k)
-      bytes |= static_cast<std::uint32_t>(tag[4 + k]) << (8 * (big_endian ? 3 - k : k));
-    at += sizeof(tag) + bytes;
+    stream.read(tag, sizeof(tag));
+    at += sizeof(tag) + raw_number<std::uint32_t>(tag + 4, big_endian);
   }
   if (at != file_bytes)
     throw FormatError(path, "", "unexpected end of file; the file is truncated or damaged");
@@ -281,7 +394,7 @@ ArrayList read_here(const std::filesystem::path& path) {
     reader.read(*variable, variable->name, 0);
   }
   if (Mat_GetVersion(file.get()) == MAT_FT_MAT73)
-    require_all_of_v73(list);
+    require_all_of(Hdf5File::open(list.file), "/", 0, list);
   else
     for (UnreadVariable& object : objects_of_v5(path)) list.unread.push_back(std::move(object));
   if (list.arrays.empty() && list.unread.empty())

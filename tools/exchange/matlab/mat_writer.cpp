@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
-#include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 
-#include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
-#include "tools/exchange/matlab/mat_variable.hpp"
 
 namespace stageid {
 namespace {
@@ -96,36 +92,26 @@ NamedArray as_matlab_stores(const NamedArray& array) {
   return stored;
 }
 
-struct MatWriter::State {
-  State(const std::filesystem::path& to, MatVersion wanted) : version(wanted), output(to) {
-    if (version == MatVersion::v5)
-      output.append(head_of(version));
-    else
-      hdf5.emplace(output.path(), to);
-  }
-
-  MatVersion version;
-  OutputFile output;
-  std::optional<Mat73File> hdf5;
-};
-
 MatWriter::MatWriter(const std::filesystem::path& file, MatVersion version)
-    : state_(std::make_unique<State>(file, version)) {}
-
-MatWriter::~MatWriter() = default;
+    : version_(version), output_(file) {
+  if (version == MatVersion::v5)
+    output_.append(head_of(version));
+  else
+    hdf5_.emplace(output_.path(), file);
+}
 
 void MatWriter::add(const ArrayList& list) {
-  if (!state_->hdf5) require_room(list);
+  if (!hdf5_) require_room(list);
   for (const MatVariable& variable : variables_of(list))
-    if (state_->hdf5)
-      state_->hdf5->add(variable);
+    if (hdf5_)
+      hdf5_->add(variable);
     else
-      state_->output.append(mat5_element(variable));
+      output_.append(mat5_element(variable));
 }
 
 void MatWriter::close() {
-  if (state_->hdf5) state_->hdf5->close(head_of(state_->version));
-  state_->output.commit();
+  if (hdf5_) hdf5_->close(head_of(version_));
+  output_.commit();
 }
 
 void write_mat(const std::filesystem::path& file, const ArrayList& list, MatVersion version) {

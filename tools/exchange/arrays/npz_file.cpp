@@ -1,3 +1,5 @@
+#include "tools/exchange/arrays/npz_file.hpp"
+
 #include <fmt/format.h>
 #include <zip.h>
 
@@ -6,17 +8,115 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <system_error>
+#include <utility>
 
 #include "acquisition/files/file_error.hpp"
-#include "tools/exchange/arrays/npz_file.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/terminal/output_paths.hpp"
 #include "tools/terminal/unicode.hpp"
 
-// Sources: as tools/exchange/arrays/npz_writer.cpp. Input is untrusted: every offset is checked.
+// Source: NEP 1 (the .npy format, https://numpy.org/neps/nep-0001-npy-format.html).
 
 namespace stageid {
 namespace {
+
+// Writing -----------------------------------------------------------------------------------------
+
+static_assert(std::endian::native == std::endian::little, ".npy members are written as '<'");
+
+constexpr zip_uint16_t kFirstDay = 0x0021;  // 1980-01-01, the zip format's zero
+
+std::string shape_text(const std::vector<std::size_t>& shape) {
+  std::string text;
+  for (const std::size_t extent : shape) text += fmt::format("{}, ", extent);
+  if (shape.size() > 1) text.resize(text.size() - 2);
+  if (shape.size() == 1) text.resize(text.size() - 1);
+  return "(" + text + ")";
+}
+
+/// Magic, version 1.0, length and a header that ends at a multiple of 64 bytes.
+std::string npy(const std::string& type, const std::vector<std::size_t>& shape,
+                std::string_view data) {
+  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}", type,
+                                   shape_text(shape));
+  header.append(63 - (10 + header.size()) % 64, ' ');
+  header += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  append_raw(bytes, static_cast<std::uint16_t>(header.size()));
+  return bytes.append(header).append(data);
+}
+
+std::string npy_of_texts(const std::vector<std::string>& texts,
+                         const std::vector<std::size_t>& shape) {
+  std::size_t longest = 1;
+  std::vector<std::u32string> all;
+  for (const std::string& text : texts) {
+    all.push_back(code_points_of(text));
+    longest = std::max(longest, all.back().size());
+  }
+  std::string data;
+  for (std::u32string& points : all) {
+    points.resize(longest, U'\0');
+    data.append(reinterpret_cast<const char*>(points.data()), 4 * longest);
+  }
+  return npy(fmt::format("<U{}", longest), shape, data);
+}
+
+std::string npy_of(const NamedArray& array) {
+  if (array.is_text()) return npy_of_texts(std::get<2>(array.values), array.shape);
+  const auto bytes = [](const auto& values) {
+    return std::string_view(reinterpret_cast<const char*>(values.data()),
+                            values.size() * sizeof(values[0]));
+  };
+  if (array.is_complex()) return npy("<c16", array.shape, bytes(std::get<1>(array.values)));
+  return npy("<f8", array.shape, bytes(std::get<0>(array.values)));
+}
+
+/// The bytes of the archive. libzip does not write the file itself: an interrupt would leave its temporary
+/// file behind.
+std::string archive_of(const std::filesystem::path& file, const ArrayList& list) {
+  const std::unique_ptr<zip_source_t, decltype(&zip_source_free)> bytes(
+      zip_source_buffer_create(nullptr, 0, 0, nullptr), &zip_source_free);
+  std::unique_ptr<zip_t, decltype(&zip_discard)> archive(
+      zip_open_from_source(bytes.get(), ZIP_CREATE | ZIP_TRUNCATE, nullptr), &zip_discard);
+  if (archive == nullptr) throw std::bad_alloc();
+  zip_source_keep(bytes.get());  // the archive frees it, too
+  const auto require = [&](bool done) {
+    if (!done)
+      throw FileError(
+          fmt::format("{}: cannot be written: {}", file.string(), zip_strerror(archive.get())));
+  };
+
+  std::vector<std::string> contents;  // zip_close() reads them
+  for (const NamedArray& array : list.arrays) contents.push_back(npy_of(array));
+  for (std::size_t k = 0; k < contents.size(); ++k) {
+    zip_source_t* content =
+        zip_source_buffer(archive.get(), contents[k].data(), contents[k].size(), 0);
+    const zip_int64_t at = zip_file_add(archive.get(), (list.arrays[k].name + ".npy").c_str(),
+                                        content, ZIP_FL_ENC_UTF_8);
+    if (at < 0) zip_source_free(content);
+    require(at >= 0);
+    const auto index = static_cast<zip_uint64_t>(at);
+    require(zip_set_file_compression(archive.get(), index, ZIP_CM_STORE, 0) == 0);
+    require(zip_file_set_dostime(archive.get(), index, 0, kFirstDay, 0) == 0);
+  }
+  require(zip_close(archive.get()) == 0);
+  static_cast<void>(archive.release());
+
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_source_stat(bytes.get(), &stat) != 0 || zip_source_open(bytes.get()) != 0)
+    throw std::bad_alloc();
+  std::string out(stat.size, '\0');
+  zip_source_read(bytes.get(), out.data(), out.size());
+  zip_source_close(bytes.get());
+  return out;
+}
+
+// Reading: the input is untrusted, so every offset is checked ------------------------------------
 
 /// Limit of the compression ratio of a deflated stream.
 constexpr std::size_t kMostInflation = 1032;
@@ -34,9 +134,7 @@ class Bytes {
   }
   template <typename Number>
   Number number(std::size_t at) const {
-    Number value;
-    std::memcpy(&value, piece(at, sizeof(Number)).data(), sizeof(Number));
-    return value;
+    return raw_number<Number>(piece(at, sizeof(Number)).data());
   }
   std::size_t size() const noexcept { return data_.size(); }
 
@@ -166,33 +264,17 @@ Layout layout_of(const Bytes& npy, std::string_view header) {
   return layout;
 }
 
-template <typename Number>
-double element(const char* at, bool big_endian) {
-  char raw[sizeof(Number)];
-  std::memcpy(raw, at, sizeof(raw));
-  if (big_endian) std::reverse(raw, raw + sizeof(raw));
-  Number value;
-  std::memcpy(&value, raw, sizeof(raw));
-  return static_cast<double>(value);
-}
+constexpr std::pair<char, NumberType> kNumberTypes[] = {
+    {'f', kNumberType<double>},        {'f', kNumberType<float>},
+    {'i', kNumberType<std::int64_t>},  {'i', kNumberType<std::int32_t>},
+    {'i', kNumberType<std::int16_t>},  {'i', kNumberType<std::int8_t>},
+    {'u', kNumberType<std::uint64_t>}, {'u', kNumberType<std::uint32_t>},
+    {'u', kNumberType<std::uint16_t>}, {'u', kNumberType<std::uint8_t>}};
 
-using ElementReader = double (*)(const char*, bool);
-
-/// Null if the type is unknown.
-ElementReader reader_of(char kind, std::size_t width) {
-  if (kind == 'f') return width == 8 ? element<double> : width == 4 ? element<float> : nullptr;
-  if (kind == 'i')
-    return width == 8   ? element<std::int64_t>
-           : width == 4 ? element<std::int32_t>
-           : width == 2 ? element<std::int16_t>
-           : width == 1 ? element<std::int8_t>
-                        : nullptr;
-  if (kind == 'u' || kind == 'b')
-    return width == 8   ? element<std::uint64_t>
-           : width == 4 ? element<std::uint32_t>
-           : width == 2 ? element<std::uint16_t>
-           : width == 1 ? element<std::uint8_t>
-                        : nullptr;
+/// @param width in bytes   @returns null if the type is unknown
+const NumberType* number_type(char kind, std::size_t width) {
+  for (const auto& [known, type] : kNumberTypes)
+    if (known == kind && type.width == width) return &type;
   return nullptr;
 }
 
@@ -208,7 +290,7 @@ std::vector<std::string> texts_of(const Bytes& npy, const Layout& layout, std::s
     }
     std::u32string points;
     for (std::size_t c = 0; c < layout.width; ++c)
-      points += static_cast<char32_t>(element<std::uint32_t>(at + 4 * c, layout.big_endian));
+      points += raw_number<char32_t>(at + 4 * c, layout.big_endian);
     texts.push_back(utf8_of(points.substr(0, points.find(U'\0'))));
   }
   return texts;
@@ -228,30 +310,31 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
   if (layout.kind == 'U' || layout.kind == 'S') {
     array.values = texts_of(npy, layout, data);
   } else {
-    const bool complex = layout.kind == 'c';
-    const std::size_t width = complex ? layout.width / 2 : layout.width;
-    const ElementReader read = reader_of(complex ? 'f' : layout.kind, width);
-    if (read == nullptr)
+    const std::size_t parts = layout.kind == 'c' ? 2 : 1;
+    const char kind = layout.kind == 'c' ? 'f' : layout.kind == 'b' ? 'u' : layout.kind;
+    const NumberType* type = number_type(kind, layout.width / parts);
+    if (type == nullptr)
       npy.fail(fmt::format("unsupported number type '{}{}'; save float64, complex128 or integers",
                            layout.kind, layout.width));
-    const std::size_t parts = complex ? 2 : 1;
-    if (layout.count > data.size() / (parts * width)) npy.fail("its data are truncated");
-    std::vector<double> numbers(parts * layout.count);
-    for (std::size_t k = 0; k < numbers.size(); ++k)
-      numbers[k] = read(data.data() + k * width, layout.big_endian);
-    if (complex) {
-      std::vector<std::complex<double>> values(layout.count);
-      for (std::size_t k = 0; k < values.size(); ++k)
-        values[k] = {numbers[2 * k], numbers[2 * k + 1]};
-      array.values = std::move(values);
-    } else {
-      array.values = std::move(numbers);
-    }
+    if (layout.count > data.size() / (parts * type->width)) npy.fail("its data are truncated");
+    const auto read = [&](double* to) {
+      for (std::size_t k = 0; k < parts * layout.count; ++k)
+        to[k] = type->read(data.data() + k * type->width, layout.big_endian);
+    };
+    if (parts == 2)
+      read(reinterpret_cast<double*>(
+          array.values.emplace<1>(layout.count).data()));  // real and imaginary parts in turn
+    else
+      read(array.values.emplace<0>(layout.count).data());
   }
   return layout.column_major ? reversed(array) : array;
 }
 
 }  // namespace
+
+void write_npz(const std::filesystem::path& path, const ArrayList& list) {
+  write_text_file(path, archive_of(path, list));
+}
 
 ArrayList read_npz(const std::filesystem::path& file) {
   require_readable(file);
