@@ -137,11 +137,11 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
 void require_keys(ConfigVisitor& v, const ImportMap& map) {
   if (map.kind == ImportMap::Kind::log) {
     v.require(map.period_samples > 0, "kind", "a log needs period_samples; add the key");
-    v.require(!map.excitation.arrays.empty(), "kind",
-              "a log needs excitation: {arrays: [...]}; add it");
-    v.require(!map.actuators.arrays.empty(), "kind",
-              "a log needs actuators: {arrays: [...]}; add it");
-    v.require(!map.sensors.arrays.empty(), "kind", "a log needs sensors: {arrays: [...]}; add it");
+    for (const auto& [key, group] :
+         {std::pair{"excitation", &map.excitation}, std::pair{"actuators", &map.actuators},
+          std::pair{"sensors", &map.sensors}})
+      v.require(!group->arrays.empty(), "kind",
+                fmt::format("a log needs {}: {{arrays: [...]}}; add it", key));
     return;
   }
   const bool even = !map.first_hz.empty() || !map.step_hz.empty();
@@ -174,9 +174,8 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
   if (units.empty()) units = {"1"};
   if (units.size() == 1) units.resize(count, units.front());
   if (units.size() != count)
-    throw FormatError(map.file, "",
-                      fmt::format("{}: got {} for {}; write one, or one per channel", key,
-                                  counted(units.size(), "unit"), counted(count, "channel")));
+    refuse_map(map, fmt::format("{}: got {} for {}; write one, or one per channel", key,
+                                counted(units.size(), "unit"), counted(count, "channel")));
   return units;
 }
 

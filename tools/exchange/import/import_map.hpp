@@ -68,6 +68,8 @@ struct ImportMap {
   Signals excitation, actuators, sensors;
   ExcitationPeriod excitation_period = ExcitationPeriod::repeats;
   std::vector<Run> runs;
+
+  std::vector<const Signals*> groups() const { return {&excitation, &actuators, &sensors}; }
 };
 template <>
 inline constexpr std::array kWords<ImportMap::Kind> = {"frf", "log"};

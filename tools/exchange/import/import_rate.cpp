@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <optional>
+#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -34,23 +35,12 @@ std::string plain_name(const std::string& name) {
 }
 
 std::optional<double> rate_of_scalar(const std::string& name, double value) {
-  static const std::set<std::string> kRates = {"samplerate",
-                                               "sampleratehz",
-                                               "samplingrate",
-                                               "samplingratehz",
-                                               "samplefrequency",
-                                               "samplefrequencyhz",
-                                               "samplingfrequency",
-                                               "samplingfrequencyhz",
-                                               "fs",
-                                               "fshz",
-                                               "fsample"};
-  static const std::set<std::string> kSteps = {
-      "dt",           "dts",         "ts",           "tsample",       "sampletime",
-      "samplingtime", "sampletimes", "sampleperiod", "sampleperiods", "wfincrement"};
+  static const std::regex kRate("sampl(e|ing)(rate|frequency)(hz)?|fs(hz)?|fsample");
+  static const std::regex kStep(
+      "dts?|ts|tsample|sampletimes?|samplingtime|sampleperiods?|wfincrement");
   if (!(value > 0.0)) return std::nullopt;
-  if (kRates.contains(name)) return value;
-  if (kSteps.contains(name)) return 1.0 / value;
+  if (std::regex_match(name, kRate)) return value;
+  if (std::regex_match(name, kStep)) return 1.0 / value;
   return std::nullopt;
 }
 
@@ -72,7 +62,7 @@ std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
 std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
   static const std::set<std::string> kAxes = {"t", "ts", "time", "times", "timeaxis"};
   std::set<std::string> abscissas;
-  for (const ImportMap::Signals* group : {&map.excitation, &map.actuators, &map.sensors})
+  for (const ImportMap::Signals* group : map.groups())
     for (const std::string& name : group->arrays) abscissas.insert(name + "@abscissa");
   std::vector<FileRate> rates;
   for (const NamedArray& array : arrays.arrays) {
@@ -110,25 +100,22 @@ double sample_rate_of(const ArrayList& arrays, const ImportMap& map) {
           return agree(rate.hz, map.sample_rate_hz);
         });
     if (confirmed) return map.sample_rate_hz;
-    throw FormatError(
-        map.file, "",
-        fmt::format("sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "
-                    "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
-                    map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz),
-                    rates.front().told_by, arrays.file.string()));
+    refuse_map(
+        map, fmt::format("sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "
+                         "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
+                         map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz),
+                         rates.front().told_by, arrays.file.string()));
   }
   if (rates.empty())
-    throw FormatError(
-        map.file, "",
-        fmt::format("a log needs sample_rate_hz, which {} does not contain; add the key",
-                    arrays.file.string()));
+    refuse_map(map,
+               fmt::format("a log needs sample_rate_hz, which {} does not contain; add the key",
+                           arrays.file.string()));
   for (const FileRate& rate : rates)
     if (!agree(rate.hz, rates.front().hz))
-      throw FormatError(map.file, "",
-                        fmt::format("a log needs sample_rate_hz: '{}' of {} is {:.6g} Hz, but '{}' "
-                                    "is {:.6g} Hz; add the key",
-                                    rates.front().told_by, arrays.file.string(), rates.front().hz,
-                                    rate.told_by, rate.hz));
+      refuse_map(map, fmt::format("a log needs sample_rate_hz: '{}' of {} is {:.6g} Hz, but '{}' "
+                                  "is {:.6g} Hz; add the key",
+                                  rates.front().told_by, arrays.file.string(), rates.front().hz,
+                                  rate.told_by, rate.hz));
   return snapped(rates.front().hz);
 }
 

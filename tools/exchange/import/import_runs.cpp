@@ -22,37 +22,15 @@ std::int64_t rank_of(long long number, const std::vector<RunNumbers>& all, Numbe
   return std::distance(numbers.begin(), numbers.find(number));
 }
 
-/// The source of the realization or experiment number of a run.
-class Source {
- public:
-  Source(const ImportMap& map, const char* what) : map_(map), what_(what) {}
-
-  void take(const char* from, std::int64_t value) {
-    if (from_ != nullptr)
-      throw FormatError(map_.file, "",
-                        fmt::format("the {} of a run is given by {} and by {}; keep one of them",
-                                    what_, from_, from));
-    from_ = from;
-    value_ = value;
-  }
-  std::int64_t value() const noexcept { return value_; }
-
- private:
-  const ImportMap& map_;
-  const char* what_;
-  const char* from_ = nullptr;
-  std::int64_t value_ = 0;
-};
-
 std::vector<ImportMap::Run> entries_of(const ImportMap& map, const RunAxes& axes) {
-  if (!axes.has_runs) return map.runs.empty() ? std::vector<ImportMap::Run>(1) : map.runs;
+  if (!axes.contains("run")) return map.runs.empty() ? std::vector<ImportMap::Run>(1) : map.runs;
   std::vector<ImportMap::Run> entries = map.runs;
-  for (Eigen::Index r = 0; r < axes.runs && map.runs.empty(); ++r)
-    entries.push_back({.realization = r});
-  if (static_cast<Eigen::Index>(entries.size()) != axes.runs)
-    throw FormatError(map.file, "",
-                      fmt::format("runs: {}; axis run has {}. Give one entry per run",
-                                  counted(entries.size(), "entry", "entries"), axes.runs));
+  const std::size_t runs = axes.at("run");
+  for (std::size_t r = 0; r < runs && map.runs.empty(); ++r)
+    entries.push_back({.realization = static_cast<std::int64_t>(r)});
+  if (entries.size() != runs)
+    refuse_map(map, fmt::format("runs: {}; axis run has {}. Give one entry per run",
+                                counted(entries.size(), "entry", "entries"), runs));
   return entries;
 }
 
@@ -80,38 +58,36 @@ std::vector<ForeignFile> foreign_files(const std::filesystem::path& file, const 
 std::vector<ImportedRun> runs_of(const ArrayList& arrays, const ImportMap& map,
                                  const std::vector<ForeignFile>& files, const ForeignFile& file) {
   const RunAxes axes = run_axes_of(arrays, map);
+  const auto extent = [&axes](const char* axis) { return axes.contains(axis) ? axes.at(axis) : 1; };
   const std::vector<RunNumbers> names = name_numbers_of(arrays, map);
   std::vector<RunNumbers> file_numbers;
   for (const ForeignFile& other : files) file_numbers.push_back(other.numbers);
   const std::vector<ImportMap::Run> entries = entries_of(map, axes);
   std::vector<ImportedRun> runs;
   for (const RunNumbers& name : names)
-    for (Eigen::Index m = 0; m < axes.realizations; ++m)
-      for (Eigen::Index e = 0; e < axes.experiments; ++e)
+    for (std::size_t m = 0; m < extent("realization"); ++m)
+      for (std::size_t e = 0; e < extent("experiment"); ++e)
         for (std::size_t r = 0; r < entries.size(); ++r) {
-          Source realization(map, "realization"), experiment(map, "experiment");
-          if (file.numbers.realization)
-            realization.take(
-                "the name of its file",
-                rank_of(*file.numbers.realization, file_numbers, &RunNumbers::realization));
-          if (file.numbers.experiment)
-            experiment.take("the name of its file", rank_of(*file.numbers.experiment, file_numbers,
-                                                            &RunNumbers::experiment));
-          if (name.realization)
-            realization.take("the names of the arrays",
-                             rank_of(*name.realization, names, &RunNumbers::realization));
-          if (name.experiment)
-            experiment.take("the names of the arrays",
-                            rank_of(*name.experiment, names, &RunNumbers::experiment));
-          if (axes.has_realizations) realization.take("axis realization", m);
-          if (axes.has_experiments) experiment.take("axis experiment", e);
-          const bool listed = axes.has_runs || !map.runs.empty();
-          const ImportMap::Run& entry = entries[r];
-          if (listed && entry.realization != 0) realization.take("runs", entry.realization);
-          if (listed && entry.experiment != 0) experiment.take("runs", entry.experiment);
-          ImportedRun run{{name, m, e, static_cast<Eigen::Index>(r)}, entry};
-          run.run.realization = realization.value();
-          run.run.experiment = experiment.value();
+          ImportedRun run{{name, {{"realization", m}, {"experiment", e}, {"run", r}}}, entries[r]};
+          const auto number_of = [&](const std::string& what, Number which, std::size_t along_axis,
+                                     std::int64_t listed) {
+            std::vector<std::pair<std::string, std::int64_t>> sources;
+            if (const auto number = file.numbers.*which)
+              sources.emplace_back("the name of its file", rank_of(*number, file_numbers, which));
+            if (const auto number = name.*which)
+              sources.emplace_back("the names of the arrays", rank_of(*number, names, which));
+            if (axes.contains(what)) sources.emplace_back("axis " + what, along_axis);
+            if (listed != 0) sources.emplace_back("runs", listed);
+            if (sources.size() > 1)
+              refuse_map(map,
+                         fmt::format("the {} of a run is given by {} and by {}; keep one of them",
+                                     what, sources[0].first, sources[1].first));
+            return sources.empty() ? 0 : sources[0].second;
+          };
+          run.run.realization =
+              number_of("realization", &RunNumbers::realization, m, entries[r].realization);
+          run.run.experiment =
+              number_of("experiment", &RunNumbers::experiment, e, entries[r].experiment);
           runs.push_back(run);
         }
   return runs;

@@ -14,10 +14,6 @@
 namespace stageid {
 namespace {
 
-std::vector<const ImportMap::Signals*> groups_of(const ImportMap& map) {
-  return {&map.excitation, &map.actuators, &map.sensors};
-}
-
 std::vector<std::string> names_in(const ArrayList& arrays) {
   std::vector<std::string> names;
   for (const NamedArray& array : arrays.arrays) names.push_back(array.name);
@@ -62,16 +58,11 @@ struct Axis {
   std::size_t extent = 1, step = 0;
 };
 
-bool is_vector(const NamedArray& array) {
-  return std::count_if(array.shape.begin(), array.shape.end(),
-                       [](std::size_t extent) { return extent != 1; }) <= 1;
-}
-
 /// The axes of `array` in the order of the map's `axes`.
 std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
                           const std::vector<std::string>& names) {
   std::vector<std::size_t> shape = array.shape;
-  if (names.size() == 1 && is_vector(array)) shape = {array.size()};
+  if (names.size() == 1 && array.is_vector()) shape = {array.size()};
   while (shape.size() < names.size()) shape.push_back(1);  // MATLAB drops trailing ones
   while (shape.size() > names.size() && shape.back() == 1) shape.pop_back();
   if (shape.size() != names.size())
@@ -110,13 +101,12 @@ SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
   Axis sample, channel;
   std::size_t first = 0;
   for (std::size_t q = 0; q < names.size(); ++q) {
-    if (names[q] == "sample") sample = axes[q];
-    if (names[q] == "channel") channel = axes[q];
-    if (names[q] == "realization")
-      first += axes[q].step * static_cast<std::size_t>(place.realization);
-    if (names[q] == "experiment")
-      first += axes[q].step * static_cast<std::size_t>(place.experiment);
-    if (names[q] == "run") first += axes[q].step * static_cast<std::size_t>(place.run);
+    if (names[q] == "sample")
+      sample = axes[q];
+    else if (names[q] == "channel")
+      channel = axes[q];
+    else
+      first += axes[q].step * place.indices.at(names[q]);
   }
   if (values.empty()) throw FormatError(arrays.file, array.name, "is empty; expected samples");
   SampleRows out(sample.extent, channel.extent);
@@ -155,18 +145,7 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
 
 RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
   RunAxes out;
-  const auto take = [&](const NamedArray& array, const std::string& name, std::size_t extent,
-                        bool& has, Eigen::Index& count) {
-    const auto size = static_cast<Eigen::Index>(extent);
-    if (has && size != count)
-      throw FormatError(
-          arrays.file, array.name,
-          fmt::format("has {} along axis {}; another array has {}. The numbers must be equal", size,
-                      name, count));
-    has = true;
-    count = size;
-  };
-  for (const ImportMap::Signals* group : groups_of(map))
+  for (const ImportMap::Signals* group : map.groups())
     for (const std::string& name : group->arrays) {
       if (group->axes.empty()) break;
       const RunNumbers first = name_numbers_of(arrays, map).front();
@@ -174,11 +153,13 @@ RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
       const std::vector<Axis> axes = axes_of(arrays, array, group->axes);
       for (std::size_t q = 0; q < axes.size(); ++q) {
         const std::string& axis = group->axes[q];
-        if (axis == "realization")
-          take(array, axis, axes[q].extent, out.has_realizations, out.realizations);
-        if (axis == "experiment")
-          take(array, axis, axes[q].extent, out.has_experiments, out.experiments);
-        if (axis == "run") take(array, axis, axes[q].extent, out.has_runs, out.runs);
+        if (axis == "sample" || axis == "channel") continue;
+        const std::size_t known = out.emplace(axis, axes[q].extent).first->second;
+        if (known != axes[q].extent)
+          throw FormatError(
+              arrays.file, array.name,
+              fmt::format("has {} along axis {}; another array has {}. The numbers must be equal",
+                          axes[q].extent, axis, known));
       }
     }
   return out;

@@ -1,7 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,16 +15,13 @@ namespace stageid {
 
 using SampleRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// The axes realization, experiment and run with an extent or an index from 0.
+using RunAxes = std::map<std::string, std::size_t>;
+
 /// Location of a run in a file: numbers in the names of arrays, and indices along their axes.
 struct RunPlace {
   RunNumbers names;
-  Eigen::Index realization = 0, experiment = 0, run = 0;  ///< along the corresponding axis, from 0
-};
-
-/// Extents of the axes of a map's arrays; 1 if there is no such axis.
-struct RunAxes {
-  Eigen::Index realizations = 1, experiments = 1, runs = 1;
-  bool has_realizations = false, has_experiments = false, has_runs = false;
+  RunAxes indices;  ///< of all three axes
 };
 
 /// A group of channels with all its samples of one run, in SI units.
@@ -32,7 +30,7 @@ struct SignalGroup {
   SampleRows samples;
 };
 
-/// The extents of the axes of all groups' arrays; they must agree.
+/// The extents of the axes that the groups' arrays have; they must agree.
 /// @throws FormatError
 RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map);
 

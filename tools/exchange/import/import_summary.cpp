@@ -14,27 +14,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// "400", "8 to 12".
-template <typename Number>
-std::string range_text(const std::vector<Number>& values) {
+std::string range_text(const std::vector<std::uint64_t>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   return *low == *high ? fmt::format("{}", *low) : fmt::format("{} to {}", *low, *high);
-}
-
-Json channels_json(const ChannelList& channels, const Eigen::VectorXd& rms) {
-  Json list = Json::array();
-  for (std::size_t c = 0; c < channels.size(); ++c)
-    list.push_back({{"name", channels.names[c]},
-                    {"unit", channels.units[c]},
-                    {"rms", rms[static_cast<Eigen::Index>(c)]}});
-  return list;
-}
-
-std::string rms_line(const char* group, const ChannelList& channels, const Eigen::VectorXd& rms) {
-  std::vector<std::string> parts;
-  for (std::size_t c = 0; c < channels.size(); ++c)
-    parts.push_back(fmt::format("{} {:.4g} {}", channels.names[c],
-                                rms[static_cast<Eigen::Index>(c)], channels.units[c]));
-  return fmt::format("rms of {}: {}", group, fmt::join(parts, ", "));
 }
 
 /// Dimensionless channels have the unit in their name: "y1 [m], y2 [rad]".
@@ -52,8 +34,6 @@ void LogSummary::Power::add(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
   squares += columns.colwise().squaredNorm().transpose();
   samples += static_cast<double>(columns.rows());
 }
-
-Eigen::VectorXd LogSummary::Power::rms() const { return (squares / samples).cwiseSqrt(); }
 
 void LogSummary::add(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& period,
                      const Eigen::Ref<const Eigen::MatrixXd>& actuators,
@@ -102,9 +82,6 @@ ImportSummary LogSummary::summary(const LogInfo& info,
                                                   : fmt::format("{}", fmt::join(names, ", "))));
     excited.push_back({{"experiment", e + 1}, {"excites", names}});
   }
-  out.lines.push_back(rms_line("excitation", info.excitation, excitation_.rms()));
-  out.lines.push_back(rms_line("actuators", info.actuators, actuators_.rms()));
-  out.lines.push_back(rms_line("sensors", info.sensors, sensors_.rms()));
   out.json = {{"kind", "log"},
               {"runs", runs_.size()},
               {"realizations", realizations.size()},
@@ -114,11 +91,22 @@ ImportSummary LogSummary::summary(const LogInfo& info,
               {"period_samples", info.period_samples},
               {"sample_rate_hz", info.sample_rate_hz},
               {"duration_s", duration_s},
-              {"excited", excited},
-              {"excitation", channels_json(info.excitation, excitation_.rms())},
-              {"actuators", channels_json(info.actuators, actuators_.rms())},
-              {"sensors", channels_json(info.sensors, sensors_.rms())},
-              {"notes", notes}};
+              {"excited", excited}};
+  const auto add_rms = [&out](const char* group, const ChannelList& channels, const Power& power) {
+    const Eigen::VectorXd rms = (power.squares / power.samples).cwiseSqrt();
+    std::vector<std::string> parts;
+    Json& list = out.json[group] = Json::array();
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      const double value = rms[static_cast<Eigen::Index>(c)];
+      parts.push_back(fmt::format("{} {:.4g} {}", channels.names[c], value, channels.units[c]));
+      list.push_back({{"name", channels.names[c]}, {"unit", channels.units[c]}, {"rms", value}});
+    }
+    out.lines.push_back(fmt::format("rms of {}: {}", group, fmt::join(parts, ", ")));
+  };
+  add_rms("excitation", info.excitation, excitation_);
+  add_rms("actuators", info.actuators, actuators_);
+  add_rms("sensors", info.sensors, sensors_);
+  out.json["notes"] = notes;
   return out;
 }
 

@@ -33,7 +33,6 @@ class LogSummary {
     Eigen::VectorXd squares;  ///< per channel
     double samples = 0.0;
     void add(const Eigen::Ref<const Eigen::MatrixXd>& columns);
-    Eigen::VectorXd rms() const;
   };
   std::set<std::pair<int, int>> runs_;  ///< realization, experiment
   /// per experiment: channels with nonzero excitation

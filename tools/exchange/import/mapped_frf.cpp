@@ -17,13 +17,6 @@ namespace {
 
 using Complex = std::vector<std::complex<double>>;
 
-std::vector<std::size_t> without_ones(const std::vector<std::size_t>& shape) {
-  std::vector<std::size_t> kept;
-  std::copy_if(shape.begin(), shape.end(), std::back_inserter(kept),
-               [](std::size_t extent) { return extent != 1; });
-  return kept;
-}
-
 /// Axes of the array for line, output and input, in this order.
 std::vector<std::size_t> axis_places(const ImportMap& map) {
   std::vector<std::size_t> places;
@@ -42,7 +35,7 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
                     std::size_t lines) {
   NamedArray result = array;
   if (map.axes.empty()) {
-    if (without_ones(array.shape).size() > 1 || array.size() != lines)
+    if (!array.is_vector() || array.size() != lines)
       refuse_map(map,
                  fmt::format("key 'axes' is missing; '{}' has the shape {} with {} frequencies, "
                              "write for example axes: [output, input, line]",

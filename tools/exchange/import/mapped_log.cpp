@@ -15,7 +15,7 @@
 #include "acquisition/formats/convert_log.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "tools/exchange/import/array_formats.hpp"
+#include "tools/exchange/import/foreign_formats.hpp"
 #include "tools/exchange/import/import_period.hpp"
 #include "tools/exchange/import/import_rate.hpp"
 
@@ -103,10 +103,11 @@ class LogImport {
 
   /// A realization that lacks one of its experiments is unusable, so report a missing run here.
   void require_full() {
-    std::set<std::int64_t> experiments;
-    for (const auto& [realization, experiment] : runs_) experiments.insert(experiment);
-    std::set<std::int64_t> realizations;
-    for (const auto& [realization, experiment] : runs_) realizations.insert(realization);
+    std::set<std::int64_t> realizations, experiments;
+    for (const auto& [realization, experiment] : runs_) {
+      realizations.insert(realization);
+      experiments.insert(experiment);
+    }
     std::vector<std::string> missing;
     for (const std::int64_t m : realizations)
       for (const std::int64_t e : experiments)

@@ -6,13 +6,15 @@
 #include <charconv>
 #include <regex>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace stageid {
 namespace {
 
-constexpr const char* kRealization = "{realization}";
-constexpr const char* kExperiment = "{experiment}";
+constexpr std::string_view kRealization = "{realization}";
+constexpr std::string_view kExperiment = "{experiment}";
 
 struct Expression {
   std::regex regex;
@@ -22,21 +24,21 @@ struct Expression {
 Expression expression_of(const std::string& pattern) {
   std::string text;
   Expression out;
-  for (std::size_t at = 0; at < pattern.size();) {
-    const bool realization =
-        pattern.compare(at, std::string(kRealization).size(), kRealization) == 0;
-    const bool experiment = pattern.compare(at, std::string(kExperiment).size(), kExperiment) == 0;
-    if (realization || experiment) {
+  for (std::string_view rest = pattern; !rest.empty();) {
+    const bool realization = rest.starts_with(kRealization);
+    if (realization || rest.starts_with(kExperiment)) {
+      const std::string_view key = realization ? kRealization : kExperiment;
       if (std::count(out.is_realization.begin(), out.is_realization.end(), realization) > 0)
-        throw std::invalid_argument(fmt::format("'{}' contains {} twice; keep one", pattern,
-                                                realization ? kRealization : kExperiment));
+        throw std::invalid_argument(fmt::format("'{}' contains {} twice; keep one", pattern, key));
       out.is_realization.push_back(realization);
       text += "([0-9]{1,18})";
-      at += std::string(realization ? kRealization : kExperiment).size();
+      rest.remove_prefix(key.size());
       continue;
     }
-    if (std::string(".^$|()[]{}*+?\\").find(pattern[at]) != std::string::npos) text += '\\';
-    text += pattern[at++];
+    if (std::string_view(".^$|()[]{}*+?\\").find(rest.front()) != std::string_view::npos)
+      text += '\\';
+    text += rest.front();
+    rest.remove_prefix(1);
   }
   out.regex = std::regex(text);
   return out;
@@ -53,29 +55,6 @@ std::optional<RunNumbers> match(const Expression& expression, const std::string&
     (expression.is_realization[k] ? numbers.realization : numbers.experiment) = value;
   }
   return numbers;
-}
-
-void collect(const std::filesystem::path& folder, std::vector<std::string> components,
-             std::vector<std::string>& found) {
-  if (components.empty()) {
-    found.push_back(folder.string());
-    return;
-  }
-  const std::string component = components.front();
-  components.erase(components.begin());
-  if (!is_pattern(component)) {
-    const std::filesystem::path next = folder / component;
-    std::error_code error;
-    if (std::filesystem::exists(next, error)) collect(next, components, found);
-    return;
-  }
-  const Expression expression = expression_of(component);
-  std::error_code error;
-  const std::filesystem::path listed = folder.empty() ? std::filesystem::path(".") : folder;
-  for (const auto& entry : std::filesystem::directory_iterator(listed, error)) {
-    const std::string name = entry.path().filename().string();
-    if (match(expression, name)) collect(folder / name, components, found);
-  }
 }
 
 }  // namespace
@@ -101,15 +80,25 @@ std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
   return out;
 }
 
-std::map<RunNumbers, std::filesystem::path> files_of(const std::filesystem::path& pattern) {
-  std::vector<std::string> components;
-  for (const auto& component : pattern.relative_path()) components.push_back(component.string());
-  std::vector<std::string> found;
-  collect(pattern.root_path(), components, found);
-  std::map<RunNumbers, std::filesystem::path> out;
-  for (const auto& [numbers, file] : matches_of(pattern.string(), found))
-    out.emplace(numbers, file);
-  return out;
+std::map<RunNumbers, std::string> files_of(const std::filesystem::path& pattern) {
+  std::vector<std::filesystem::path> found = {pattern.root_path()};
+  for (const std::filesystem::path& component : pattern.relative_path()) {
+    std::vector<std::filesystem::path> next;
+    std::error_code error;
+    for (const std::filesystem::path& folder : found) {
+      if (!is_pattern(component.string())) {
+        if (std::filesystem::exists(folder / component, error)) next.push_back(folder / component);
+        continue;
+      }
+      const Expression expression = expression_of(component.string());
+      for (const auto& entry :
+           std::filesystem::directory_iterator(folder.empty() ? "." : folder, error))
+        if (match(expression, entry.path().filename().string()))
+          next.push_back(folder / entry.path().filename());
+    }
+    found = std::move(next);
+  }
+  return matches_of(pattern.string(), {found.begin(), found.end()});
 }
 
 }  // namespace stageid

@@ -23,6 +23,6 @@ std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
                                              const std::vector<std::string>& texts);
 
 /// The same for files; folders may contain placeholders too.
-std::map<RunNumbers, std::filesystem::path> files_of(const std::filesystem::path& pattern);
+std::map<RunNumbers, std::string> files_of(const std::filesystem::path& pattern);
 
 }  // namespace stageid

@@ -16,43 +16,34 @@ namespace {
 struct KnownUnit {
   std::string_view text;
   std::string_view si;
-  double factor;
-  bool takes_prefix;
+  double factor = 1.0;
+  bool takes_prefix = true;
 };
 
-constexpr KnownUnit kUnits[] = {{"1", "1", 1.0, false},
-                                {"m", "m", 1.0, true},
-                                {"s", "s", 1.0, true},
-                                {"A", "A", 1.0, true},
-                                {"K", "K", 1.0, true},
-                                {"kg", "kg", 1.0, false},
-                                {"rad", "rad", 1.0, true},
-                                {"Hz", "Hz", 1.0, true},
-                                {"N", "N", 1.0, true},
-                                {"Nm", "Nm", 1.0, true},
-                                {"Pa", "Pa", 1.0, true},
-                                {"J", "J", 1.0, true},
-                                {"W", "W", 1.0, true},
-                                {"C", "C", 1.0, true},
-                                {"V", "V", 1.0, true},
-                                {"F", "F", 1.0, true},
-                                {"T", "T", 1.0, true},
-                                {"H", "H", 1.0, true},
-                                {"Wb", "Wb", 1.0, true},
-                                {"ohm", "ohm", 1.0, true},
-                                {"Ohm", "ohm", 1.0, true},
-                                {"\u03a9", "ohm", 1.0, true},
-                                {"S", "S", 1.0, true},
-                                {"%", "1", 0.01, false},
-                                {"deg", "rad", std::numbers::pi / 180.0, false},
-                                {"\u00b0", "rad", std::numbers::pi / 180.0, false},
-                                {"arcsec", "rad", std::numbers::pi / 648000.0, false},
-                                {"min", "s", 60.0, false},
-                                {"in", "m", 0.0254, false},
-                                {"inch", "m", 0.0254, false},
-                                {"ft", "m", 0.3048, false},
-                                {"lbf", "N", 4.4482216152605, false},
-                                {"bar", "Pa", 1e5, true}};
+constexpr std::string_view kSiUnits[] = {"m", "s", "A", "K", "rad", "Hz", "N",  "Nm",  "Pa", "J",
+                                         "W", "C", "V", "F", "T",   "H",  "Wb", "ohm", "S"};
+constexpr KnownUnit kOtherUnits[] = {{"1", "1", 1.0, false},
+                                     {"kg", "kg", 1.0, false},
+                                     {"Ohm", "ohm"},
+                                     {"\u03a9", "ohm"},
+                                     {"%", "1", 0.01, false},
+                                     {"deg", "rad", std::numbers::pi / 180.0, false},
+                                     {"\u00b0", "rad", std::numbers::pi / 180.0, false},
+                                     {"arcsec", "rad", std::numbers::pi / 648000.0, false},
+                                     {"min", "s", 60.0, false},
+                                     {"in", "m", 0.0254, false},
+                                     {"inch", "m", 0.0254, false},
+                                     {"ft", "m", 0.3048, false},
+                                     {"lbf", "N", 4.4482216152605, false},
+                                     {"bar", "Pa", 1e5}};
+
+std::optional<KnownUnit> known_unit(std::string_view text) {
+  for (const std::string_view unit : kSiUnits)
+    if (unit == text) return KnownUnit{unit, unit};
+  for (const KnownUnit& unit : kOtherUnits)
+    if (unit.text == text) return unit;
+  return std::nullopt;
+}
 
 struct Prefix {
   std::string_view text;
@@ -65,15 +56,14 @@ constexpr Prefix kPrefixes[] = {{"f", 1e-15},     {"p", 1e-12},     {"n", 1e-9},
                                 {"G", 1e9}};
 
 std::optional<SiUnit> plain_unit(std::string_view text) {
-  for (const KnownUnit& unit : kUnits)
-    if (unit.text == text) return SiUnit{std::string(unit.si), unit.factor};
+  if (const auto unit = known_unit(text)) return SiUnit{std::string(unit->si), unit->factor};
   for (const Prefix& prefix : kPrefixes) {
     if (!text.starts_with(prefix.text)) continue;
     const std::string_view rest = text.substr(prefix.text.size());
-    for (const KnownUnit& unit : kUnits)
-      // Kiloseconds are not used, and Gs is gauss.
-      if (unit.takes_prefix && unit.text == rest && !(rest == "s" && prefix.factor > 1.0))
-        return SiUnit{std::string(unit.si), prefix.factor * unit.factor};
+    const std::optional<KnownUnit> unit = known_unit(rest);
+    // Kiloseconds are not used, and Gs is gauss.
+    if (unit && unit->takes_prefix && !(rest == "s" && prefix.factor > 1.0))
+      return SiUnit{std::string(unit->si), prefix.factor * unit->factor};
     if (rest == "g") return SiUnit{"kg", 1e-3 * prefix.factor};
   }
   return std::nullopt;

@@ -1,15 +1,20 @@
-#include "tools/exchange/import/frf_formats.hpp"
+#include "tools/exchange/import/foreign_formats.hpp"
 
 #include <fmt/format.h>
 
+#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
+#include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/arrays/frf_csv.hpp"
+#include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/exchange/arrays/touchstone_reader.hpp"
-#include "tools/exchange/import/array_formats.hpp"
+#include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
+#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
@@ -29,6 +34,21 @@ namespace {
 }
 
 }  // namespace
+
+ArrayList read_foreign_arrays(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending == ".mat") return read_mat(file);
+  if (ending == ".npz") return read_npz(file);
+  if (ending == ".csv" || ending == ".txt" || ending == ".dat") return read_csv(file);
+  if (ending == ".h5" || ending == ".hdf5") return read_hdf5_arrays(file);
+  if (is_uff_name(file)) return arrays_of_uff(file, read_uff(file));
+  require_readable(file);
+  if (const std::string other = other_kind(file, "a file of another program"); !other.empty())
+    throw FormatError(file, "", other);
+  throw std::invalid_argument(fmt::format(
+      "{}: unsupported file type '{}'; use .unv, .uff, .mat, .csv, .h5, .npz or .sNp (Touchstone)",
+      file.string(), ending));
+}
 
 FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,
                              std::vector<std::string>& notes) {
