@@ -1,6 +1,7 @@
 #include "tools/python/array_log.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <stdexcept>
 #include <utility>
@@ -41,17 +42,11 @@ Reals with_rows_together(Reals array) {
   return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
 }
 
-std::string shape_text(const py::array& array) {
-  std::string text = "[";
-  for (py::ssize_t axis = 0; axis < array.ndim(); ++axis)
-    text += fmt::format("{}{}", axis > 0 ? " x " : "", array.shape(axis));
-  return text + "]";
-}
-
 void require(bool fits, const char* name, const py::array& array, const std::string& right) {
   if (fits) return;
   throw std::invalid_argument(
-      fmt::format("{}: has the shape {}; {}", name, shape_text(array), right));
+      fmt::format("{}: has the shape [{}]; {}", name,
+                  fmt::join(array.shape(), array.shape() + array.ndim(), " x "), right));
 }
 
 void require_axes(const char* name, const py::array& array, py::ssize_t axes, const char* right) {
@@ -59,6 +54,13 @@ void require_axes(const char* name, const py::array& array, py::ssize_t axes, co
 }
 
 }  // namespace
+
+ExperimentArrays experiment_arrays(const py::object& r, const py::object& u, const py::object& y,
+                                   const py::object& marked) {
+  ExperimentArrays arrays{real_array(r, "r"), real_array(u, "u"), real_array(y, "y"), {}};
+  if (!marked.is_none()) arrays.marked = flag_array(marked, "marked");
+  return arrays;
+}
 
 ArrayLog::ArrayLog(std::filesystem::path name, LogInfo info, ExperimentArrays arrays)
     : name_(std::move(name)), info_(std::move(info)), arrays_(std::move(arrays)) {

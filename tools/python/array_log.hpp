@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
-#include "tools/python/real_arrays.hpp"
+#include "tools/python/arguments.hpp"
 
 namespace stageid {
 
@@ -23,6 +23,11 @@ struct ExperimentArrays {
   Reals sensors;                ///< [M x E x S x n_y]
   std::optional<Flags> marked;  ///< [M x E x S], nonzero: do not use
 };
+
+/// The arguments r, u, y and marked (None: nothing is marked) of a log.
+/// @throws as real_array() and flag_array()
+ExperimentArrays experiment_arrays(const pybind11::object& r, const pybind11::object& u,
+                                   const pybind11::object& y, const pybind11::object& marked);
 
 /// A log in Python arrays. They are not copied if the channels of a sample are contiguous (C order, slices of it,
 /// views of other records), otherwise once.

@@ -5,18 +5,28 @@
 """
 
 import ast
+import inspect
 import pathlib
 import sys
 
-SOURCE = """#include "tools/python/docstring.hpp"
+SOURCE = """#include <stdexcept>
+#include <string>
+
+#include "tools/python/bindings.hpp"
 
 namespace stageid {{
 
-std::span<const Docstring> docstrings() {{
+const char* docstring(std::string_view name) {{
+  struct Docstring {{
+    std::string_view name;
+    const char* text;
+  }};
   static constexpr Docstring kDocstrings[] = {{
 {}
   }};
-  return kDocstrings;
+  for (const Docstring& documented : kDocstrings)
+    if (documented.name == name) return documented.text;
+  throw std::logic_error("the stub has no docstring of " + std::string(name));
 }}
 
 }}  // namespace stageid
@@ -24,7 +34,9 @@ std::span<const Docstring> docstrings() {{
 
 
 def docstrings(body, prefix=""):
-    for node in body:
+    for node, after in zip(body, [*body[1:], None]):
+        if isinstance(node, ast.AnnAssign) and isinstance(after, ast.Expr):
+            yield prefix + node.target.id, inspect.cleandoc(after.value.value)
         if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
             if text := ast.get_docstring(node):
                 yield prefix + node.name, text

@@ -8,7 +8,6 @@
 #include "acquisition/files/file_error.hpp"
 #include "hal/stage/stage.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/terminal/exit_code.hpp"
 
 namespace stageid {
@@ -22,9 +21,7 @@ PyObject* format_error = nullptr;
 PyObject* request_error = nullptr;
 PyObject* stage_error = nullptr;
 
-PyObject* new_error(py::module_& module, const char* name, PyObject* base, PyObject* kind) {
-  const py::tuple bases = kind == nullptr ? py::make_tuple(py::handle(base))
-                                          : py::make_tuple(py::handle(base), py::handle(kind));
+PyObject* new_error(py::module_& module, const char* name, const py::tuple& bases) {
   const auto type = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
       (std::string("stageid.") + name).c_str(), docstring(name), bases.ptr(), nullptr));
   if (!type) throw py::error_already_set();
@@ -62,11 +59,15 @@ void translate(std::exception_ptr thrown) {
 }  // namespace
 
 void define_errors(py::module_& module) {
-  PyObject* base = new_error(module, "StageidError", PyExc_Exception, nullptr);
-  request_error = new_error(module, "RequestError", base, PyExc_ValueError);
-  format_error = new_error(module, "FormatError", base, PyExc_ValueError);
-  file_error = new_error(module, "FileError", base, PyExc_OSError);
-  stage_error = new_error(module, "StageError", base, PyExc_RuntimeError);
+  const py::handle base =
+      new_error(module, "StageidError", py::make_tuple(py::handle(PyExc_Exception)));
+  const auto derived = [&](const char* name, PyObject* kind) {
+    return new_error(module, name, py::make_tuple(base, py::handle(kind)));
+  };
+  request_error = derived("RequestError", PyExc_ValueError);
+  format_error = derived("FormatError", PyExc_ValueError);
+  file_error = derived("FileError", PyExc_OSError);
+  stage_error = derived("StageError", PyExc_RuntimeError);
   py::register_local_exception_translator(&translate);
 }
 

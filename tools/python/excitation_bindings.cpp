@@ -3,14 +3,14 @@
 
 #include "excitation/multisine/multisine.hpp"
 #include "tools/fit/flag_values.hpp"
+#include "tools/python/arguments.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
-#include "tools/python/real_arrays.hpp"
 
 namespace stageid {
 namespace {
 
 namespace py = pybind11;
+using py::literals::operator""_a;
 
 Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_hz, double high_hz,
                           double rms, std::uint64_t seed, const std::string& lines,
@@ -31,10 +31,9 @@ Eigen::VectorXd multisine(double sample_rate_hz, int period_samples, double low_
 }  // namespace
 
 void define_excitation(py::module_& module) {
-  module.def("multisine", &multisine, py::arg("sample_rate_hz"), py::arg("period_samples"),
-             py::arg("low_hz"), py::arg("high_hz"), py::arg("rms"), py::arg("seed"), py::kw_only(),
-             py::arg("lines") = "all", py::arg("shape") = py::none(),
-             py::arg("crest_iterations") = 0, docstring("multisine"));
+  module.def("multisine", &multisine, "sample_rate_hz"_a, "period_samples"_a, "low_hz"_a,
+             "high_hz"_a, "rms"_a, "seed"_a, py::kw_only(), "lines"_a = "all",
+             "shape"_a = py::none(), "crest_iterations"_a = 0, docstring("multisine"));
 }
 
 }  // namespace stageid

@@ -10,10 +10,8 @@
 #include "tools/exchange/model/covariance_file.hpp"
 #include "tools/fit/fit_flags.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
-#include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/results.hpp"
 #include "tools/steps/fit_step.hpp"
@@ -89,14 +87,19 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
 py::object covariance_of(const py::object& self) {
   const auto& r = self.cast<const FitResult&>();
   if (r.covariance.sandwich.size() == 0) return py::none();
-  const ParameterNames parameters = parameter_names(r);
+  py::list names, units;
+  std::vector<double> values;
+  for (const NamedParameter& parameter : named_parameters(r)) {
+    names.append(parameter.name);
+    units.append(parameter.unit);
+    values.push_back(parameter.value);
+  }
   const Eigen::Index n_y = r.model.n_outputs();
   const auto lines = [&](const Eigen::MatrixXd& columns) {
     return lines_view<double>(columns, n_y, self);
   };
-  return result("Covariance", "name"_a = parameters.names, "unit"_a = parameters.units,
-                "value"_a = array_of(parameters.values), "sandwich"_a = r.covariance.sandwich,
-                "likelihood"_a = r.covariance.likelihood,
+  return result("Covariance", "name"_a = names, "unit"_a = units, "value"_a = array_of(values),
+                "sandwich"_a = r.covariance.sandwich, "likelihood"_a = r.covariance.likelihood,
                 "response_variance"_a = lines(r.covariance.response_variance),
                 "confidence_radius"_a = lines(r.covariance.response_radius));
 }
@@ -122,15 +125,13 @@ void define_fit(py::module_& module) {
   });
   property("covariance", &covariance_of);
   const FitRequest defaults;
-  module.def("fit", &fit, py::arg("frf"), py::kw_only(), py::arg("band_hz") = py::none(),
-             py::arg("modes") = py::none(), py::arg("weighting") = py::none(),
-             py::arg("hold") = py::none(), py::arg("delay") = py::none(),
-             py::arg("rigid_body") = py::none(), py::arg("residue_rank") = "full",
-             py::arg("damping") = py::none(), py::arg("direct_term") = py::none(),
-             py::arg("submodels") = py::none(), py::arg("method") = "riv",
-             py::arg("max_iterations") = defaults.max_iterations,
-             py::arg("search_seconds") = defaults.search_seconds, py::arg("threads") = py::none(),
-             py::arg("covariance") = false, docstring("fit"));
+  module.def("fit", &fit, "frf"_a, py::kw_only(), "band_hz"_a = py::none(), "modes"_a = py::none(),
+             "weighting"_a = py::none(), "hold"_a = py::none(), "delay"_a = py::none(),
+             "rigid_body"_a = py::none(), "residue_rank"_a = "full", "damping"_a = py::none(),
+             "direct_term"_a = py::none(), "submodels"_a = py::none(), "method"_a = "riv",
+             "max_iterations"_a = defaults.max_iterations,
+             "search_seconds"_a = defaults.search_seconds, "threads"_a = py::none(),
+             "covariance"_a = false, docstring("fit"));
 }
 
 }  // namespace stageid

@@ -4,24 +4,23 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <stdexcept>
 #include <utility>
 #include <variant>
 
+#include "acquisition/files/fingerprint.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/hold_compensation.hpp"
 #include "tools/fit/flag_values.hpp"
+#include "tools/python/arguments.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/channels.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
-#include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
-#include "tools/python/real_arrays.hpp"
 #include "tools/python/results.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
@@ -61,7 +60,7 @@ FrfHandle frf_of_arrays(const py::object& frequency_hz, const Complexes& respons
   frf.sample_rate_hz = sample_rate_hz.value_or(0.0);
   frf.hold = pick<Hold>("hold", hold);
   check(frf);
-  return FrfHandle(std::move(frf));
+  return FrfHandle{std::move(frf)};
 }
 
 /// Logs as they are given: a Log, the name of a file, or a list of these.
@@ -123,7 +122,7 @@ FrfHandle frf(const py::object& given, const Choice<std::string>& inputs,
   Console silent;
   silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
-    return FrfHandle(estimate_frf(logs, options, {health, stage.value_or("")}, silent).frf);
+    return FrfHandle{estimate_frf(logs, options, {health, stage.value_or("")}, silent).frf};
   });
 }
 
@@ -133,11 +132,11 @@ FrfHandle select(const FrfHandle& of, std::optional<std::array<double, 2>> band_
   if (inputs || outputs)
     frf = select_channels(frf, inputs ? chosen("inputs", inputs) : frf.inputs.names,
                           outputs ? chosen("outputs", outputs) : frf.outputs.names);
-  return FrfHandle(std::move(frf));
+  return FrfHandle{std::move(frf)};
 }
 
 FrfHandle compensated(const FrfHandle& of, const std::string& what, double delay_s) {
-  return FrfHandle(compensate(of.frf, pick<Compensation>("what", what), delay_s));
+  return FrfHandle{compensate(of.frf, pick<Compensation>("what", what), delay_s)};
 }
 
 py::object radius(const FrfHandle& of, double level, const std::string& variance) {
@@ -209,29 +208,44 @@ void define_properties(Class& c) {
 
 }  // namespace
 
+FrfHandle read_frf_handle(const std::filesystem::path& file) {
+  return {read_frf(file), file.filename().string(), fingerprint_of_file(file)};
+}
+
+std::string fingerprint_of_content(const FrfEstimate& frf) {
+  Fingerprint fingerprint;
+  const auto add = [&](const auto& matrix) {
+    fingerprint.add({reinterpret_cast<const std::byte*>(matrix.data()),
+                     static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
+  };
+  add(frf.frequency_hz);
+  add(frf.response);
+  add(frf.noise_variance);
+  add(frf.total_variance);
+  return fingerprint.hex();
+}
+
 void define_frf(py::module_& module) {
   py::class_<FrfHandle, std::shared_ptr<FrfHandle>> c(module, "Frf", docstring("Frf"));
-  c.def(py::init(&frf_of_arrays), py::arg("frequency_hz"), py::arg("response"), py::kw_only(),
-        py::arg("noise_variance") = py::none(), py::arg("total_variance") = py::none(),
-        py::arg("noise_dof") = py::none(), py::arg("total_dof") = py::none(),
-        py::arg("inputs") = py::none(), py::arg("outputs") = py::none(),
-        py::arg("input_units") = py::none(), py::arg("output_units") = py::none(),
-        py::arg("sample_rate_hz") = py::none(), py::arg("hold") = "none", of("__init__"));
+  c.def(py::init(&frf_of_arrays), "frequency_hz"_a, "response"_a, py::kw_only(),
+        "noise_variance"_a = py::none(), "total_variance"_a = py::none(),
+        "noise_dof"_a = py::none(), "total_dof"_a = py::none(), "inputs"_a = py::none(),
+        "outputs"_a = py::none(), "input_units"_a = py::none(), "output_units"_a = py::none(),
+        "sample_rate_hz"_a = py::none(), "hold"_a = "none", of("__init__"));
   c.def(py::pickle([](const FrfHandle& frf) { return state_of(frf); }, &frf_of_state));
   define_properties(c);
-  c.def("select", &select, py::kw_only(), py::arg("band_hz") = py::none(),
-        py::arg("inputs") = py::none(), py::arg("outputs") = py::none(), of("select"));
-  c.def("compensate", &compensated, py::arg("what"), py::arg("delay_s"), of("compensate"));
-  c.def("confidence_radius", &radius, py::arg("level") = 0.95, py::arg("variance") = "noise",
+  c.def("select", &select, py::kw_only(), "band_hz"_a = py::none(), "inputs"_a = py::none(),
+        "outputs"_a = py::none(), of("select"));
+  c.def("compensate", &compensated, "what"_a, "delay_s"_a, of("compensate"));
+  c.def("confidence_radius", &radius, "level"_a = 0.95, "variance"_a = "noise",
         of("confidence_radius"));
-  module.def("frf", &frf, py::arg("logs"), py::kw_only(), py::arg("inputs") = py::none(),
-             py::arg("outputs") = py::none(), py::arg("realizations") = py::none(),
-             py::arg("transient_periods") = py::none(), py::arg("method") = "periodic",
-             py::arg("covariance") = "diagonal", py::arg("periods") = "consistent",
-             py::arg("covariance_lines") = 1, py::arg("health") = true,
-             py::arg("stage") = py::none(), py::arg("threads") = py::none(), docstring("frf"));
-  module.def("read_frf", &read_frf_handle, py::arg("file"), docstring("read_frf"));
-  module.def("write_frf", &write, py::arg("file"), py::arg("frf"), docstring("write_frf"));
+  module.def("frf", &frf, "logs"_a, py::kw_only(), "inputs"_a = py::none(),
+             "outputs"_a = py::none(), "realizations"_a = py::none(),
+             "transient_periods"_a = py::none(), "method"_a = "periodic",
+             "covariance"_a = "diagonal", "periods"_a = "consistent", "covariance_lines"_a = 1,
+             "health"_a = true, "stage"_a = py::none(), "threads"_a = py::none(), docstring("frf"));
+  module.def("read_frf", &read_frf_handle, "file"_a, docstring("read_frf"));
+  module.def("write_frf", &write, "file"_a, "frf"_a, docstring("write_frf"));
 }
 
 }  // namespace stageid

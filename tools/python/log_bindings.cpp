@@ -12,13 +12,11 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_format.hpp"
+#include "tools/python/arguments.hpp"
 #include "tools/python/array_log.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/channels.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/pickles.hpp"
-#include "tools/python/real_arrays.hpp"
 #include "tools/python/results.hpp"
 #include "tools/python/simulate.hpp"
 
@@ -28,14 +26,6 @@ namespace {
 namespace py = pybind11;
 using py::literals::operator""_a;
 
-/// The arguments r, u, y and marked (None: nothing is marked) of a log.
-ExperimentArrays given_arrays(const py::object& r, const py::object& u, const py::object& y,
-                              const py::object& marked) {
-  ExperimentArrays arrays{real_array(r, "r"), real_array(u, "u"), real_array(y, "y"), {}};
-  if (!marked.is_none()) arrays.marked = flag_array(marked, "marked");
-  return arrays;
-}
-
 std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& u,
                                          const py::object& y, double sample_rate_hz,
                                          int transient_periods, const Names& excitation,
@@ -43,7 +33,7 @@ std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& 
                                          const std::optional<Units>& actuator_units,
                                          const std::optional<Units>& sensor_units,
                                          const py::object& marked) {
-  ExperimentArrays arrays = given_arrays(r, u, y, marked);
+  ExperimentArrays arrays = experiment_arrays(r, u, y, marked);
   const auto last_axis = [](const py::array& array) {
     return array.ndim() == 4 ? array.shape(3) : 0;
   };
@@ -214,11 +204,10 @@ void define_properties(Class& log) {
 
 void define_logs(py::module_& module) {
   py::class_<LogReader, std::shared_ptr<LogReader>> log(module, "Log", docstring("Log"));
-  log.def(py::init(&log_of_arrays), py::arg("r"), py::arg("u"), py::arg("y"), py::kw_only(),
-          py::arg("sample_rate_hz"), py::arg("transient_periods") = 0,
-          py::arg("excitation") = py::none(), py::arg("actuators") = py::none(),
-          py::arg("sensors") = py::none(), py::arg("actuator_units") = py::none(),
-          py::arg("sensor_units") = py::none(), py::arg("marked") = py::none(), of("__init__"));
+  log.def(py::init(&log_of_arrays), "r"_a, "u"_a, "y"_a, py::kw_only(), "sample_rate_hz"_a,
+          "transient_periods"_a = 0, "excitation"_a = py::none(), "actuators"_a = py::none(),
+          "sensors"_a = py::none(), "actuator_units"_a = py::none(), "sensor_units"_a = py::none(),
+          "marked"_a = py::none(), of("__init__"));
   log.def(py::pickle([](const LogReader& l) { return state_of(l); }, &log_of_state));
   define_properties(log);
   log.def(
@@ -229,10 +218,10 @@ void define_logs(py::module_& module) {
         return py::reinterpret_steal<py::object>(PySeqIter_New(self.ptr()));
       },
       of("__iter__"));
-  log.def("__getitem__", &run_at, py::arg("run"), of("__getitem__"));
+  log.def("__getitem__", &run_at, "run"_a, of("__getitem__"));
   log.def("arrays", &arrays, of("arrays"));
-  module.def("read_log", &read_log, py::arg("file"), docstring("read_log"));
-  module.def("simulate", &simulate, py::arg("config"), docstring("simulate"));
+  module.def("read_log", &read_log, "file"_a, docstring("read_log"));
+  module.def("simulate", &simulate, "config"_a, docstring("simulate"));
 }
 
 }  // namespace stageid

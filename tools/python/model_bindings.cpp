@@ -11,12 +11,10 @@
 #include "estimation/modal/modal_form.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 #include "estimation/modal/validation.hpp"
+#include "tools/python/arguments.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/frf_handle.hpp"
-#include "tools/python/numpy_arrays.hpp"
 #include "tools/python/pickles.hpp"
-#include "tools/python/real_arrays.hpp"
 #include "tools/python/results.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -159,15 +157,15 @@ void define_model(py::module_& module) {
   property("submodels", &submodels_of);
   property("fit", &fit_of);
   property("provenance_json", [](const Model& m) { return m.provenance_json; });
-  c.def("response", &response_of, py::arg("frequency_hz"), of("response"));
+  c.def("response", &response_of, "frequency_hz"_a, of("response"));
   c.def("modes", &modes_of, of("modes"));
   c.def("state_space", &continuous, of("state_space"));
   c.def("sampled_state_space", &sampled, of("sampled_state_space"));
-  c.def("save", &save, py::arg("file"), of("save"));
-  module.def("read_model", &read_model, py::arg("file"), docstring("read_model"));
-  module.def("validate", &validate_on, py::arg("model"), py::arg("frf"), py::kw_only(),
-             py::arg("band_hz") = py::none(), docstring("validate"));
-  module.def("pair_modes", &pairs_of, py::arg("first"), py::arg("second"), docstring("pair_modes"));
+  c.def("save", &save, "file"_a, of("save"));
+  module.def("read_model", &read_model, "file"_a, docstring("read_model"));
+  module.def("validate", &validate_on, "model"_a, "frf"_a, py::kw_only(), "band_hz"_a = py::none(),
+             docstring("validate"));
+  module.def("pair_modes", &pairs_of, "first"_a, "second"_a, docstring("pair_modes"));
 }
 
 }  // namespace stageid

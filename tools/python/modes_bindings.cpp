@@ -6,7 +6,6 @@
 #include "estimation/start/stabilization.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/python/results.hpp"
@@ -46,16 +45,16 @@ py::list poles_over_orders(const FrfHandle& of, int most_order, double delay_s) 
 }  // namespace
 
 void define_modes(py::module_& module) {
-  module.def("modes", &modes, py::arg("frf"), py::kw_only(), py::arg("kind") = "accelerance",
-             py::arg("prominence_db") = PeakOptions{}.minimum_prominence_db, docstring("modes"));
+  module.def("modes", &modes, "frf"_a, py::kw_only(), "kind"_a = "accelerance",
+             "prominence_db"_a = PeakOptions{}.minimum_prominence_db, docstring("modes"));
   module.def(
       "cmif",
       [](const FrfHandle& of, const std::string& kind) {
         return cmif(of.frf, pick<CmifKind>("kind", kind));
       },
-      py::arg("frf"), py::kw_only(), py::arg("kind") = "response", docstring("cmif"));
-  module.def("stabilization", &poles_over_orders, py::arg("frf"), py::kw_only(),
-             py::arg("most_order") = StabilizationOptions{}.most_order, py::arg("delay_s") = 0.0,
+      "frf"_a, py::kw_only(), "kind"_a = "response", docstring("cmif"));
+  module.def("stabilization", &poles_over_orders, "frf"_a, py::kw_only(),
+             "most_order"_a = StabilizationOptions{}.most_order, "delay_s"_a = 0.0,
              docstring("stabilization"));
 }
 

@@ -6,7 +6,6 @@
 #include "acquisition/files/version.hpp"
 #include "tools/commands/program.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/docstring.hpp"
 #include "tools/python/interruptible.hpp"
 #include "tools/terminal/interrupt.hpp"
 

@@ -69,8 +69,7 @@ py::tuple state_of(const FrfHandle& frf) {
 FrfHandle frf_of_state(const py::tuple& state) {
   const OutputFile scratch(scratch_name("stageid.h5"));
   fill(scratch.path(), state[0].cast<py::bytes>());
-  return FrfHandle(read_frf(scratch.path()), state[1].cast<std::string>(),
-                   state[2].cast<std::string>());
+  return {read_frf(scratch.path()), state[1].cast<std::string>(), state[2].cast<std::string>()};
 }
 
 py::bytes state_of(const AdditiveModel& model) {
@@ -137,10 +136,8 @@ std::shared_ptr<LogReader> log_of_state(const py::tuple& state) {
   info.actuators = channels_of(state[5]);
   info.sensors = channels_of(state[6]);
   info.metadata_json = state[7].cast<std::string>();
-  ExperimentArrays arrays{
-      real_array(state[8], "r"), real_array(state[9], "u"), real_array(state[10], "y"), {}};
-  if (!state[11].is_none()) arrays.marked = flag_array(state[11], "marked");
-  return std::make_shared<ArrayLog>(name, std::move(info), std::move(arrays));
+  return std::make_shared<ArrayLog>(name, std::move(info),
+                                    experiment_arrays(state[8], state[9], state[10], state[11]));
 }
 
 }  // namespace stageid

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <pybind11/complex.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <Eigen/Core>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -36,6 +39,31 @@ inline pybind11::array_t<double> array_of(const std::vector<double>& values) {
 template <typename Values>
 pybind11::object array_unless_empty(const Values& values) {
   return values.size() > 0 ? pybind11::cast(values) : pybind11::none();
+}
+
+/// Columns that are vec of an n_y x n_u matrix, as a read-only array [N x n_y x n_u] over the same memory; `owner`
+/// keeps the memory alive. None for an empty matrix.
+template <typename Scalar>
+pybind11::object lines_view(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& columns,
+                            Eigen::Index n_y, const pybind11::handle& owner) {
+  namespace py = pybind11;
+  if (columns.size() == 0) return py::none();
+  const auto bytes = static_cast<py::ssize_t>(sizeof(Scalar));
+  py::array_t<Scalar> array({columns.cols(), n_y, columns.rows() / n_y},
+                            {columns.rows() * bytes, bytes, n_y * bytes}, columns.data(), owner);
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+/// The same for a matrix without another owner, which is moved into the array.
+template <typename Scalar>
+pybind11::object lines_moved(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>&& columns,
+                             Eigen::Index n_y) {
+  using Columns = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  auto kept = std::make_unique<Columns>(std::move(columns));
+  Columns* memory = kept.get();
+  const pybind11::capsule owner(kept.release(), [](void* p) { delete static_cast<Columns*>(p); });
+  return lines_view(*memory, n_y, owner);
 }
 
 }  // namespace stageid

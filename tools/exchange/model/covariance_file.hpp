@@ -8,14 +8,15 @@
 
 namespace stageid {
 
-/// The parameters of the rows of FitCovariance.
-struct ParameterNames {
-  std::vector<std::string> names;  ///< key in model.json: submodels[1].numerator[0][y][u]
-  std::vector<std::string> units;
-  std::vector<double> values;
+/// A parameter of FitCovariance.
+struct NamedParameter {
+  std::string name;  ///< key in model.json: submodels[1].numerator[0][y][u]
+  std::string unit;
+  double value = 0.0;
 };
+/// The parameters of the rows of FitCovariance.
 /// @pre result.covariance is not empty
-ParameterNames parameter_names(const FitResult& result);
+std::vector<NamedParameter> named_parameters(const FitResult& result);
 
 /// Writes the covariance of a fit as in docs/formats.md, atomically.
 /// @pre result.covariance is not empty   @throws FileError

@@ -3,7 +3,7 @@
 // Exported models and frequency responses, by file extension; docs/exchange.md.
 //
 //   .json        the model                        .h5, .hdf5   tools/exchange/model/model_hdf5.hpp
-//   .csv         model_csv.hpp, frf_csv.hpp       .npz, .mat   the content of .h5 for numpy and MATLAB
+//   .csv         a table, frf_csv.hpp             .npz, .mat   the content of .h5 for numpy and MATLAB
 //   .unv, .uff   tools/exchange/uff/uff_frf.hpp, text and binary: response and modes
 //   .py, .m      tools/exchange/model/model_script.hpp
 

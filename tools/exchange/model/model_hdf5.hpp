@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <optional>
 
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "estimation/modal/modal_form.hpp"
+#include "frf/file/line_datasets.hpp"
 
 namespace stageid {
 
@@ -15,6 +17,21 @@ struct ExportedResponse {
   Eigen::VectorXd frequency_hz;
   Eigen::MatrixXd variance;  ///< (n_y n_u) x N or 0 x 0
 };
+
+// Parts of files of a model.
+
+/// /inputs and /outputs with their units.
+void write_channels(Hdf5File& file, const AdditiveModel& model);
+/// A dataset [lines x outputs x inputs] of columns vec(outputs x inputs).
+template <typename Scalar>
+void write_lines(Hdf5File& file, const std::string& dataset, const VecColumns<Scalar>& columns,
+                 Eigen::Index n_y) {
+  write_array(file, dataset, {size_of(columns.cols()), size_of(n_y), size_of(columns.rows() / n_y)},
+              to_c_order<Scalar>(columns, n_y).data());
+}
+/// /frequency_hz and /response.
+void write_response(Hdf5File& file, const AdditiveModel& model,
+                    const Eigen::VectorXd& frequency_hz);
 
 /// Writes model.h5 atomically.
 /// @param driving_point for /modes/driving_point_mass

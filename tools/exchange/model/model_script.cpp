@@ -1,6 +1,7 @@
 #include "tools/exchange/model/model_script.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cctype>
 #include <cmath>
@@ -42,10 +43,9 @@ class Syntax {
   }
 
   std::string texts(const std::vector<std::string>& values) const {
-    std::string list;
-    for (const std::string& value : values)
-      list += fmt::format("{}{}", list.empty() ? "" : ", ", text(value));
-    return python_ ? fmt::format("[{}]", list) : fmt::format("{{{}}}", list);
+    std::vector<std::string> quoted;
+    for (const std::string& value : values) quoted.push_back(text(value));
+    return fmt::format(fmt::runtime(python_ ? "[{}]" : "{{{}}}"), fmt::join(quoted, ", "));
   }
 
   std::string matrix(const Eigen::MatrixXd& m) const {
@@ -53,21 +53,15 @@ class Syntax {
       return python_ ? fmt::format("np.zeros(({}, {}))", m.rows(), m.cols())
                      : fmt::format("zeros({}, {})", m.rows(), m.cols());
     std::string rows;
-    for (Eigen::Index i = 0; i < m.rows(); ++i) {
-      std::string row;
-      for (Eigen::Index j = 0; j < m.cols(); ++j)
-        row += fmt::format("{}{}", j == 0 ? "" : ", ", number(m(i, j)));
-      rows += python_ ? fmt::format("    [{}],\n", row) : fmt::format("  {};\n", row);
-    }
+    for (const auto& row : m.rowwise())
+      rows += fmt::format(fmt::runtime(python_ ? "    [{}],\n" : "  {};\n"), numbers(row));
     return python_ ? fmt::format("np.array([\n{}])", rows) : fmt::format("[ ...\n{}]", rows);
   }
 
   /// A one-dimensional array; a column in MATLAB.
-  std::string vector(const Eigen::VectorXd& v) const {
-    std::string list;
-    for (const double value : v)
-      list += fmt::format("{}{}", list.empty() ? "" : ", ", number(value));
-    return python_ ? fmt::format("np.array([{}])", list) : fmt::format("[{}].'", list);
+  template <typename Vector>
+  std::string vector(const Vector& v) const {
+    return fmt::format(fmt::runtime(python_ ? "np.array([{}])" : "[{}].'"), numbers(v));
   }
 
   std::string assign(const std::string& name, const std::string& value) const {
@@ -78,6 +72,13 @@ class Syntax {
   }
 
  private:
+  template <typename Numbers>
+  std::string numbers(const Numbers& values) const {
+    std::vector<std::string> list;
+    for (const double value : values) list.push_back(number(value));
+    return fmt::format("{}", fmt::join(list, ", "));
+  }
+
   bool python_;
 };
 
@@ -97,20 +98,15 @@ std::string model_data(const AdditiveModel& model, const Syntax& syntax) {
   text += syntax.assign("OUTPUT_UNITS", syntax.texts(model.outputs.units));
   text += syntax.assign("SAMPLE_RATE_HZ", syntax.number(model.sample_rate_hz));
   text += syntax.assign("HOLD", syntax.text(to_string(model.hold)));
-  text += syntax.assign("BAND_HZ",
-                        syntax.vector(Eigen::Vector2d(model.fit.band_hz[0], model.fit.band_hz[1])));
+  text += syntax.assign("BAND_HZ", syntax.vector(model.fit.band_hz));
   std::vector<double> frequency_hz, damping;
   for (const Submodel& s : model.submodels)
     if (s.is_mode()) {
       frequency_hz.push_back(s.natural_frequency_hz());
       damping.push_back(s.damping_ratio());
     }
-  const auto map = [](const std::vector<double>& v) {
-    return Eigen::VectorXd(
-        Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-  };
-  text += syntax.assign("NATURAL_FREQUENCY_HZ", syntax.vector(map(frequency_hz)));
-  text += syntax.assign("DAMPING_RATIO", syntax.vector(map(damping)));
+  text += syntax.assign("NATURAL_FREQUENCY_HZ", syntax.vector(frequency_hz));
+  text += syntax.assign("DAMPING_RATIO", syntax.vector(damping));
   text += syntax.assign("INPUT_DELAY_S", syntax.vector(model.input_delays_s()));
   text += syntax.assign("OUTPUT_DELAY_S", syntax.vector(model.output_delays_s()));
   add_system(syntax, state_space(model), "", text);

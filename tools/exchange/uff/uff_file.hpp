@@ -6,7 +6,6 @@
 
 #include <array>
 #include <complex>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -80,16 +79,12 @@ struct UffContent {
   std::vector<UffMode> modes;
 };
 
-enum class UffEncoding : std::uint8_t {
-  text,   ///< 13 digits, as prescribed (E20.12); abscissas 6 unless evenly spaced
-  binary  ///< 58b: exact; uneven abscissas in double precision, as common readers expect
-};
-
-/// Writes datasets 151, 164, 58 and 55 atomically. Equal content gives equal bytes; dates are empty. Abscissas are
+/// Writes datasets 151, 164, 58 and 55 atomically: for .uff binary (58b: exact; uneven abscissas in double precision, as
+/// common readers expect), otherwise text (13 digits, as prescribed (E20.12); abscissas 6 unless evenly spaced). Equal content gives equal bytes; dates are empty. Abscissas are
 /// stored as even if minimum and step, written with six digits, reproduce them exactly.
 /// @throws std::invalid_argument if an id line is longer than 80 characters, or a unit than 20.
 /// @throws FileError
-void write_uff(const std::filesystem::path& file, const UffContent& content, UffEncoding encoding);
+void write_uff(const std::filesystem::path& file, const UffContent& content);
 
 /// Whether the extension is that of a universal file.
 bool is_uff_name(const std::filesystem::path& file);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
@@ -24,16 +25,39 @@ constexpr const char* kInput = "input: ";
 constexpr const char* kSettings = "stageid-frf";
 constexpr long long kFirstInputNode = 1001;
 
+/// Specific data type: units along an axis and about it, and the exponents of length and force.
+struct Quantity {
+  int type;
+  const char* unit;
+  const char* rotation_unit;
+  int length, rotation_length, force;
+};
+
+constexpr Quantity kQuantities[] = {{8, "m", "rad", 1, 0, 0},
+                                    {11, "m/s", "rad/s", 1, 0, 0},
+                                    {12, "m/s^2", "rad/s^2", 1, 0, 0},
+                                    {13, "N", "Nm", 0, 1, 1}};
+
+/// Null if there is none.
+const Quantity* quantity_of(int type) {
+  for (const Quantity& quantity : kQuantities)
+    if (quantity.type == type) return &quantity;
+  return nullptr;
+}
+
+/// Of values that need not be complex.
+std::vector<double> real_parts(const UffFunction& f) {
+  std::vector<double> real;
+  for (const std::complex<double>& value : f.ordinate) real.push_back(value.real());
+  return real;
+}
+
 // Writing -----------------------------------------------------------------------------------------
 
-/// Axis with the specific data type of a unit.
 UffAxis axis_of(const std::string& unit) {
-  static const std::map<std::string, int> kTypes = {
-      {"m", 8}, {"m/s", 11}, {"m/s^2", 12}, {"N", 13}};
-  const auto found = kTypes.find(unit);
-  UffAxis axis;
-  axis.type = found == kTypes.end() ? 0 : found->second;
-  axis.unit = unit;
+  UffAxis axis{.unit = unit};
+  for (const Quantity& quantity : kQuantities)
+    if (unit == quantity.unit) axis.type = quantity.type;
   return axis;
 }
 
@@ -46,7 +70,7 @@ std::string name_line(const char* head, const std::string& name) {
   return head + name;
 }
 
-/// The full name, as an id line.
+/// The name in ASCII.
 std::string entity_of(const std::string& name) {
   std::string entity;
   for (const char32_t point : code_points_of(name))
@@ -70,37 +94,31 @@ UffFunction channel_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Inde
   return f;
 }
 
-UffFunction response_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Index j) {
-  UffFunction f = channel_function(frf, i, j);
-  f.id[0] = fmt::format("FRF {} <- {}", f.id[3].substr(8), f.id[4].substr(7)).substr(0, 80);
-  f.type = 4;
-  f.complex = true;
-  const Eigen::VectorXcd values = frf.response.row(i + frf.n_outputs() * j);
-  f.ordinate.assign(values.begin(), values.end());
-  return f;
-}
-
-void add_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance, const char* title,
-                  UffContent& content) {
-  if (variance.size() == 0) return;
-  for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
-    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i) {
-      UffFunction f = channel_function(frf, i, j);
-      f.id[0] = title;
-      const Eigen::VectorXd values = variance.row(i + frf.n_outputs() * j);
-      f.ordinate.assign(values.begin(), values.end());
-      content.functions.push_back(std::move(f));
+/// One function per channel. @param title empty: that of a response
+template <typename Values>
+void add_functions(const FrfEstimate& frf, const Values& values, const std::string& title,
+                   UffContent& content) {
+  for (Eigen::Index c = 0; c < values.rows(); ++c) {
+    UffFunction f = channel_function(frf, c % frf.n_outputs(), c / frf.n_outputs());
+    f.id[0] = title;
+    if (title.empty()) {
+      f.id[0] = fmt::format("FRF {} <- {}", f.id[3].substr(8), f.id[4].substr(7)).substr(0, 80);
+      f.type = 4;
+      f.complex = true;
     }
+    const auto row = values.row(c);
+    f.ordinate.assign(row.begin(), row.end());
+    content.functions.push_back(std::move(f));
+  }
 }
 
 UffFunction frequency_function(const FrfEstimate& frf) {
   UffFunction f;
   f.id[0] = kFrequencies;
   f.ordinate_axis = {18, {0, 0, 0}, "Hz"};
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    f.abscissa.push_back(static_cast<double>(k));
-    f.ordinate.emplace_back(frf.frequency_hz[k], 0.0);
-  }
+  f.ordinate.assign(frf.frequency_hz.begin(), frf.frequency_hz.end());
+  f.abscissa.resize(f.ordinate.size());
+  std::iota(f.abscissa.begin(), f.abscissa.end(), 0.0);
   return f;
 }
 
@@ -138,36 +156,21 @@ std::string channel_name(const UffFunction& f) {
 /// Factor between file units and the SI unit for a quantity of this axis; empty if unknown.
 std::optional<double> factor_of(const UffAxis& axis, int direction, const UffUnits& units) {
   if (units.length == 1.0 && units.force == 1.0) return 1.0;
-  const bool rotation = std::abs(direction) > 3;
-  switch (axis.type) {
-    case 8:
-    case 11:
-    case 12:
-      return rotation ? 1.0 : units.length;
-    case 13:
-      return rotation ? units.force * units.length : units.force;
-    case 1:
-      return std::pow(units.length, axis.exponents[0]) * std::pow(units.force, axis.exponents[1]);
-    default:
-      return std::nullopt;
-  }
+  const auto factor = [&](int length, int force) {
+    return std::pow(units.length, length) * std::pow(units.force, force);
+  };
+  if (axis.type == 1) return factor(axis.exponents[0], axis.exponents[1]);
+  const Quantity* quantity = quantity_of(axis.type);
+  if (quantity == nullptr) return std::nullopt;
+  return factor(std::abs(direction) > 3 ? quantity->rotation_length : quantity->length,
+                quantity->force);
 }
 
 std::string unit_of(const UffAxis& axis, int direction, bool other_units) {
   if (axis.unit != "NONE" && !other_units) return axis.unit;
-  const bool rotation = std::abs(direction) > 3;
-  switch (axis.type) {
-    case 8:
-      return rotation ? "rad" : "m";
-    case 11:
-      return rotation ? "rad/s" : "m/s";
-    case 12:
-      return rotation ? "rad/s^2" : "m/s^2";
-    case 13:
-      return rotation ? "Nm" : "N";
-    default:
-      return "1";
-  }
+  const Quantity* quantity = quantity_of(axis.type);
+  if (quantity == nullptr) return "1";
+  return std::abs(direction) > 3 ? quantity->rotation_unit : quantity->unit;
 }
 
 Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit) {
@@ -260,12 +263,8 @@ double scale_to_si(const std::filesystem::path& file, const UffFunction& f, cons
 }
 
 std::vector<double> frequencies_of(const UffContent& content, const UffFunction& first) {
-  for (const UffFunction& f : content.functions) {
-    if (f.id[0] != kFrequencies || f.ordinate.size() != first.abscissa.size()) continue;
-    std::vector<double> exact;
-    for (const std::complex<double>& value : f.ordinate) exact.push_back(value.real());
-    return exact;
-  }
+  for (const UffFunction& f : content.functions)
+    if (f.id[0] == kFrequencies && f.ordinate.size() == first.abscissa.size()) return real_parts(f);
   return first.abscissa;
 }
 
@@ -273,9 +272,8 @@ Eigen::MatrixXd variance_of(const std::filesystem::path& file, const UffContent&
                             const FrfEstimate& frf, const char* title) {
   FrfEstimate same = frf;
   const auto table = table_of(file, content, same, title);
-  if (table.empty()) return {};
+  if (table.empty() || !(same.outputs == frf.outputs) || !(same.inputs == frf.inputs)) return {};
   Eigen::MatrixXd variance(frf.response.rows(), frf.lines());
-  if (!(same.outputs == frf.outputs) || !(same.inputs == frf.inputs)) return {};
   for (const auto& [channel, f] : table)
     for (Eigen::Index k = 0; k < frf.lines(); ++k)
       variance(channel.first + frf.n_outputs() * channel.second, k) =
@@ -297,12 +295,10 @@ UffContent uff_of_frf(const FrfEstimate& frf) {
                                     to_string(frf.compensated), frf.sample_rate_hz, frf.delay_s);
   content.program = fmt::format("stageid {}", version());
   content.units = UffUnits{};
-  for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
-    for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
-      content.functions.push_back(response_function(frf, i, j));
+  add_functions(frf, frf.response, "", content);
   content.functions.push_back(frequency_function(frf));
-  add_variance(frf, frf.noise_variance, kNoiseVariance, content);
-  add_variance(frf, frf.total_variance, kTotalVariance, content);
+  add_functions(frf, frf.noise_variance, kNoiseVariance, content);
+  add_functions(frf, frf.total_variance, kTotalVariance, content);
   return content;
 }
 
@@ -338,11 +334,7 @@ ArrayList arrays_of_uff(const std::filesystem::path& file, const UffContent& con
     const int before = seen[channel]++;
     const std::string name = before == 0 ? channel : fmt::format("{} ({})", channel, before + 1);
     NamedArray array{name, {f.ordinate.size()}, f.ordinate};
-    if (!f.complex) {
-      std::vector<double> real;
-      for (const std::complex<double>& value : f.ordinate) real.push_back(value.real());
-      array.values = std::move(real);
-    }
+    if (!f.complex) array.values = real_parts(f);
     list.arrays.push_back(std::move(array));
     list.arrays.push_back({name + "@abscissa", {f.abscissa.size()}, f.abscissa});
   }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "acquisition/files/file_error.hpp"
+#include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
 #include "tools/terminal/text_lines.hpp"
 #include "tools/terminal/unicode.hpp"
@@ -21,19 +21,13 @@ class Record {
   Record(const TextLines& lines, std::string_view line) : lines_(lines), line_(line) {}
 
   std::string text(std::size_t width) { return utf8_of_text(trimmed(take(width))); }
-  long long integer(std::size_t width) {
-    const std::string_view field = trimmed(take(width));
-    if (field.empty()) return 0;
-    const std::optional<double> value = parse_number(field);
-    if (!value || *value != std::trunc(*value) || std::abs(*value) > 1e15)
-      lines_.fail(fmt::format("got '{}'; expected a whole number", field));
-    return static_cast<long long>(*value);
-  }
-  double number(std::size_t width) {
+  long long integer(std::size_t width) { return static_cast<long long>(number(width, "whole")); }
+  double number(std::size_t width, std::string_view kind = "finite") {
     const std::string_view field = trimmed(take(width));
     if (field.empty()) return 0.0;
     const std::optional<double> value = parse_number(field);
-    if (!value) lines_.fail(fmt::format("got '{}'; expected a finite number", field));
+    if (!value || (kind == "whole" && (*value != std::trunc(*value) || std::abs(*value) > 1e15)))
+      lines_.fail(fmt::format("got '{}'; expected a {} number", field, kind));
     return *value;
   }
   bool at_end() const { return trimmed(line_).empty(); }
@@ -46,10 +40,6 @@ class Record {
   }
   const TextLines& lines_;
   std::string_view line_;
-};
-
-struct BinaryForm {
-  bool big_endian = false;
 };
 
 struct DataForm {
@@ -121,21 +111,6 @@ std::vector<double> text_values(TextLines& lines, const DataForm& form) {
   return values;
 }
 
-template <typename Number, typename Bits>
-double binary_number(const char* bytes, bool big_endian) {
-  char raw[sizeof(Number)];
-  std::memcpy(raw, bytes, sizeof(raw));
-  if (big_endian != (std::endian::native == std::endian::big)) std::reverse(raw, raw + sizeof(raw));
-  return static_cast<double>(std::bit_cast<Number>(std::bit_cast<Bits>(raw)));
-}
-
-struct FourBytes {
-  char raw[4];
-};
-struct EightBytes {
-  char raw[8];
-};
-
 /// True if the data end at `bytes`: the delimiter follows, possibly on a line of its own.
 bool ends_at(std::string_view rest, std::size_t bytes) {
   if (bytes > rest.size()) return false;
@@ -145,11 +120,11 @@ bool ends_at(std::string_view rest, std::size_t bytes) {
 
 /// Record 12 in binary. The width of the abscissas follows from the end of the data, because some programs write a
 /// wrong number of bytes in the head of the dataset.
-std::vector<double> binary_values(TextLines& lines, const DataForm& form,
-                                  const BinaryForm& binary) {
+std::vector<double> binary_values(TextLines& lines, const DataForm& form, std::endian order) {
   const std::string_view rest = lines.rest();
   const std::size_t width = form.double_precision ? 8 : 4;
   const std::size_t ordinates = form.complex ? 2 : 1;
+  const bool big_endian = order == std::endian::big;
   std::vector<std::size_t> abscissa_widths = {0};
   if (!form.even) abscissa_widths = {4, 8};
   for (const std::size_t abscissa_width : abscissa_widths) {
@@ -158,8 +133,8 @@ std::vector<double> binary_values(TextLines& lines, const DataForm& form,
     std::vector<double> values;
     const char* at = rest.data();
     const auto read = [&](std::size_t bytes) {
-      values.push_back(bytes == 4 ? binary_number<float, FourBytes>(at, binary.big_endian)
-                                  : binary_number<double, EightBytes>(at, binary.big_endian));
+      values.push_back(bytes == 4 ? double{raw_number<float>(at, big_endian)}
+                                  : raw_number<double>(at, big_endian));
       at += bytes;
     };
     for (std::size_t k = 0; k < form.count; ++k) {
@@ -183,7 +158,7 @@ void distribute(const std::vector<double>& values, const DataForm& form, UffFunc
   }
 }
 
-UffFunction read_function(TextLines& lines, const std::optional<BinaryForm>& binary) {
+UffFunction read_function(TextLines& lines, const std::optional<std::endian>& binary) {
   UffFunction f;
   f.line = lines.line_number();
   for (std::string& id : f.id) id = utf8_of_text(trimmed(lines.next()));
@@ -272,8 +247,8 @@ void read_header(TextLines& lines, UffContent& content) {
     *text = utf8_of_text(trimmed(lines.next()));
 }
 
-/// The form of the data if the dataset line contains "58b".
-std::optional<BinaryForm> binary_form(const TextLines& lines, std::string_view line) {
+/// That of the data if the dataset line contains "58b".
+std::optional<std::endian> byte_order(const TextLines& lines, std::string_view line) {
   if (line.size() < 7 || (line[6] != 'b' && line[6] != 'B')) return std::nullopt;
   Record record(lines, line.substr(7));
   const long long order = record.integer(6), format = record.integer(6);
@@ -281,7 +256,7 @@ std::optional<BinaryForm> binary_form(const TextLines& lines, std::string_view l
     lines.fail(fmt::format("unsupported byte order {}; expected 1 (little endian) or 2", order));
   if (format != 2)
     lines.fail(fmt::format("unsupported floating-point format {}; expected 2 (IEEE 754)", format));
-  return BinaryForm{order == 2};
+  return order == 2 ? std::endian::big : std::endian::little;
 }
 
 void skip_to_edge(TextLines& lines) {
@@ -293,7 +268,7 @@ void read_dataset(TextLines& lines, UffContent& content) {
   const std::string_view line = lines.next();
   const std::string number(trimmed(line.substr(0, 6)));
   if (number == "58") {
-    content.functions.push_back(read_function(lines, binary_form(lines, line)));
+    content.functions.push_back(read_function(lines, byte_order(lines, line)));
   } else if (number == "55") {
     const std::optional<UffMode> mode = read_mode(lines);
     if (mode) {

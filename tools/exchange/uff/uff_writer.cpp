@@ -2,11 +2,11 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
+#include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
 #include "tools/terminal/text_lines.hpp"
 
@@ -111,27 +111,21 @@ std::string text_values(const UffFunction& f, bool even) {
   return text;
 }
 
-void append_bytes(std::string& bytes, double value) {
-  char raw[sizeof(value)];
-  std::memcpy(raw, &value, sizeof(value));
-  bytes.append(raw, sizeof(value));
-}
-
 /// The specification has abscissas of single precision. The most common readers, pyuff and MATLAB's readuff, expect
 /// the precision of the ordinate and fail on such files.
 std::string binary_values(const UffFunction& f, bool even) {
   std::string bytes;
   for (std::size_t k = 0; k < f.abscissa.size(); ++k) {
-    if (!even) append_bytes(bytes, f.abscissa[k]);
-    append_bytes(bytes, f.ordinate[k].real());
-    if (f.complex) append_bytes(bytes, f.ordinate[k].imag());
+    if (!even) append_raw(bytes, f.abscissa[k]);
+    append_raw(bytes, f.ordinate[k].real());
+    if (f.complex) append_raw(bytes, f.ordinate[k].imag());
   }
   return bytes;
 }
 
-std::string function_text(const UffFunction& f, UffEncoding encoding) {
+std::string function_text(const UffFunction& f, bool binary) {
   const EvenAbscissa even = even_abscissa(f.abscissa);
-  if (encoding == UffEncoding::text)
+  if (!binary)
     return kEdgeLine + dataset_line(58) + function_head(f, even) + text_values(f, even.even) +
            kEdgeLine;
   const std::string bytes = binary_values(f, even.even);
@@ -178,10 +172,11 @@ std::string mode_text(const UffMode& mode) {
 
 }  // namespace
 
-void write_uff(const std::filesystem::path& file, const UffContent& content, UffEncoding encoding) {
+void write_uff(const std::filesystem::path& file, const UffContent& content) {
+  const bool binary = file.extension() == ".uff";
   std::string text = header_text(content);
   if (content.units) text += units_text(*content.units);
-  for (const UffFunction& function : content.functions) text += function_text(function, encoding);
+  for (const UffFunction& function : content.functions) text += function_text(function, binary);
   for (const UffMode& mode : content.modes) text += mode_text(mode);
   write_text_file(file, text);
 }

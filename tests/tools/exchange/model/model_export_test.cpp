@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <sstream>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/input_files.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
@@ -31,13 +31,6 @@ AdditiveModel small_model() {
   mode.natural_frequency_std_hz = 0.25;
   model.submodels = {rigid, mode};
   return model;
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
 }
 
 TEST(ModelExport, Hdf5HoldsWhatTheModelHolds) {
@@ -65,24 +58,14 @@ TEST(ModelExport, Hdf5HoldsWhatTheModelHolds) {
   EXPECT_EQ(read_response_variance(directory / "m.h5", exported.frequency_hz), exported.variance);
   EXPECT_EQ(read_response_variance(directory / "m.h5", Eigen::VectorXd{{5.0, 11.0}}).size(), 0);
   // The text inside is the model file.
-  write_model(directory / "m.json", model);
-  EXPECT_EQ(file.read_texts("/model_json").at(0), text_of(directory / "m.json"));
-}
-
-TEST(ModelExport, JsonComesBackTheSame) {
-  const test::TemporaryDirectory directory;
-  const AdditiveModel model = small_model();
   export_model(directory / "m.json", model, {});
-  const AdditiveModel back = read_model(directory / "m.json");
-  ASSERT_EQ(back.submodels.size(), 2U);
-  EXPECT_EQ(back.submodels[1].numerator[1], model.submodels[1].numerator[1]);
-  EXPECT_EQ(back.input_delay_s, model.input_delay_s);
+  EXPECT_EQ(file.read_texts("/model_json").at(0), read_whole_file(directory / "m.json"));
 }
 
 TEST(ModelExport, CsvHasOneLineACoefficient) {
   const test::TemporaryDirectory directory;
   export_model(directory / "m.csv", small_model(), {});
-  std::istringstream text(text_of(directory / "m.csv"));
+  std::istringstream text(read_whole_file(directory / "m.csv"));
   std::string line;
   std::vector<std::string> lines;
   while (std::getline(text, line))
@@ -108,10 +91,8 @@ TEST(ModelExport, WhatAFormatCannotHoldIsRefused) {
 TEST(ModelExport, LeavesNothingBesideItsFile) {
   const test::TemporaryDirectory directory;
   export_model(directory / "m.h5", small_model(), {});
-  int files = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory.path()))
-    ++files;
-  EXPECT_EQ(files, 1);
+  const std::filesystem::directory_iterator files(directory.path());
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
 }  // namespace test_model_export

@@ -1,10 +1,12 @@
-#include "tools/python/real_arrays.hpp"
+#include "tools/python/arguments.hpp"
 
 #include <fmt/format.h>
 
 #include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "acquisition/files/counted.hpp"
 
 namespace stageid {
 namespace {
@@ -49,6 +51,29 @@ FlagArray flag_array(const py::object& given, const char* name) {
   FlagArray flags = FlagArray::ensure(number_array(given, name).attr("__ne__")(0));
   if (!flags) refuse_type(name);
   return flags;
+}
+
+ChannelList channels(const char* group, long count, const char* prefix, const Names& names,
+                     const std::optional<Units>& units) {
+  ChannelList list;
+  if (names) list.names = *names;
+  if (!names)
+    for (long c = 1; c <= count; ++c) list.names.push_back(fmt::format("{}{}", prefix, c));
+  list.units.resize(list.size());
+  if (!units) return list;
+  if (units->size() != list.size())
+    throw std::invalid_argument(fmt::format("{}: {} for {}; give one per channel", group,
+                                            counted(units->size(), "unit"),
+                                            counted(list.size(), "channel")));
+  for (std::size_t c = 0; c < list.size(); ++c) list.units[c] = (*units)[c].value_or("");
+  return list;
+}
+
+Units units_of(const ChannelList& channels) {
+  Units units(channels.size());
+  for (std::size_t c = 0; c < channels.units.size() && c < units.size(); ++c)
+    if (!channels.units[c].empty()) units[c] = channels.units[c];
+  return units;
 }
 
 }  // namespace stageid
