@@ -17,6 +17,15 @@ def stub_tree():
     return ast.parse((PACKAGES / "stageid" / "__init__.pyi").read_text())
 
 
+def stub_docstrings(kind):
+    """(name, docstring) of the members of a class: attributes have theirs behind them."""
+    for member, after in zip(kind.body, [*kind.body[1:], None]):
+        if isinstance(member, ast.FunctionDef):
+            yield member.name, ast.get_docstring(member)
+        if isinstance(member, ast.AnnAssign):
+            yield member.target.id, inspect.cleandoc(after.value.value)
+
+
 def stub_parameters(function):
     """(name, keyword only, default as text or None) of every parameter but self."""
     a = function.args
@@ -32,27 +41,15 @@ def compiled_parameters(function, name):
         return [(p.name, p.kind is p.KEYWORD_ONLY, None if p.default is p.empty else repr(p.default))
                 for p in list(inspect.signature(function).parameters.values())[1:]]
     signature = re.match(rf"{name}\((.*)\) -> ", function.__doc__).group(1)
-    listed, only, depth, word = [], False, 0, ""
-    for character in signature + ",":
-        depth += character in "[({"
-        depth -= character in "])}"
-        if character != "," or depth > 0:
-            word += character
-            continue
-        word, part = "", word.strip()
-        if part == "*":
-            only = True
-        elif part and part.split(":")[0] != "self":
-            default = part.split(" = ")[1] if " = " in part else None
-            listed.append((part.split(":")[0], only, default))
-    return listed
+    return stub_parameters(ast.parse(f"def function({signature}): pass").body[0])
 
 
 class Stub(unittest.TestCase):
     def test_names(self):
         nodes = [n for n in stub_tree().body if isinstance(n, (ast.ClassDef, ast.FunctionDef))]
         names = {n.name for n in nodes} | {"__version__"}
-        results = {a.name for n in stub_tree().body if isinstance(n, ast.ImportFrom) for a in n.names if a.asname}
+        results = set(stageid._results.__all__)
+        self.assertIn("from stageid._results import *", map(ast.unparse, stub_tree().body))
         self.assertEqual(names | results, set(stageid.__all__))
         self.assertEqual(names, {n for n in dir(stageid._native) if n == "__version__" or not n.startswith("_")})
         self.assertEqual(results, {n for n, kind in vars(stageid._results).items() if isinstance(kind, type)
@@ -84,7 +81,7 @@ class Stub(unittest.TestCase):
         for node in stub_tree().body:
             if isinstance(node, ast.ClassDef) and node.name in ("Log", "Frf", "Model", "Fit"):
                 kind = getattr(stageid, node.name)
-                said = {m.name for m in node.body if isinstance(m, ast.FunctionDef)} - SPECIAL
+                said = {member for member, _ in stub_docstrings(node)} - SPECIAL
                 self.assertEqual(said, {name for name in vars(kind) if not name.startswith("_")})
 
     def test_docstrings(self):
@@ -107,10 +104,9 @@ class Stub(unittest.TestCase):
             if isinstance(node, ast.ClassDef):
                 kind = getattr(stageid, node.name)
                 self.assertEqual(inspect.getdoc(kind), ast.get_docstring(node))
-                for member in node.body:
-                    if isinstance(member, ast.FunctionDef):
-                        with self.subTest(f"{node.name}.{member.name}"):
-                            self.assertIn(ast.get_docstring(member), inspect.getdoc(getattr(kind, member.name)))
+                for member, text in stub_docstrings(node):
+                    with self.subTest(f"{node.name}.{member}"):
+                        self.assertIn(text, inspect.getdoc(getattr(kind, member)))
 
     def check_function(self, name, function):
         """Behind the signature stands a text; it tells of every parameter, and says what is raised."""

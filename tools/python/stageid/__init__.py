@@ -4,47 +4,9 @@ Results are identical to those of the program `stageid`, because both use the sa
 """
 
 from stageid import _conversions, _display, _native
-from stageid._native import (
-    FileError,
-    Fit,
-    FormatError,
-    Frf,
-    Log,
-    Model,
-    RequestError,
-    StageError,
-    StageidError,
-    __version__,
-    call,
-    cmif,
-    fit,
-    frf,
-    modes,
-    multisine,
-    pair_modes,
-    read_frf,
-    read_log,
-    read_model,
-    simulate,
-    stabilization,
-    validate,
-    write_frf,
-)
-from stageid._results import (
-    CandidateMode,
-    Covariance,
-    Finding,
-    FitRecord,
-    LogArrays,
-    Mode,
-    ModePair,
-    Run,
-    SampledStateSpace,
-    StabilizationPole,
-    StateSpace,
-    Submodel,
-    Validation,
-)
+from stageid._native import *
+from stageid._native import __version__
+from stageid._results import *
 
 __all__ = ["__version__", *(name for name in globals() if not name.startswith("_"))]
 

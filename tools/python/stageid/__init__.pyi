@@ -3,26 +3,14 @@
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Union
+from typing import Any, Final, Literal, Union
 
 import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
-from stageid._results import CandidateMode as CandidateMode
+from stageid._results import *
 from stageid._results import Complexes, Reals
-from stageid._results import Covariance as Covariance
-from stageid._results import Finding as Finding
-from stageid._results import FitRecord as FitRecord
-from stageid._results import LogArrays as LogArrays
-from stageid._results import Mode as Mode
-from stageid._results import ModePair as ModePair
-from stageid._results import Run as Run
-from stageid._results import SampledStateSpace as SampledStateSpace
-from stageid._results import StabilizationPole as StabilizationPole
-from stageid._results import StateSpace as StateSpace
-from stageid._results import Submodel as Submodel
-from stageid._results import Validation as Validation
 
 __version__: str
 
@@ -96,33 +84,24 @@ class Log:
         FormatError
             The runs are not whole periods.
         """
-    @property
-    def sample_rate_hz(self) -> float:
-        """Sample rate of the loop in Hz."""
-    @property
-    def period_samples(self) -> int:
-        """Samples per period of the excitation."""
-    @property
-    def transient_periods(self) -> int:
-        """Periods at the beginning of every run that an estimate discards."""
-    @property
-    def realizations(self) -> list[int]:
-        """Realizations with a complete run, counted from 1 and ascending."""
-    @property
-    def excitation(self) -> list[str]:
-        """Names of the excited channels, [n_r]."""
-    @property
-    def actuators(self) -> list[str]:
-        """Names of the actuators, [n_u]."""
-    @property
-    def sensors(self) -> list[str]:
-        """Names of the sensors, [n_y]."""
-    @property
-    def actuator_units(self) -> list[str | None]:
-        """Units of the actuators, [n_u]; None: unknown."""
-    @property
-    def sensor_units(self) -> list[str | None]:
-        """Units of the sensors, [n_y]; None: unknown."""
+    sample_rate_hz: Final[float]
+    """Sample rate of the loop in Hz."""
+    period_samples: Final[int]
+    """Samples per period of the excitation."""
+    transient_periods: Final[int]
+    """Periods at the beginning of every run that an estimate discards."""
+    realizations: Final[list[int]]
+    """Realizations with a complete run, counted from 1 and ascending."""
+    excitation: Final[list[str]]
+    """Names of the excited channels, [n_r]."""
+    actuators: Final[list[str]]
+    """Names of the actuators, [n_u]."""
+    sensors: Final[list[str]]
+    """Names of the sensors, [n_y]."""
+    actuator_units: Final[list[str | None]]
+    """Units of the actuators, [n_u]; None: unknown."""
+    sensor_units: Final[list[str | None]]
+    """Units of the sensors, [n_y]; None: unknown."""
     def __len__(self) -> int:
         """Number of runs, including incomplete ones."""
     def __iter__(self) -> Iterator[Run]:
@@ -196,57 +175,40 @@ class Frf:
         RequestError
             Shapes do not match, or values are not finite.
         """
-    @property
-    def frequency_hz(self) -> Reals:
-        """Frequencies in Hz, [N], increasing."""
-    @property
-    def response(self) -> Complexes:
-        """G(j omega_k), complex128 [N, n_y, n_u], unit of output over unit of input."""
-    @property
-    def noise_variance(self) -> Reals | None:
-        """E|dG|^2 due to noise, from periods, float64 [N, n_y, n_u]; None: unknown."""
-    @property
-    def total_variance(self) -> Reals | None:
-        """E|dG|^2 due to noise and nonlinearity, from realizations, float64 [N, n_y, n_u]; None: unknown."""
-    @property
-    def noise_dof(self) -> float | None:
-        """Complex degrees of freedom of noise_variance; None: unknown."""
-    @property
-    def total_dof(self) -> float | None:
-        """Complex degrees of freedom of total_variance; None: unknown."""
-    @property
-    def correlated_lines(self) -> float:
-        """Number of lines per independent line in zippered experiments; else 1."""
-    @property
-    def inputs(self) -> list[str]:
-        """Names of the inputs, [n_u]."""
-    @property
-    def outputs(self) -> list[str]:
-        """Names of the outputs, [n_y]."""
-    @property
-    def input_units(self) -> list[str | None]:
-        """Units of the inputs, [n_u]; None: unknown."""
-    @property
-    def output_units(self) -> list[str | None]:
-        """Units of the outputs, [n_y]; None: unknown."""
-    @property
-    def sample_rate_hz(self) -> float | None:
-        """Sample rate of the loop in Hz; None: unknown."""
-    @property
-    def hold(self) -> str:
-        """'zoh' if the response was measured in a digital loop, 'none' for a continuous-time plant."""
-    @property
-    def compensated(self) -> str | None:
-        """'delay' or 'hold' if the response is compensated for it; None: not compensated."""
-    @property
-    def delay_s(self) -> float | None:
-        """Compensated delay in s, without that of the hold; None: not compensated."""
-    @property
-    def provenance_json(self) -> str:
-        """Input files with their hashes, options and versions, as JSON."""
-    @property
-    def health(self) -> list[Finding]:
-        """Findings in the data, as `stageid frf` lists them."""
+    frequency_hz: Final[Reals]
+    """Frequencies in Hz, [N], increasing."""
+    response: Final[Complexes]
+    """G(j omega_k), complex128 [N, n_y, n_u], unit of output over unit of input."""
+    noise_variance: Final[Reals | None]
+    """E|dG|^2 due to noise, from periods, float64 [N, n_y, n_u]; None: unknown."""
+    total_variance: Final[Reals | None]
+    """E|dG|^2 due to noise and nonlinearity, from realizations, float64 [N, n_y, n_u]; None: unknown."""
+    noise_dof: Final[float | None]
+    """Complex degrees of freedom of noise_variance; None: unknown."""
+    total_dof: Final[float | None]
+    """Complex degrees of freedom of total_variance; None: unknown."""
+    correlated_lines: Final[float]
+    """Number of lines per independent line in zippered experiments; else 1."""
+    inputs: Final[list[str]]
+    """Names of the inputs, [n_u]."""
+    outputs: Final[list[str]]
+    """Names of the outputs, [n_y]."""
+    input_units: Final[list[str | None]]
+    """Units of the inputs, [n_u]; None: unknown."""
+    output_units: Final[list[str | None]]
+    """Units of the outputs, [n_y]; None: unknown."""
+    sample_rate_hz: Final[float | None]
+    """Sample rate of the loop in Hz; None: unknown."""
+    hold: Final[str]
+    """'zoh' if the response was measured in a digital loop, 'none' for a continuous-time plant."""
+    compensated: Final[str | None]
+    """'delay' or 'hold' if the response is compensated for it; None: not compensated."""
+    delay_s: Final[float | None]
+    """Compensated delay in s, without that of the hold; None: not compensated."""
+    provenance_json: Final[str]
+    """Input files with their hashes, options and versions, as JSON."""
+    health: Final[list[Finding]]
+    """Findings in the data, as `stageid frf` lists them."""
     def select(
         self,
         *,
@@ -332,42 +294,31 @@ class Model:
     prototype wafer stage, equations (1) to (4).
     """
 
-    @property
-    def inputs(self) -> list[str]:
-        """Names of the inputs, [n_u]."""
-    @property
-    def outputs(self) -> list[str]:
-        """Names of the outputs, [n_y]."""
-    @property
-    def sample_rate_hz(self) -> float | None:
-        """Sample rate of the loop in Hz; None: unknown."""
-    @property
-    def hold(self) -> str:
-        """Hold of the sampled data to which the model was fitted: 'none', 'phase', 'sinc' or 'exact'."""
-    @property
-    def input_delay_s(self) -> Reals:
-        """Delays in s, [n_u]."""
-    @property
-    def output_delay_s(self) -> Reals:
-        """Delays in s, [n_y]."""
-    @property
-    def input_delay_std_s(self) -> Reals | None:
-        """Standard deviations in s, [n_u]; None: the delay was given, or unknown."""
-    @property
-    def output_delay_std_s(self) -> Reals | None:
-        """Standard deviations in s, [n_y]; None: the delay was given, or unknown.
+    inputs: Final[list[str]]
+    """Names of the inputs, [n_u]."""
+    outputs: Final[list[str]]
+    """Names of the outputs, [n_y]."""
+    sample_rate_hz: Final[float | None]
+    """Sample rate of the loop in Hz; None: unknown."""
+    hold: Final[str]
+    """Hold of the sampled data to which the model was fitted: 'none', 'phase', 'sinc' or 'exact'."""
+    input_delay_s: Final[Reals]
+    """Delays in s, [n_u]."""
+    output_delay_s: Final[Reals]
+    """Delays in s, [n_y]."""
+    input_delay_std_s: Final[Reals | None]
+    """Standard deviations in s, [n_u]; None: the delay was given, or unknown."""
+    output_delay_std_s: Final[Reals | None]
+    """Standard deviations in s, [n_y]; None: the delay was given, or unknown.
 
-        With delays per channel, the last output is the reference; its deviation is 0.
-        """
-    @property
-    def submodels(self) -> list[Submodel]:
-        """The terms of the sum, in SI units, with s in rad/s."""
-    @property
-    def fit(self) -> FitRecord:
-        """How the model was fitted."""
-    @property
-    def provenance_json(self) -> str:
-        """Input files with their hashes, options and versions, as JSON."""
+    With delays per channel, the last output is the reference; its deviation is 0.
+    """
+    submodels: Final[list[Submodel]]
+    """The terms of the sum, in SI units, with s in rad/s."""
+    fit: Final[FitRecord]
+    """How the model was fitted."""
+    provenance_json: Final[str]
+    """Input files with their hashes, options and versions, as JSON."""
     def response(self, frequency_hz: ArrayLike) -> Complexes:
         """P(j omega) including the hold and the delays of the model. The result is not copied.
 
@@ -442,36 +393,27 @@ class Model:
 class Fit:
     """The result of a fit: the model, the decisions on the way, and whether it is trustworthy."""
 
-    @property
-    def model(self) -> Model:
-        """The fitted model (a copy)."""
-    @property
-    def trustworthy(self) -> bool:
-        """False if `stageid fit` would end with exit code 3."""
-    @property
-    def status(self) -> str:
-        """'gradient_small', 'step_small', or the reason why the fit is not trustworthy."""
-    @property
-    def message(self) -> str | None:
-        """How the fit ended, in one line; None: there is nothing to report."""
-    @property
-    def cost(self) -> list[float]:
-        """Cost 1/(2N) sum vec(E)^H W vec(E) per iteration, beginning with the start; equation (8) of the paper."""
-    @property
-    def decisions(self) -> list[str]:
-        """What was chosen and why, one line per decision."""
-    @property
-    def removal_cost(self) -> list[float]:
-        """Increase of sum W |E|^2 without each submodel."""
-    @property
-    def response_variance(self) -> Reals | None:
-        """E|dP|^2 of the model's response on the fitted lines, float64 [N, n_y, n_u]; None: unknown.
+    model: Final[Model]
+    """The fitted model (a copy)."""
+    trustworthy: Final[bool]
+    """False if `stageid fit` would end with exit code 3."""
+    status: Final[str]
+    """'gradient_small', 'step_small', or the reason why the fit is not trustworthy."""
+    message: Final[str | None]
+    """How the fit ended, in one line; None: there is nothing to report."""
+    cost: Final[list[float]]
+    """Cost 1/(2N) sum vec(E)^H W vec(E) per iteration, beginning with the start; equation (8) of the paper."""
+    decisions: Final[list[str]]
+    """What was chosen and why, one line per decision."""
+    removal_cost: Final[list[float]]
+    """Increase of sum W |E|^2 without each submodel."""
+    response_variance: Final[Reals | None]
+    """E|dP|^2 of the model's response on the fitted lines, float64 [N, n_y, n_u]; None: unknown.
 
-        A read-only view, not a copy.
-        """
-    @property
-    def covariance(self) -> Covariance | None:
-        """Covariance of the parameters, as `stageid fit --covariance` writes it; None: not requested, or unknown."""
+    A read-only view, not a copy.
+    """
+    covariance: Final[Covariance | None]
+    """Covariance of the parameters, as `stageid fit --covariance` writes it; None: not requested, or unknown."""
 
 def call(*args: object) -> int:
     """Runs a command of the program in this process: call('fit', 'frf.h5', '-o', 'model.json').

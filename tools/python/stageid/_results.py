@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["CandidateMode", "Covariance", "Finding", "FitRecord", "LogArrays", "Mode", "ModePair", "Run",
+           "SampledStateSpace", "StabilizationPole", "StateSpace", "Submodel", "Validation"]
+
 Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
