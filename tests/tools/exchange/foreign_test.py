@@ -19,8 +19,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
-from exchange_test import WORK, Case, everything, run
-from import_test import write_map
+from exchange_test import WORK, Case, content, everything, run
 
 SPARSE = np.array([[0, 1.5, 0], [2, 0, -3.0]])
 
@@ -109,10 +108,8 @@ class Matlab(Case):
             scipy.io.savemat(WORK / name, {"S": scipy.sparse.csc_matrix(values)})
             self.assertEqual(self.listed(name), {"S": {"name": "S", "size": [2, 3], "holds": kind}})
         scipy.io.savemat(WORK / "z.mat", {"G": sparse.astype(complex), "f": np.arange(1.0, 4.0)}, do_compression=True)
-        write_map("kind: frf\nfrequency: f\nresponse: G\naxes: [output, line, input]\n")
-        self.succeed("import", "z.mat", "-o", "back.h5", "--map", "map.yaml")
-        with h5py.File(WORK / "back.h5") as f:
-            np.testing.assert_array_equal(f["response"][:, :, 0], SPARSE.T)
+        self.imports("z.mat", map="kind: frf\nfrequency: f\nresponse: G\naxes: [output, line, input]\n")
+        np.testing.assert_array_equal(content()["response"][:, :, 0], SPARSE.T)
         scipy.io.savemat(WORK / "big.mat", {"S": scipy.sparse.csc_matrix((10**6, 10**6))})
         self.refuse("S: is a sparse matrix of 1000000 x 1000000, too large", "import", "big.mat", "--json")
 
@@ -128,9 +125,8 @@ class Matlab(Case):
                 self.assertEqual(listed["T"]["holds"], "MATLAB object (table)")
                 shown = self.succeed("import", "x.mat").stdout
                 self.assertIn("T: MATLAB object (table) cannot be read. Save its contents as arrays in MATLAB", shown)
-                write_map("kind: frf\nfrequency: T.f\nresponse: x\n")
-                self.refuse("T: MATLAB object (table) cannot be read. Save its contents", "import", "x.mat", "-o", "n.h5",
-                            "--map", "map.yaml")
+                self.refuses("T: MATLAB object (table) cannot be read. Save its contents", "x.mat",
+                             "kind: frf\nfrequency: T.f\nresponse: x\n")
 
     def test_version_73_with_all_of_it(self):
         write_v73(WORK / "x.mat", everything_in_v73)
@@ -255,19 +251,18 @@ class Touchstone(Case):
                 + "\n" for k in range(4)]
             (WORK / "x.s2p").write_text("".join(lines) + "# HZ S RI R 1\n")
             shown = self.succeed("import", "x.s2p", "-o", "back.h5").stdout
-            with h5py.File(WORK / "back.h5") as f:
-                np.testing.assert_allclose(f["response"][()], true, rtol=1e-14)
-                found = tuple("".join(np.broadcast_to(f[side].attrs["unit"], 2)) for side in ("outputs", "inputs"))
+            back = content()
+            np.testing.assert_allclose(back["response"], true, rtol=1e-14)
+            found = tuple("".join(np.broadcast_to(back[f"{side}@unit"], 2)) for side in ("outputs", "inputs"))
             self.assertEqual(found, units[kind])
             self.assertEqual("reference resistance 75 ohm" in shown, kind != "S", shown)
         (WORK / "x.s1p").write_text("# HZ Z RI\n1 2 0\n2 2 0\n")
         self.succeed("import", "x.s1p", "-o", "back.h5")  # 50 ohm where nothing is said
-        with h5py.File(WORK / "back.h5") as f:
-            np.testing.assert_array_equal(f["response"][:, 0, 0], [100, 100])
-        (WORK / "x.s1p").write_text("# HZ H RI\n1 2 0\n")
-        self.refuse("H parameters need two ports, the file name declares 1", "import", "x.s1p", "-o", "n.h5")
-        (WORK / "x.s1p").write_text("# HZ Z RI R 0\n1 2 0\n")
-        self.refuse("'0' is not a reference resistance", "import", "x.s1p", "-o", "n.h5")
+        np.testing.assert_array_equal(content()["response"][:, 0, 0], [100, 100])
+        for head, text in (("# HZ H RI", "H parameters need two ports, the file name declares 1"),
+                           ("# HZ Z RI R 0", "'0' is not a reference resistance")):
+            (WORK / "x.s1p").write_text(f"{head}\n1 2 0\n")
+            self.refuse(text, "import", "x.s1p", "-o", "n.h5")
 
 
 class Tables(Case):
@@ -286,8 +281,7 @@ class Tables(Case):
             del f["total_variance"], f["noise_variance"]
         self.succeed("export", frf, "-o", "f.csv")
         self.succeed("import", "f.csv", "-o", "back.h5")
-        with h5py.File(WORK / "back.h5") as f:
-            self.assertNotIn("noise_variance", f)
+        self.assertNotIn("noise_variance", content())
 
     def test_tables_without_the_description(self):
         """As exports were before: names and units from the titles of the columns."""
@@ -298,17 +292,16 @@ class Tables(Case):
         lines = (WORK / "f.csv").read_text().splitlines(keepends=True)
         (WORK / "f.csv").write_text("".join(line for line in lines if not line.startswith("# {")))
         self.succeed("import", "f.csv", "-o", "back.h5")
-        with h5py.File(frf) as a, h5py.File(WORK / "back.h5") as b:
-            for name in ("frequency_hz", "response", "noise_variance", "total_variance", "outputs", "inputs"):
-                np.testing.assert_array_equal(a[name][()], b[name][()])
-            self.assertEqual(list(b["outputs"].attrs["unit"]), ["m/s^2", "rad"])
-        head = lines[3].replace("real z1/", "real z/1/")
-        (WORK / "f.csv").write_text("".join([head] + lines[4:]))
-        self.refuse("contain slashes and cannot be separated. Write a map", "import", "f.csv", "-o", "n.h5")
-        (WORK / "f.csv").write_text("".join(lines[:2] + [lines[2][:-8] + "\n"] + lines[3:]))
-        self.refuse("is damaged", "import", "f.csv", "-o", "n.h5")
-        (WORK / "f.csv").write_text("".join(lines[:3] + [lines[3].replace("imaginary z1/", "imaginary q1/", 1)] + lines[4:]))
-        self.refuse("has no 'imaginary z1/", "import", "f.csv", "-o", "n.h5")
+        given, back = content(frf), content()
+        for name in ("frequency_hz", "response", "noise_variance", "total_variance", "outputs", "inputs"):
+            np.testing.assert_array_equal(given[name], back[name])
+        self.assertEqual(back["outputs@unit"], ["m/s^2", "rad"])
+        head = lines[3]
+        for begin, text in (([head.replace("real z1/", "real z/1/")], "contain slashes and cannot be separated. Write a map"),
+                            (lines[:2] + [lines[2][:-8] + "\n", head], "is damaged"),
+                            (lines[:3] + [head.replace("imaginary z1/", "imaginary q1/", 1)], "has no 'imaginary z1/")):
+            (WORK / "f.csv").write_text("".join(begin + lines[4:]))
+            self.refuse(text, "import", "f.csv", "-o", "n.h5")
 
 
 if __name__ == "__main__":

@@ -13,18 +13,9 @@ import h5py
 import numpy as np
 import scipy.io
 
-from exchange_test import FREQUENCY_HZ, WORK, Case, random_frf
+from exchange_test import FREQUENCY_HZ, WORK, Case, content, random_frf
 
 G = random_frf()["response"]  # lines x 2 x 3
-
-
-def imported(name="back.h5"):
-    with h5py.File(WORK / name) as f:
-        return f["frequency_hz"][()], f["response"][()]
-
-
-def write_map(text):
-    (WORK / "map.yaml").write_text(text)
 
 
 def uff_function(y, reference, response, x=None, kind=4, double=True, binary=None):
@@ -65,13 +56,11 @@ class ByThemselves(Case):
                     uff_function(G[:, i, j], (101 + j, -3), (i + 1, 3), binary=binary)
                     for i in range(2) for j in range(3)))
                 self.succeed("import", "x.uff", "-o", "back.h5")
-                f, g = imported()
-                np.testing.assert_allclose(f, FREQUENCY_HZ, rtol=1e-5 if binary is None else 0)
-                np.testing.assert_allclose(g, G, rtol=tolerance)
-                with h5py.File(WORK / "back.h5") as h5:
-                    self.assertEqual(list(h5["outputs"].asstr()), ["1+Z", "2+Z"])
-                    self.assertEqual(list(h5["inputs"].asstr()), ["101-Z", "102-Z", "103-Z"])
-                    self.assertEqual(h5["outputs"].attrs["unit"], "m/s^2")
+                back = content()
+                np.testing.assert_allclose(back["frequency_hz"], FREQUENCY_HZ, rtol=1e-5 if binary is None else 0)
+                np.testing.assert_allclose(back["response"], G, rtol=tolerance)
+                self.assertEqual((back["outputs"], back["inputs"], back["outputs@unit"]),
+                                 (["1+Z", "2+Z"], ["101-Z", "102-Z", "103-Z"], "m/s^2"))
 
     def test_universal_files_of_programs_that_number_no_node(self):
         """Latin-1, channels named by the label of the ordinate or the first line, several without any name."""
@@ -100,15 +89,12 @@ class ByThemselves(Case):
     def test_units_of_a_universal_file_become_si(self):
         units = (f"    -1\n   164\n{5:10}{'mm (milli newton)':20}{2:10}\n"
                  + "".join(f"{v:25.16e}".replace("e", "D") for v in (1000.0, 1000.0, 1.0)) + f"\n{0:25.16e}\n    -1\n")
-        # mm/s^2 over mN are m/s^2 over N; length alone counts for the ordinate, force for the reference.
-        (WORK / "x.unv").write_bytes(units.replace("D+03", "D+03", 1).encode()
-                                     + uff_function(G[:, 0, 0], (1, 3), (2, 3), binary="<"))
-        self.succeed("import", "x.unv", "-o", "back.h5")
-        np.testing.assert_allclose(imported()[1][:, 0, 0], G[:, 0, 0], rtol=1e-15)
         inches = units.replace(f"{1000.0:25.16e}".replace("e", "D"), f"{40.0:25.16e}".replace("e", "D"), 1)
-        (WORK / "x.unv").write_bytes(inches.encode() + uff_function(G[:, 0, 0], (1, 3), (2, 3), binary="<"))
-        self.succeed("import", "x.unv", "-o", "back.h5")
-        np.testing.assert_allclose(imported()[1][:, 0, 0], G[:, 0, 0] * 1000 / 40, rtol=1e-15)
+        # mm/s^2 over mN are m/s^2 over N; length alone counts for the ordinate, force for the reference.
+        for given, factor in ((units, 1), (inches, 1000 / 40)):
+            (WORK / "x.unv").write_bytes(given.encode() + uff_function(G[:, 0, 0], (1, 3), (2, 3), binary="<"))
+            self.succeed("import", "x.unv", "-o", "back.h5")
+            np.testing.assert_allclose(content()["response"][:, 0, 0], G[:, 0, 0] * factor, rtol=1e-15)
 
     def test_touchstone(self):
         s = G[:4, :2, :2] * 1e7
@@ -122,17 +108,12 @@ class ByThemselves(Case):
                 lines.append(f"{k + 1} " + " ".join(f"{v:.17g}" for v in numbers) + " ! here\n")
             (WORK / "x.s2p").write_text("".join(lines))
             self.succeed("import", "x.s2p", "-o", "back.h5")
-            f, g = imported()
-            np.testing.assert_array_equal(f, [1e6, 2e6, 3e6, 4e6])
-            np.testing.assert_allclose(g, s, rtol=1e-13)
-        self.refuse("Touchstone 2", "import", self.text("y.s1p", "[Version] 2.0\n"),
-                    "-o", "n.h5")
-        self.refuse("are not complete lines of", "import", self.text("y.s3p", "# Hz S RI\n1 2 3\n"), "-o", "n.h5")
-        self.refuse("'x'", "import", self.text("y.s1p", "1 2 x\n"), "-o", "n.h5")
-
-    def text(self, name, content):
-        (WORK / name).write_text(content)
-        return name
+            np.testing.assert_array_equal(content()["frequency_hz"], [1e6, 2e6, 3e6, 4e6])
+            np.testing.assert_allclose(content()["response"], s, rtol=1e-13)
+        for name, text, error in (("y.s1p", "[Version] 2.0\n", "Touchstone 2"), ("y.s1p", "1 2 x\n", "'x'"),
+                                  ("y.s3p", "# Hz S RI\n1 2 3\n", "are not complete lines of")):
+            (WORK / name).write_text(text)
+            self.refuse(error, "import", name, "-o", "n.h5")
 
 
 class WithAMap(Case):
@@ -144,24 +125,18 @@ class WithAMap(Case):
             f["s/w"], f["s/G"] = 2 * np.pi * FREQUENCY_HZ, turned
         for name, prefix in (("x.mat", "s."), ("x.npz", ""), ("x.h5", "s/")):
             with self.subTest(name):
-                write_map(f"kind: frf\nfrequency: {prefix}w\nfrequency_unit: rad/s\nresponse: {prefix}G\n"
-                          "axes: [output, input, line]\noutputs: [p, q]\noutput_unit: m rad\n"
-                          "input_unit: N\n")
-                self.succeed("import", name, "-o", "back.h5", "--map", "map.yaml")
-                f, g = imported()
-                np.testing.assert_allclose(f, FREQUENCY_HZ, rtol=1e-15)
-                np.testing.assert_array_equal(g, G)
-                with h5py.File(WORK / "back.h5") as h5:
-                    self.assertEqual(list(h5["outputs"].asstr()), ["p", "q"])
-                    self.assertEqual(list(h5["inputs"].asstr()), ["u1", "u2", "u3"])
-                    self.assertEqual(list(h5["outputs"].attrs["unit"]), ["m", "rad"])
+                self.imports(name, map=f"kind: frf\nfrequency: {prefix}w\nfrequency_unit: rad/s\n"
+                             f"response: {prefix}G\naxes: [output, input, line]\noutputs: [p, q]\n"
+                             "output_unit: m rad\ninput_unit: N\n")
+                back = content()
+                np.testing.assert_allclose(back["frequency_hz"], FREQUENCY_HZ, rtol=1e-15)
+                np.testing.assert_array_equal(back["response"], G)
+                self.assertEqual((back["outputs"], back["inputs"], back["outputs@unit"]),
+                                 (["p", "q"], ["u1", "u2", "u3"], ["m", "rad"]))
         self.refuse("write a map", "import", "x.npz", "-o", "n.h5")
-        write_map("kind: frf\nfrequency: w\nresponse: G\n")
-        self.refuse("key 'axes' is missing", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
-        write_map("kind: frf\nfrequency: v\nresponse: G\n")
-        self.refuse("has no 'v'; it contains w, G", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
-        write_map("kind: frf\nfrequency: w\n")
-        self.refuse("map.yaml:1:", "import", "x.npz", "-o", "n.h5", "--map", "map.yaml")
+        self.refuses("key 'axes' is missing", "x.npz", "kind: frf\nfrequency: w\nresponse: G\n")
+        self.refuses("has no 'v'; it contains w, G", "x.npz", "kind: frf\nfrequency: v\nresponse: G\n")
+        self.refuses("map.yaml:1:", "x.npz", "kind: frf\nfrequency: w\n")
 
     def test_columns_of_a_table(self):
         y = G[:, 0, 0]
@@ -169,21 +144,19 @@ class WithAMap(Case):
         text = "f;mag;deg;re;im;\n" + "".join(
             ";".join(repr(float(v)).replace(".", ",") for v in row) + ";\n" for row in rows)
         (WORK / "x.csv").write_text(text)
-        write_map("kind: frf\nfrequency: f\nchannels:\n"
-                  "- {output: y, input: a, magnitude: mag, phase_deg: deg}\n"
-                  "- {output: y, input: b, real: re, imaginary: im}\n")
-        self.succeed("import", "x.csv", "-o", "back.h5", "--map", "map.yaml")
-        f, g = imported()
-        np.testing.assert_array_equal(f, FREQUENCY_HZ)
-        np.testing.assert_allclose(g[:, 0, 0], y, rtol=1e-14)
-        np.testing.assert_array_equal(g[:, 0, 1], y)
-        (WORK / "x.csv").write_text(text.replace(";deg;", ";mag;"))
-        self.refuse("x.csv:1: duplicate column name", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
-        (WORK / "x.csv").write_text(text + "1;2;nonsense;4;5;\n")
-        self.refuse("got 'nonsense' in column 3", "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
-        (WORK / "x.csv").write_text(text + "1;2;" + "nonsense" * 9 + ";4;5;\n")
-        self.refuse("'" + ("nonsense" * 9)[:37] + "...' in column 3",
-                    "import", "x.csv", "-o", "n.h5", "--map", "map.yaml")
+        self.imports("x.csv", map="kind: frf\nfrequency: f\nchannels:\n"
+                     "- {output: y, input: a, magnitude: mag, phase_deg: deg}\n"
+                     "- {output: y, input: b, real: re, imaginary: im}\n")
+        back = content()
+        np.testing.assert_array_equal(back["frequency_hz"], FREQUENCY_HZ)
+        np.testing.assert_allclose(back["response"][:, 0, 0], y, rtol=1e-14)
+        np.testing.assert_array_equal(back["response"][:, 0, 1], y)
+        for wrong, error in ((text.replace(";deg;", ";mag;"), "x.csv:1: duplicate column name"),
+                             (text + "1;2;nonsense;4;5;\n", "got 'nonsense' in column 3"),
+                             (text + "1;2;" + "nonsense" * 9 + ";4;5;\n",
+                              "'" + ("nonsense" * 9)[:37] + "...' in column 3")):
+            (WORK / "x.csv").write_text(wrong)
+            self.refuses(error, "x.csv")
 
     def test_names_that_hold_what_stands_between_fields(self):
         names = ["f", "a;b", "c\td", 'say "x;y", z']
@@ -205,30 +178,26 @@ class WithAMap(Case):
         with open(WORK / "f.csv", encoding="utf-8") as file:
             head, *rows = csv.reader(line for line in file if not line.startswith("#"))
         columns = dict(zip(head, np.array(rows, dtype=float).T))
-        with h5py.File(frf) as f:
-            response, noise, total = (f[name][:] for name in ("response", "noise_variance", "total_variance"))
-            names = [list(f[side].asstr()) for side in ("outputs", "inputs")]
-            units = [np.broadcast_to(f[side].attrs["unit"], f[side].shape) for side in ("outputs", "inputs")]
+        given = content(frf)
+        response, noise, total = (given[name] for name in ("response", "noise_variance", "total_variance"))
         np.testing.assert_array_equal(columns["frequency_hz"], FREQUENCY_HZ)
         channels = []
-        for i, output in enumerate(names[0]):
-            for j, given in enumerate(names[1]):
-                unit = f"{units[0][i]}/{units[1][j]}"
-                called = {part: f"{part} {output}/{given} [{unit}]" for part in ("real", "imaginary")}
-                called |= {part: f"{part} {output}/{given} [({unit})^2]" for part in ("noise_variance", "total_variance")}
+        for i, output in enumerate(given["outputs"]):
+            for j, input in enumerate(given["inputs"]):
+                unit = f"{given['outputs@unit'][i]}/{given['inputs@unit']}"
+                called = {part: f"{part} {output}/{input} [{unit}]" for part in ("real", "imaginary")}
+                called |= {part: f"{part} {output}/{input} [({unit})^2]" for part in ("noise_variance", "total_variance")}
                 for part, values in (("real", response.real), ("imaginary", response.imag),
                                      ("noise_variance", noise), ("total_variance", total)):  # fmt: skip
                     np.testing.assert_array_equal(columns[called[part]], values[:, i, j])
-                channels.append({"output": output, "input": given} | called)
+                channels.append({"output": output, "input": input} | called)
         self.assertEqual(len(head), 1 + 4 * len(channels))
-        write_map(f"kind: frf\nfrequency: frequency_hz\nchannels: {json.dumps(channels)}\n")
-        self.succeed("import", "f.csv", "-o", "back.h5", "--map", "map.yaml")
-        with h5py.File(WORK / "back.h5") as f:
-            for name, values in (("response", response), ("noise_variance", noise), ("total_variance", total)):
-                np.testing.assert_array_equal(f[name][:], values)
+        head = "kind: frf\nfrequency: frequency_hz\nchannels: "
+        self.imports("f.csv", map=head + json.dumps(channels))
+        for name in ("response", "noise_variance", "total_variance"):
+            np.testing.assert_array_equal(content()[name], given[name])
         del channels[2]["noise_variance"]
-        write_map(f"kind: frf\nfrequency: frequency_hz\nchannels: {json.dumps(channels)}\n")
-        self.refuse("for all channels or for none", "import", "f.csv", "-o", "n.h5", "--map", "map.yaml")
+        self.refuses("for all channels or for none", "f.csv", head + json.dumps(channels))
 
     def test_a_log(self):
         g = np.random.default_rng(4)
@@ -238,36 +207,26 @@ class WithAMap(Case):
         text = ("kind: log\nsample_rate_hz: 100\nperiod_samples: 50\ntransient_periods: 1\n"
                 "excitation: {arrays: [r], unit: N}\nactuators: {arrays: [u], unit: N}\n"
                 "sensors: {arrays: [y], names: [y1, y2], unit: m rad, scale: [0.001, 1]}\n")
-        write_map(text)
         for name in ("run.h5", "run.slog"):
-            self.succeed("import", "x.mat", "-o", name, "--map", "map.yaml")
+            self.imports("x.mat", name, text)
             self.succeed("log", "verify", name)
-        with h5py.File(WORK / "run.h5") as h5:
-            run = h5["runs/0000"]
-            np.testing.assert_array_equal(run["excitation"][()], r[:50])
-            np.testing.assert_array_equal(run["actuators"][()], u)
-            np.testing.assert_array_equal(run["sensors"][()], y * [0.001, 1])
-            self.assertEqual(list(h5["channels/sensors"].asstr()), ["y1", "y2"])
-        write_map(text.replace("names: [y1, y2], ", ""))
-        self.refuse("write names", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
-        write_map(text.replace("sample_rate_hz: 100\n", ""))
-        self.refuse("needs sample_rate_hz", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
-        write_map(text.replace("period_samples: 50", "period_samples: 60"))
-        self.refuse("not a multiple of period_samples", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        h5 = content("run.h5")
+        for name, values in (("excitation", r[:50]), ("actuators", u), ("sensors", y * [0.001, 1])):
+            np.testing.assert_array_equal(h5[f"runs/0000/{name}"], values)
+        self.assertEqual(h5["channels/sensors"], ["y1", "y2"])
+        self.refuses("write names", "x.mat", text.replace("names: [y1, y2], ", ""))
+        self.refuses("needs sample_rate_hz", "x.mat", text.replace("sample_rate_hz: 100\n", ""))
+        self.refuses("not a multiple of period_samples", "x.mat", text.replace("period_samples: 50", "period_samples: 60"))
         scipy.io.savemat(WORK / "x.mat", {"r": r + 1e-3 * g.normal(size=r.shape), "u": u, "y": y})
-        write_map(text)
-        self.refuse("excitation_period: mean", "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
+        self.refuses("excitation_period: mean", "x.mat", text)
+        text += "excitation_period: mean\n"
         for second in ("{first_row: 100}", "{realization: 0, experiment: 0}"):
-            write_map(text + f"excitation_period: mean\nruns: [{{first_row: 0, rows: 100}}, {{experiment: 1}}, {second}]\n")
-            error = self.refuse("entries 1 and 3 of runs are both realization: 0, experiment: 0",
-                                "import", "x.mat", "-o", "n.slog", "--map", "map.yaml")
-            self.assertFalse((WORK / "n.slog").exists())
+            error = self.refuses("entries 1 and 3 of runs are both realization: 0, experiment: 0", "x.mat",
+                                 f"{text}runs: [{{first_row: 0, rows: 100}}, {{experiment: 1}}, {second}]\n")
             self.assertRegex(error, r"map.yaml:9:\d+: ")
-        write_map(text + "excitation_period: mean\nruns: [{experiment: 2, first_row: 100, rows: 100}]\n")
-        self.succeed("import", "x.mat", "-o", "run.h5", "--map", "map.yaml")
-        with h5py.File(WORK / "run.h5") as h5:
-            self.assertEqual(h5["runs/0000"].attrs["experiment"], 2)
-            np.testing.assert_array_equal(h5["runs/0000/actuators"][()], u[100:])
+        self.imports("x.mat", "run.h5", text + "runs: [{experiment: 2, first_row: 100, rows: 100}]\n")
+        self.assertEqual(content("run.h5")["runs/0000@experiment"], 2)
+        np.testing.assert_array_equal(content("run.h5")["runs/0000/actuators"], u[100:])
 
 
 class Logs(Case):
@@ -311,38 +270,35 @@ class Logs(Case):
 
     def test_matlab_comes_back_through_a_map(self):
         self.succeed("log", "convert", "log.h5", "-o", "log.mat")
-        write_map("kind: log\nsample_rate_hz: 100\nperiod_samples: 50\ntransient_periods: 1\n"
-                  "excitation: {arrays: [run0000/excitation], names: [r], unit: N}\n"
-                  "actuators: {arrays: [run0000/actuators], names: [a], unit: N}\n"
-                  "sensors: {arrays: [run0000/sensors], names: [z1, z2], unit: m}\n")
-        self.succeed("import", "log.mat", "-o", "back.h5", "--map", "map.yaml")
-        with h5py.File(WORK / "back.h5") as f:
-            np.testing.assert_array_equal(f["runs/0000/sensors"][()], self.y[0])
-            np.testing.assert_array_equal(f["runs/0000/actuators"][()], self.u[0])
+        self.imports("log.mat", map="kind: log\nsample_rate_hz: 100\nperiod_samples: 50\ntransient_periods: 1\n"
+                     "excitation: {arrays: [run0000/excitation], names: [r], unit: N}\n"
+                     "actuators: {arrays: [run0000/actuators], names: [a], unit: N}\n"
+                     "sensors: {arrays: [run0000/sensors], names: [z1, z2], unit: m}\n")
+        np.testing.assert_array_equal(content()["runs/0000/sensors"], self.y[0])
+        np.testing.assert_array_equal(content()["runs/0000/actuators"], self.u[0])
 
     def test_native_and_back_to_the_bit(self):
         self.succeed("log", "convert", "log.h5", "-o", "log.slog")
         self.succeed("log", "verify", "log.slog")
         self.refuse("is already a native log", "log", "convert", "log.slog", "-o", "twice.slog")
         self.succeed("log", "convert", "log.slog", "-o", "again.h5")
-        with h5py.File(WORK / "again.h5") as f:
-            for m in range(2):
-                run = f[f"runs/{m:04}"]
-                self.assertEqual((run.attrs["realization"], run.attrs["complete"]), (m, 1 - m))
-                np.testing.assert_array_equal(run["excitation"][()], self.r)
-                np.testing.assert_array_equal(run["actuators"][()], self.u[m])
-                np.testing.assert_array_equal(run["sensors"][()], self.y[m])
-                np.testing.assert_array_equal(run["marked"][()], self.marked)
+        again = content("again.h5")
+        for m in range(2):
+            run = f"runs/{m:04}"
+            self.assertEqual((again[f"{run}@realization"], again[f"{run}@complete"]), (m, 1 - m))
+            for name, given in (("excitation", self.r), ("actuators", self.u[m]), ("sensors", self.y[m]),
+                                ("marked", self.marked)):
+                np.testing.assert_array_equal(again[f"{run}/{name}"], given)
 
 
 class Damaged(Case):
     def test_files_of_another_kind_are_named(self):
-        (WORK / "run.slog").write_bytes(b"\x89SLOG\r\n\x1a" + bytes(100))
-        self.refuse("is a native log, not an HDF5 file; use it with 'stageid frf'", "fit", "run.slog", "-o", "n.json")
-        (WORK / "model.json").write_text("{}")
-        self.refuse("is JSON, not an HDF5 file", "fit", "model.json", "-o", "n.json")
-        (WORK / "run.txt").write_text("words")
-        self.refuse("is not an HDF5 file", "fit", "run.txt", "-o", "n.json")
+        for name, data, text in (
+                ("run.slog", b"\x89SLOG\r\n\x1a" + bytes(100),
+                 "is a native log, not an HDF5 file; use it with 'stageid frf'"),
+                ("model.json", b"{}", "is JSON, not an HDF5 file"), ("run.txt", b"words", "is not an HDF5 file")):
+            (WORK / name).write_bytes(data)
+            self.refuse(text, "fit", name, "-o", "n.json")
 
     def test_names_that_do_not_end_as_their_kind(self):
         frf = self.frf()

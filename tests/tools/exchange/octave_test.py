@@ -12,10 +12,9 @@ import subprocess
 import sys
 import unittest
 
-import h5py
 import numpy as np
 
-from exchange_test import MODEL, WORK, Case
+from exchange_test import MODEL, WORK, Case, content
 
 OCTAVE = shutil.which("octave-cli")
 
@@ -33,6 +32,13 @@ class Octave(Case):
         real, imaginary = np.fromfile(WORK / "v.bin").reshape(2, -1)
         return real + 1j * imaginary
 
+    def same(self, h5, files, names):
+        for file in files:
+            for name in names:
+                value = content(h5)[name]
+                given = (np.moveaxis(value, 0, -1) if value.ndim == 3 else value).ravel(order="F")
+                np.testing.assert_array_equal(self.numbers(file, name.replace("/", ".")), given, f"{file} {name}")
+
     def export_model(self, *names):
         (WORK / "model.json").write_text(json.dumps(MODEL))
         for name in names:
@@ -47,37 +53,26 @@ class Octave(Case):
 
     def test_loads_models_to_the_bit(self):
         self.export_model("m.mat", "m73.mat", "m.h5")
-        with h5py.File(WORK / "m.h5") as h5:
-            for file in ("m.mat", "m73.mat"):
-                for name in ("response", "state_space/continuous/A", "state_space/discrete/B", "modes/output_shape"):
-                    value = h5[name][()]
-                    given = (np.moveaxis(value, 0, -1) if value.ndim == 3 else value).ravel(order="F")
-                    np.testing.assert_array_equal(self.numbers(file, name.replace("/", ".")), given, f"{file} {name}")
+        self.same("m.h5", ("m.mat", "m73.mat"),
+                  ("response", "state_space/continuous/A", "state_space/discrete/B", "modes/output_shape"))
         self.assertEqual(self.octave("m = load('m.mat'); printf('%s ', m.outputs{:}, m.hold);"), "z1 z'2 exact ")
 
     def test_loads_frequency_responses_to_the_bit(self):
         frf = self.frf()
         self.succeed("export", frf, "-o", "f.mat")
         self.succeed("export", frf, "-o", "f73.mat", "--mat-version", "7.3")
-        with h5py.File(frf) as h5:
-            for file in ("f.mat", "f73.mat"):
-                for name in ("response", "noise_variance"):
-                    given = np.moveaxis(h5[name][()], 0, -1).ravel(order="F")
-                    np.testing.assert_array_equal(self.numbers(file, name), given, f"{file} {name}")
-                np.testing.assert_array_equal(self.numbers(file, "frequency_hz"), h5["frequency_hz"][()])
+        self.same(frf, ("f.mat", "f73.mat"), ("response", "noise_variance", "frequency_hz"))
 
     def test_what_it_saves_is_imported_to_the_bit(self):
         frf = self.frf()
         self.succeed("export", frf, "-o", "f.mat")
-        (WORK / "map.yaml").write_text("kind: frf\nfrequency: f\nfrequency_unit: Hz\nresponse: G\n"
-                                       "axes: [output, input, line]\noutput_unit: m\ninput_unit: N\n")
         self.octave("load f.mat; f = frequency_hz; G = response;"
                     "save -v6 v6.mat f G; save -v7 v7.mat f G; save own.mat f G; save -hdf5 h5.mat f G;")
         for file in ("v6.mat", "v7.mat"):
-            self.succeed("import", file, "-o", "back.h5", "--map", "map.yaml")
-            with h5py.File(frf) as a, h5py.File(WORK / "back.h5") as b:
-                np.testing.assert_array_equal(b["response"][()], a["response"][()])
-                np.testing.assert_array_equal(b["frequency_hz"][()], a["frequency_hz"][()])
+            self.imports(file, map="kind: frf\nfrequency: f\nfrequency_unit: Hz\nresponse: G\n"
+                         "axes: [output, input, line]\noutput_unit: m\ninput_unit: N\n")
+            for name in ("response", "frequency_hz"):
+                np.testing.assert_array_equal(content()[name], content(frf)[name])
         self.refuse("own.mat: is in the native Octave format; write it in Octave with 'save -v7", "import", "own.mat")
         self.refuse("h5.mat: is HDF5, but not a MATLAB file; write it in Octave with 'save -v7", "import", "h5.mat")
 
