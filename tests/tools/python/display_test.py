@@ -8,15 +8,11 @@ import unittest
 from html.parser import HTMLParser
 from unittest import mock
 
-from experiment import CONFIG, PACKAGES, WORK, measure, run_tests
+from experiment import CONFIG, PACKAGES, WORK, run_tests, setUpModule
 
 import numpy as np
 
 import stageid
-
-
-def setUpModule():
-    measure()
 
 
 class Tags(HTMLParser):

@@ -20,7 +20,7 @@ def program(*words):
     return done.returncode
 
 
-def measure():
+def setUpModule():
     """run.slog, run.h5, frf.h5 and model.json as the program makes them."""
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
@@ -28,6 +28,17 @@ def measure():
     program("log", "convert", "run.slog", "-o", "run.h5")
     program("frf", "run.slog", "-o", "frf.h5")
     program("fit", "frf.h5", "-o", "model.json", "--band", "120", "800")
+
+
+def file_bytes(result):
+    """The content of the file that a response or a model is written as."""
+    import stageid
+    file = WORK / ("written.h5" if isinstance(result, stageid.Frf) else "written.json")
+    if file.suffix == ".h5":
+        stageid.write_frf(file, result)
+    else:
+        result.save(file)
+    return file.read_bytes()
 
 
 def run_tests():

@@ -3,10 +3,11 @@
 
 import dataclasses
 import json
+import shutil
 import subprocess
 import unittest
 
-from experiment import CONFIG, PROGRAM, WORK, measure, program, run_tests
+from experiment import CONFIG, PROGRAM, WORK, file_bytes, program, run_tests, setUpModule
 
 import h5py
 import numpy as np
@@ -16,8 +17,10 @@ import stageid
 BAND = (120.0, 800.0)
 
 
-def setUpModule():
-    measure()
+def read_run():
+    """The log, its arrays, and what a log of arrays also needs."""
+    log = stageid.read_log(WORK / "run.slog")
+    return log, log.arrays(), dict(sample_rate_hz=log.sample_rate_hz, transient_periods=log.transient_periods)
 
 
 def as_json(result, without=None):
@@ -30,6 +33,9 @@ class SameAsTheProgram(unittest.TestCase):
         with h5py.File(WORK / file) as h5:
             for name in ("frequency_hz", "response", "noise_variance", "total_variance"):
                 np.testing.assert_array_equal(getattr(frf, name), h5[name][()])
+
+    def assert_same_file(self, result, file):
+        self.assertEqual(file_bytes(result), (WORK / file).read_bytes())
 
     def test_commands_write_the_same_bytes(self):
         self.assertEqual(stageid.call("frf", WORK / "run.slog", "-o", WORK / "again.h5"), 0)
@@ -49,34 +55,25 @@ class SameAsTheProgram(unittest.TestCase):
 
     def test_a_response_from_a_file(self):
         for log in ("run.slog", "run.h5"):
-            stageid.write_frf(WORK / "module.h5", stageid.frf(WORK / log))
             program("frf", log, "-o", "program.h5")
-            self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "program.h5").read_bytes())
-        opened = stageid.read_log(WORK / "run.slog")
-        stageid.write_frf(WORK / "module.h5", stageid.frf([opened], threads=1))
-        self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "frf.h5").read_bytes())
+            self.assert_same_file(stageid.frf(WORK / log), "program.h5")
+        self.assert_same_file(stageid.frf([stageid.read_log(WORK / "run.slog")], threads=1), "frf.h5")
 
     def test_a_response_with_options(self):
         program("frf", "run.slog", "-o", "options.h5", "--realizations", "1,3", "--inputs", "a2,a1",
                 "--transient-periods", "1", "--covariance", "full")
-        frf = stageid.frf(WORK / "run.slog", realizations=[1, 3], inputs=["a2", "a1"],
-                          transient_periods=1, covariance="full")
-        stageid.write_frf(WORK / "module.h5", frf)
-        self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "options.h5").read_bytes())
+        self.assert_same_file(stageid.frf(WORK / "run.slog", realizations=[1, 3], inputs=["a2", "a1"],
+                                          transient_periods=1, covariance="full"), "options.h5")
         program("frf", "run.slog", "-o", "lpm.h5", "--method", "lpm")
         self.assert_same_frf(stageid.frf(WORK / "run.slog", method="lpm"), "lpm.h5")
         program("frf", "run.slog", "-o", "one.h5", "--realizations", "2", "--outputs", "s1")
-        stageid.write_frf(WORK / "module.h5", stageid.frf(WORK / "run.slog", realizations=2, outputs="s1"))
-        self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "one.h5").read_bytes())
+        self.assert_same_file(stageid.frf(WORK / "run.slog", realizations=2, outputs="s1"), "one.h5")
 
     def test_the_health_of_the_data(self):
         """Of a log with a sensor's sign turned: found as the program finds it, in memory too."""
-        read = stageid.read_log(WORK / "run.slog")
-        r, u, y = read.arrays()
-        with h5py.File(WORK / "run.h5") as whole, h5py.File(WORK / "turned.h5", "w") as turned:
-            for name in whole:
-                whole.copy(name, turned)
-            turned.attrs.update(whole.attrs)
+        _, (r, u, y), settings = read_run()
+        shutil.copy(WORK / "run.h5", WORK / "turned.h5")
+        with h5py.File(WORK / "turned.h5", "a") as turned:
             for run in turned["runs"].values():
                 run["sensors"][:, 1] *= -1
         done = subprocess.run([PROGRAM, "--json", "frf", "turned.h5", "-o", "t.h5"], cwd=WORK, capture_output=True)
@@ -86,17 +83,14 @@ class SameAsTheProgram(unittest.TestCase):
         self.assertEqual([as_json(finding) for finding in frf.health], found)
         self.assertEqual(stageid.frf(WORK / "turned.h5", health=False).health, [])
         program("frf", "run.slog", "-o", "unseen.h5", "--no-health", "--periods", "unmarked", "--smooth-covariance", "3")
-        stageid.write_frf(WORK / "module.h5", stageid.frf(WORK / "run.slog", health=False, periods="unmarked",
-                                                          covariance_lines=3))
-        self.assertEqual((WORK / "module.h5").read_bytes(), (WORK / "unseen.h5").read_bytes())
-        in_memory = stageid.Log(r, u, y, sample_rate_hz=read.sample_rate_hz, transient_periods=2)
+        self.assert_same_file(stageid.frf(WORK / "run.slog", health=False, periods="unmarked", covariance_lines=3),
+                              "unseen.h5")
+        in_memory = stageid.Log(r, u, y, **settings)
         self.assertNotIn("fault", [f.severity for f in stageid.frf(in_memory).health])
 
     def test_a_response_from_arrays(self):
-        read = stageid.read_log(WORK / "run.slog")
-        r, u, y = read.arrays()
+        read, (r, u, y), settings = read_run()
         names = dict(excitation=read.excitation, actuators=read.actuators, sensors=read.sensors)
-        settings = dict(sample_rate_hz=read.sample_rate_hz, transient_periods=read.transient_periods)
         orders = {"C": (u, y), "Fortran": (np.asfortranarray(u), np.asfortranarray(y)),
                   "slices": (np.concatenate([y, u], 3)[..., y.shape[3]:], np.repeat(y, 2, 2)[:, :, ::2])}
         for order, (u_given, y_given) in orders.items():
@@ -105,14 +99,12 @@ class SameAsTheProgram(unittest.TestCase):
                 self.assert_same_frf(stageid.frf(log), "frf.h5")
 
     def test_marked_samples_are_not_used(self):
-        read = stageid.read_log(WORK / "run.slog")
-        r, u, y = read.arrays()
+        read, (r, u, y), settings = read_run()
         P = read.period_samples
         marked = np.zeros(u.shape[:3], bool)
         marked[:, :, 3 * P + 5] = True  # in the second of three measured periods
         spoilt = y.copy()
         spoilt[:, :, 3 * P:4 * P] = 1e3
-        settings = dict(sample_rate_hz=read.sample_rate_hz, transient_periods=read.transient_periods)
         without = stageid.frf(stageid.Log(r, u, spoilt, marked=marked, **settings))
         kept = np.r_[0:3 * P, 4 * P:5 * P]
         expected = stageid.frf(stageid.Log(r, u[:, :, kept], y[:, :, kept], **settings))
@@ -128,12 +120,8 @@ class SameAsTheProgram(unittest.TestCase):
             np.testing.assert_array_equal(log[0].marked, expected[0, 0])
 
     def test_a_fit_of_a_file(self):
-        fit = stageid.fit(WORK / "frf.h5", band_hz=BAND)
-        fit.model.save(WORK / "module.json")
-        self.assertEqual((WORK / "module.json").read_bytes(), (WORK / "model.json").read_bytes())
-        read = stageid.fit(stageid.read_frf(WORK / "frf.h5"), band_hz=BAND, threads=1)
-        read.model.save(WORK / "module.json")
-        self.assertEqual((WORK / "module.json").read_bytes(), (WORK / "model.json").read_bytes())
+        self.assert_same_file(stageid.fit(WORK / "frf.h5", band_hz=BAND).model, "model.json")
+        self.assert_same_file(stageid.fit(stageid.read_frf(WORK / "frf.h5"), band_hz=BAND, threads=1).model, "model.json")
 
     def test_a_fit_with_options(self):
         code = program("fit", "frf.h5", "-o", "options.json", "--modes", "150.5,310", "--delay", "0.0003",
@@ -141,8 +129,7 @@ class SameAsTheProgram(unittest.TestCase):
                        "--direct-term", "full")
         fit = stageid.fit(WORK / "frf.h5", modes=[150.5, 310], delay=0.0003, rigid_body=2,
                           residue_rank=1, weighting="relative", direct_term="full")
-        fit.model.save(WORK / "module.json")
-        self.assertEqual((WORK / "module.json").read_bytes(), (WORK / "options.json").read_bytes())
+        self.assert_same_file(fit.model, "options.json")
         self.assertEqual(fit.trustworthy, code == 0)
 
     def test_numbers_of_numpy_are_numbers(self):
@@ -171,11 +158,9 @@ class SameAsTheProgram(unittest.TestCase):
         fit = stageid.fit(WORK / "frf.h5", band_hz=BAND, covariance=True)
         with h5py.File(WORK / "covariance.h5") as file:
             self.assertEqual([n.decode() for n in file["parameters/name"]], fit.covariance.name)
-            for ours, theirs in (("value", "parameters/value"), ("sandwich", "covariance/sandwich"),
-                                 ("likelihood", "covariance/likelihood"),
-                                 ("response_variance", "response_variance"),
-                                 ("confidence_radius", "confidence_radius")):
-                np.testing.assert_array_equal(getattr(fit.covariance, ours), file[theirs][:])
+            for theirs in ("parameters/value", "covariance/sandwich", "covariance/likelihood", "response_variance",
+                           "confidence_radius"):
+                np.testing.assert_array_equal(getattr(fit.covariance, theirs.split("/")[-1]), file[theirs][:])
         deviation = np.sqrt(np.diag(fit.covariance.sandwich))
         by_name = dict(zip(fit.covariance.name, deviation))
         for i, submodel in enumerate(fit.model.submodels):
@@ -268,14 +253,12 @@ class Values(unittest.TestCase):
         program("export", "model.json", "-o", "model.h5")
         with h5py.File(WORK / "model.h5") as h5:
             np.testing.assert_array_equal(model.response(h5["frequency_hz"][()]), h5["response"][()])
-            for given, name in zip(model.state_space(), "ABCD"):
-                np.testing.assert_array_equal(given, h5[f"state_space/continuous/{name}"][()])
             sampled = model.sampled_state_space()
             self.assertEqual(sampled.sample_rate_hz, model.sample_rate_hz)
-            for given, name in zip(sampled.system, "ABCD"):
-                np.testing.assert_array_equal(given, h5[f"state_space/discrete/{name}"][()])
-            np.testing.assert_array_equal([m.modal_mass for m in model.modes()],
-                                          h5["modes/modal_mass"][()])
+            for kind, system in (("continuous", model.state_space()), ("discrete", sampled.system)):
+                for given, name in zip(system, "ABCD"):
+                    np.testing.assert_array_equal(given, h5[f"state_space/{kind}/{name}"][()])
+            np.testing.assert_array_equal([m.modal_mass for m in model.modes()], h5["modes/modal_mass"][()])
         model.save(WORK / "saved.json")
         self.assertEqual(stageid.read_model(WORK / "saved.json").outputs, model.outputs)
 
@@ -348,8 +331,8 @@ class Memory(unittest.TestCase):
 
     def test_views(self):
         frf = stageid.frf(stageid.simulate(CONFIG))
-        self.assertTrue(np.shares_memory(frf.response, frf.response))
-        self.assertTrue(np.shares_memory(frf.noise_variance, frf.noise_variance))
+        for name in ("response", "noise_variance"):
+            self.assertTrue(np.shares_memory(getattr(frf, name), getattr(frf, name)), name)
         self.assertFalse(frf.response.flags.writeable)
         response = frf.response
         before = response.copy()

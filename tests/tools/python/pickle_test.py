@@ -6,15 +6,11 @@ import multiprocessing
 import pickle
 import unittest
 
-from experiment import CONFIG, WORK, measure, run_tests
+from experiment import CONFIG, WORK, file_bytes, run_tests, setUpModule
 
 import numpy as np
 
 import stageid
-
-
-def setUpModule():
-    measure()
 
 
 def copies(thing):
@@ -26,40 +22,28 @@ def half(frf, band_hz):
 
 
 class Pickles(unittest.TestCase):
-    def same_bytes(self, write, thing):
+    def same_bytes(self, thing):
         """A copy is written as the same file."""
-        write(thing, "a")
         for number, other in enumerate(copies(thing)):
             with self.subTest(number):
                 self.assertIsNot(other, thing)
-                write(other, "b")
-                self.assertEqual((WORK / "b").with_suffix(write.ending).read_bytes(),
-                                 (WORK / "a").with_suffix(write.ending).read_bytes())
+                self.assertEqual(file_bytes(other), file_bytes(thing))
 
     def test_frequency_responses(self):
-        def write(frf, name):
-            stageid.write_frf((WORK / name).with_suffix(".h5"), frf)
-
-        write.ending = ".h5"
         frf = stageid.frf(WORK / "run.slog", covariance="full")
-        self.same_bytes(write, frf)
-        self.same_bytes(write, stageid.Frf([1.0, 2.0], np.ones((2, 1, 1), complex)))
+        self.same_bytes(frf)
+        self.same_bytes(stageid.Frf([1.0, 2.0], np.ones((2, 1, 1), complex)))
         other = pickle.loads(pickle.dumps(frf))
         self.assertEqual(other.health, frf.health)
         self.assertIsNone(stageid.Frf([1.0], np.ones((1, 1, 1), complex)).noise_variance)
 
     def test_fits_and_models(self):
-        def write(model, name):
-            model.save((WORK / name).with_suffix(".json"))
-
-        write.ending = ".json"
         frf = stageid.read_frf(WORK / "frf.h5")
         fit = stageid.fit(frf, band_hz=(120, 800), covariance=True)
-        self.same_bytes(write, fit.model)
+        self.same_bytes(fit.model)
         for other in copies(fit):
-            self.assertEqual((other.status, other.message, other.trustworthy, other.cost, other.decisions,
-                              other.removal_cost),
-                             (fit.status, fit.message, fit.trustworthy, fit.cost, fit.decisions, fit.removal_cost))
+            for key in ("status", "message", "trustworthy", "cost", "decisions", "removal_cost"):
+                self.assertEqual(getattr(other, key), getattr(fit, key), key)
             np.testing.assert_array_equal(other.response_variance, fit.response_variance)
             self.assertEqual(other.covariance.name, fit.covariance.name)
             for key in ("sandwich", "likelihood", "response_variance", "confidence_radius"):
