@@ -4,11 +4,6 @@
 # (libstageid-dev).
 
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc)
-install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
-  DESTINATION ${doc_dir}/stageid COMPONENT program)
-install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright
-  DESTINATION ${doc_dir}/libstageid-dev)
-
 # Compressed without a time stamp: the changelog of the program, and the one of this first Debian revision.
 set(STAGEID_PACKAGE_CONTACT "stageid maintainers <stageid@packages.example>" CACHE STRING
   "Whom the Debian packages name as maintainer: NAME <ADDRESS>")
@@ -24,8 +19,9 @@ foreach(file ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${CMAKE_CURRENT_BINARY_DIR}/chan
   execute_process(COMMAND ${STAGEID_GZIP} -9nc ${file} OUTPUT_FILE ${packed} COMMAND_ERROR_IS_FATAL ANY)
   list(APPEND changelogs ${packed})
 endforeach()
-install(FILES ${changelogs} DESTINATION ${doc_dir}/stageid COMPONENT program)
-install(FILES ${changelogs} DESTINATION ${doc_dir}/libstageid-dev)
+set(documents ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelogs})
+install(FILES ${documents} DESTINATION ${doc_dir}/stageid COMPONENT program)
+install(FILES ${documents} DESTINATION ${doc_dir}/libstageid-dev)
 
 set(components program Unspecified)
 if(STAGEID_BUILD_PYTHON)
@@ -35,8 +31,7 @@ if(STAGEID_BUILD_PYTHON)
   install(TARGETS stageid_python LIBRARY DESTINATION ${package_dir} COMPONENT python)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/tools/python/stageid/ DESTINATION ${package_dir} COMPONENT python
     FILES_MATCHING PATTERN *.py PATTERN *.pyi PATTERN py.typed PATTERN __pycache__ EXCLUDE)
-  install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelogs}
-    DESTINATION ${doc_dir}/python3-stageid COMPONENT python)
+  install(FILES ${documents} DESTINATION ${doc_dir}/python3-stageid COMPONENT python)
 
   add_custom_target(wheel
     COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/wheel.py
