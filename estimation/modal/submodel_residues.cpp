@@ -40,11 +40,8 @@ void require_distinct(const std::vector<Complex>& poles, std::size_t index) {
 }  // namespace
 
 std::vector<Complex> pole_representatives(const Submodel& submodel) {
-  const auto n = static_cast<Eigen::Index>(submodel.denominator.size()) - 1;
-  std::vector<Complex> out;
-  for (const Complex pole :
-       roots(Eigen::Map<const Eigen::VectorXd>(submodel.denominator.data() + 1, n)))
-    if (pole.imag() >= 0.0) out.push_back(pole);
+  std::vector<Complex> out = roots(submodel.coefficients());
+  std::erase_if(out, [](Complex pole) { return !(pole.imag() >= 0.0); });
   return out;
 }
 
@@ -57,7 +54,7 @@ Eigen::MatrixXcd numerator_at(const Submodel& submodel, Complex s) {
 
 SubmodelResidues residues(const Submodel& submodel, std::size_t index) {
   const int l = submodel.integrators;
-  const std::size_t order = submodel.denominator.size() - 1 + static_cast<std::size_t>(l);
+  const auto order = static_cast<std::size_t>(submodel.order() + l);
   const auto& B = submodel.numerator;
   if (l < 0 || l > 2)
     throw std::invalid_argument(

@@ -64,12 +64,8 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
   for (const auto& [delay, members] : channels_by_delay(model)) {
     const HoldEquivalent through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
-      const SubmodelShape shape{submodel.integrators,
-                                static_cast<int>(submodel.denominator.size()) - 1,
-                                static_cast<int>(submodel.numerator.size()) - 1};
-      const Eigen::VectorXd a =
-          Eigen::Map<const Eigen::VectorXd>(submodel.denominator.data() + 1, shape.order);
-      evaluate_basis(through, shape, a, {}, basis);
+      const SubmodelShape shape = shape_of(submodel);
+      evaluate_basis(through, shape, submodel.coefficients(), {}, basis);
       for (Eigen::Index k = 0; k < out.cols(); ++k)
         for (int m = 0; m <= shape.numerator_degree; ++m) {
           const double* B = submodel.numerator[static_cast<std::size_t>(m)].data();

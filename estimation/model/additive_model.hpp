@@ -77,6 +77,11 @@ struct Submodel {
   bool damping_held = false;                        ///< a mode with fixed a_1
   std::vector<Eigen::MatrixXd> numerator_std = {};  ///< per entry of numerator; empty: unknown
 
+  int order() const noexcept { return static_cast<int>(denominator.size()) - 1; }  ///< n
+  /// a_1 .. a_n, valid while the denominator is.
+  Eigen::Map<const Eigen::VectorXd> coefficients() const {
+    return Eigen::Map<const Eigen::VectorXd>(denominator.data() + 1, order());
+  }
   /// n = 2 with complex poles: 1/(2 pi sqrt(a_2)) and a_1/(2 sqrt(a_2)).
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }
   double natural_frequency_hz() const;  ///< @pre is_mode()

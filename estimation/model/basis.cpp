@@ -19,6 +19,10 @@ void add(Complex factor, const SplitMatrix& x, SplitMatrix& out, Eigen::Index co
 
 }  // namespace
 
+SubmodelShape shape_of(const Submodel& submodel) {
+  return {submodel.integrators, submodel.order(), static_cast<int>(submodel.numerator.size()) - 1};
+}
+
 std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>& a) {
   const Eigen::Index n = a.size();
   if (n == 0) return {};

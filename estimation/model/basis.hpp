@@ -15,6 +15,7 @@ struct SubmodelShape {
   int numerator_degree = 0;  ///< m
   int functions() const noexcept { return numerator_degree + 1; }
 };
+SubmodelShape shape_of(const Submodel& submodel);
 
 /// The functions of frequency of one submodel on the lines, through hold, delay and sampler.
 struct SubmodelBasis {

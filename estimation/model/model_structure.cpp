@@ -56,15 +56,12 @@ std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructu
 std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
                                          const ModelStructure& structure) {
   std::vector<ModeCandidate> out = candidates;
-  for (const Submodel& s : structure.given) {
-    const Eigen::Map<const Eigen::VectorXd> a(s.denominator.data() + 1,
-                                              static_cast<Eigen::Index>(s.denominator.size()) - 1);
-    for (const std::complex<double> pole : roots(a))
+  for (const Submodel& s : structure.given)
+    for (const std::complex<double> pole : roots(s.coefficients()))
       std::erase_if(out, [&](const ModeCandidate& mode) {
         const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
         return pole.imag() != 0.0 && std::abs(std::abs(pole) - omega) < kTaken * omega;
       });
-  }
   return out;
 }
 

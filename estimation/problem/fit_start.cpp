@@ -22,19 +22,16 @@ void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
   int biproper = 0;
   int integrating = 0;
   for (const Submodel& s : start.submodels) {
-    const auto n = static_cast<int>(s.denominator.size()) - 1;
-    const auto m = static_cast<int>(s.numerator.size()) - 1;
+    const auto [l, n, m] = shape_of(s);
     require(n >= 0 && s.denominator[0] == 1.0, "fit: a denominator must start with 1");
-    require(s.integrators >= 0 && s.integrators <= 2,
-            "fit: a submodel must have 0, 1 or 2 integrators");
+    require(l >= 0 && l <= 2, "fit: a submodel must have 0, 1 or 2 integrators");
     require(std::all_of(s.denominator.begin(), s.denominator.end(),
                         [](double a) { return std::isfinite(a); }) &&
                 s.denominator.back() != 0.0,
             "fit: a denominator must be finite and not end with 0");
-    require(m >= 0 && m <= n + s.integrators,
-            "fit: a submodel must be proper and have a numerator");
-    biproper += m == n + s.integrators ? 1 : 0;
-    integrating += s.integrators > 0 ? 1 : 0;
+    require(m >= 0 && m <= n + l, "fit: a submodel must be proper and have a numerator");
+    biproper += m == n + l ? 1 : 0;
+    integrating += l > 0 ? 1 : 0;
     for (const Eigen::MatrixXd& B : s.numerator)
       require(B.rows() == frf.n_outputs() && B.cols() == frf.n_inputs(),
               "fit: the shape of a numerator must be outputs x inputs");
@@ -52,7 +49,7 @@ std::vector<Eigen::Index> held_frequencies(const AdditiveModel& start) {
   for (const Submodel& s : start.submodels) {
     if (s.is_mode() && s.damping_held) out.push_back(first);
     if (s.is_mode() && s.frequency_held) out.push_back(first + 1);
-    first += static_cast<Eigen::Index>(s.denominator.size()) - 1;
+    first += s.order();
   }
   return out;
 }
@@ -93,10 +90,10 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   problem.n_inputs = frf.n_inputs();
   problem.G = SharedMatrix<Eigen::MatrixXcd>::kept(frf.response);
   problem.W = std::move(W);
-  for (const Submodel& s : start.submodels)
-    problem.shapes.push_back({s.integrators, static_cast<int>(s.denominator.size()) - 1,
-                              static_cast<int>(s.numerator.size()) - 1});
-  for (const Submodel& s : start.submodels) problem.roles.push_back(s.role);
+  for (const Submodel& s : start.submodels) {
+    problem.shapes.push_back(shape_of(s));
+    problem.roles.push_back(s.role);
+  }
   problem.held = held_frequencies(start);
   problem.delay = options.delay;
   problem.limit = options.limit;
@@ -114,9 +111,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
 FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,
                               const FitOptions& options) {
   FitParameters beta;
-  for (const Submodel& s : start.submodels)
-    beta.a.push_back(Eigen::Map<const Eigen::VectorXd>(
-        s.denominator.data() + 1, static_cast<Eigen::Index>(s.denominator.size()) - 1));
+  for (const Submodel& s : start.submodels) beta.a.emplace_back(s.coefficients());
   const bool from_start = options.delay != DelayModel::fixed &&
                           start.input_delay_s.size() == problem.n_inputs &&
                           start.output_delay_s.size() == problem.n_outputs;

@@ -46,11 +46,11 @@ PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start)
   double lowest = kBelowLines * lowest_line;
   for (std::size_t i = 0; i < start.a.size(); ++i)
     if (searched_mode(i)) lowest = std::min(lowest, slowest(start.a[i]));
-  for (std::size_t i = 0; i < start.a.size(); ++i)
+  for (std::size_t i = 0; i < start.a.size(); ++i) {
     slow_damping_.push_back(!problem.roles.empty() && problem.roles[i] == SubmodelRole::suspension);
-  for (std::size_t i = 0; i < start.a.size(); ++i)
     lowest_rad_s_.push_back(
         searched_mode(i) ? lowest : std::min(kFarBelowLines * lowest_line, slowest(start.a[i])));
+  }
 }
 
 bool PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
