@@ -3,7 +3,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 #include <stdexcept>
 
 #include "excitation/threads/worker_pool.hpp"
@@ -13,22 +13,26 @@
 namespace stageid {
 namespace {
 
-/// G(j omega_k) times the factors of `kind`.
-Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
-  Eigen::MatrixXcd G = frf.at(k);
+/// Factor of every element of the matrix whose singular values are computed, on line k, n_y x n_u.
+Eigen::MatrixXd element_weights(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Ones(frf.n_outputs(), frf.n_inputs());
   if (kind == CmifKind::accelerance) {
     const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[k];
-    G *= omega * omega;
+    weights *= omega * omega;
   } else if (kind == CmifKind::whitened) {
-    const Eigen::MatrixXd& variance =
+    const Eigen::MatrixXd& noise =
         frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
-    if (variance.size() == 0)
+    if (noise.size() == 0)
       throw std::invalid_argument(
           "CMIF: whitening needs variances, but the FRF has none; use accelerance");
-    G.reshaped() =
-        G.reshaped().cwiseQuotient(variance.col(k).cwiseSqrt().cast<std::complex<double>>());
+    weights.reshaped() = noise.col(k).cwiseSqrt().cwiseInverse();
   }
-  return G;
+  return weights;
+}
+
+/// G(j omega_k) times these factors.
+Eigen::MatrixXcd weighted_response(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
+  return frf.at(k).cwiseProduct(element_weights(frf, kind, k).cast<std::complex<double>>());
 }
 
 /// Transposed if needed so that rows <= columns.
@@ -137,6 +141,28 @@ Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
                         .cwiseAbs2();
   });
   return curves;
+}
+
+Eigen::MatrixXd cmif_deviation(const FrfEstimate& frf, CmifKind kind,
+                               const Eigen::MatrixXd& variance) {
+  if (variance.rows() != frf.response.rows() || variance.cols() != frf.response.cols())
+    throw std::invalid_argument("CMIF: the variance must have the shape of the response");
+  const Eigen::Index curves = std::min(frf.n_outputs(), frf.n_inputs());
+  Eigen::MatrixXd deviation(curves, frf.lines());
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXd weights = element_weights(frf, kind, k);
+    const Eigen::MatrixXcd G = weighted_response(frf, kind, k);
+    const Eigen::Map<const Eigen::MatrixXd> raw(variance.col(k).data(), G.rows(), G.cols());
+    const Eigen::MatrixXd V = raw.cwiseProduct(weights.cwiseAbs2());
+    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(G, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    for (Eigen::Index i = 0; i < curves; ++i) {
+      const double s = svd.singularValues()[i];
+      const double spread =
+          svd.matrixU().col(i).cwiseAbs2().dot(V * svd.matrixV().col(i).cwiseAbs2());
+      deviation(i, k) = std::sqrt(2.0 * s * s * spread);
+    }
+  }
+  return deviation;
 }
 
 std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions& options) {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_text.hpp"
-#include "estimation/model/cmif_deviation.hpp"
+#include "estimation/model/cmif.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
 #include "tools/report/html_text.hpp"

@@ -1,4 +1,4 @@
-#include "estimation/model/cmif_deviation.hpp"
+#include "estimation/model/cmif.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
