@@ -131,47 +131,46 @@ constexpr Eigen::Index kTile = 64;  // lines
 using VarianceOfTile =
     std::function<Eigen::MatrixXd(Eigen::Index first, const Eigen::MatrixXcd& E)>;
 
-/// Judges by one variance.
-void judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
-              const Eigen::MatrixXd& weights, const VarianceOfTile& variance_of, const char* causes,
-              ResidualVerdict& verdict) {
-  Parts parts(frf, verdict.dof);
-  const Eigen::VectorXd all;
+/// Judges by one variance, with so many degrees of freedom.
+ResidualVerdict judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
+                         const Eigen::MatrixXd& weights, ResidualVariance kind, double dof,
+                         const VarianceOfTile& variance_of, const char* causes) {
+  ResidualVerdict verdict;
+  verdict.variance = kind;
+  verdict.dof = dof;
+  Parts parts(frf, dof);
+  const Eigen::MatrixXd none(0, 1);
   for (Eigen::Index first = 0, count = 0; first < frf.lines(); first += count) {
     count = frf.lines() - first;
     if (count >= 2 * kTile) count = kTile;  // the last tile has enough lines for a scatter
     const Eigen::MatrixXcd E = frf.response.middleCols(first, count) - model(first, count);
     const Eigen::MatrixXd variance = variance_of(first, E);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      if (weights.size() > 0)
-        parts.add_line(first + i, E.col(i), variance.col(i), weights.col(first + i));
-      else
-        parts.add_line(first + i, E.col(i), variance.col(i), all);
-    }
+    for (Eigen::Index i = 0; i < count; ++i)
+      parts.add_line(first + i, E.col(i), variance.col(i),
+                     weights.size() > 0 ? weights.col(first + i) : none.col(0));
   }
   verdict.chi_square = parts.all().mean_r();
   verdict.expected = parts.expected();
   const Part* unexplained = parts.unexplained();
   verdict.explained = unexplained == nullptr;
   verdict.reason = verdict.explained ? "" : parts.reason(*unexplained, causes);
+  return verdict;
 }
 
 /// For data without variances: their variance is the scatter of the residual from line to line. What a model misses is
 /// smooth.
 ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse& model,
                                 const Eigen::MatrixXd& weights, int threads) {
-  ResidualVerdict verdict;
-  if (!has_line_scatter(frf.lines())) return verdict;
-  verdict.variance = ResidualVariance::scatter;
-  verdict.dof = kScatterDof;
-  verdict.scatter.resize(frf.response.rows(), frf.lines());
-  judge_by(
-      frf, model, weights,
+  if (!has_line_scatter(frf.lines())) return {};
+  Eigen::MatrixXd scatter(frf.response.rows(), frf.lines());
+  ResidualVerdict verdict = judge_by(
+      frf, model, weights, ResidualVariance::scatter, kScatterDof,
       [&](Eigen::Index first, const Eigen::MatrixXcd& E) -> Eigen::MatrixXd {
-        return verdict.scatter.middleCols(first, E.cols()) =
+        return scatter.middleCols(first, E.cols()) =
                    scatter_variance(frf.frequency_hz.segment(first, E.cols()), E, threads);
       },
-      "neighbouring lines differ by", verdict);
+      "neighbouring lines differ by");
+  verdict.scatter = std::move(scatter);
   return verdict;
 }
 
@@ -190,17 +189,12 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
     throw std::invalid_argument("residual: the weights must have the shape of the response");
   const auto judge_with = [&](ResidualVariance kind, const Eigen::MatrixXd& variance, double dof) {
-    ResidualVerdict verdict;
-    verdict.variance = kind;
-    verdict.dof = dof;
-    judge_by(
-        frf, model, weights,
+    return judge_by(
+        frf, model, weights, kind, dof,
         [&](Eigen::Index first, const Eigen::MatrixXcd& E) {
           return Eigen::MatrixXd(variance.middleCols(first, E.cols()));
         },
-        kind == ResidualVariance::noise ? "noise explains" : "noise and distortion explain",
-        verdict);
-    return verdict;
+        kind == ResidualVariance::noise ? "noise explains" : "noise and distortion explain");
   };
   const bool has_noise = frf.noise_variance.size() > 0;
   const bool has_total = frf.total_variance.size() > 0;

@@ -38,11 +38,13 @@ FrfEstimate noise(std::uint64_t seed, Eigen::Index lines, int dof) {
   return frf;
 }
 
-ResidualVerdict judge(const FrfEstimate& frf, const Eigen::MatrixXd& weights = {}) {
+/// Of a model that is constant.
+ResidualVerdict judge(const FrfEstimate& frf, double level = 0.0,
+                      const Eigen::MatrixXd& weights = {}) {
   return judge_residual(
       frf,
       [&](Eigen::Index, Eigen::Index count) {
-        return Eigen::MatrixXcd::Zero(frf.response.rows(), count).eval();
+        return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
       },
       weights, 1);
 }
@@ -103,16 +105,11 @@ TEST(ResidualVerdict, DistortionOfOneRealizationIsTheScatterOfItsLines) {
   FrfEstimate frf = noise(15, 500, 50);
   frf.response *= 10.0;  // noise variance 1
   frf.response.array() += 300.0;
-  const auto judge_by = [&](double level) {
-    return judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
-      return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
-    });
-  };
-  const ResidualVerdict right = judge_by(300.0);
+  const ResidualVerdict right = judge(frf, 300.0);
   EXPECT_TRUE(right.explained) << right.reason;
   EXPECT_EQ(right.variance, ResidualVariance::scatter);
   EXPECT_NEAR(right.chi_square, right.expected, 0.1 * right.expected);
-  EXPECT_FALSE(judge_by(330.0).explained);
+  EXPECT_FALSE(judge(frf, 330.0).explained);
 }
 
 // Resonances narrower than the line spacing scatter the lines of one part of the band, as distortion would.
@@ -120,17 +117,9 @@ TEST(ResidualVerdict, ResonancesThatAModelMissesAreNoDistortion) {
   FrfEstimate frf = noise(19, 600, 50);
   frf.response.array() += 300.0;
   for (Eigen::Index k = 40; k < 90; k += 3) frf.response.col(k) *= 3.0;
-  const ResidualVerdict verdict = judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
-    return Eigen::MatrixXcd::Constant(frf.response.rows(), count, 300.0).eval();
-  });
+  const ResidualVerdict verdict = judge(frf, 300.0);
   EXPECT_FALSE(verdict.explained);
   EXPECT_EQ(verdict.variance, ResidualVariance::noise);
-}
-
-ResidualVerdict judge_constant(const FrfEstimate& frf, double level) {
-  return judge_residual(frf, [&](Eigen::Index, Eigen::Index count) {
-    return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
-  });
 }
 
 // Noise scatters from line to line; what a model misses is smooth.
@@ -140,10 +129,10 @@ TEST(ResidualVerdict, DataWithoutVariancesAreJudgedByTheirOwnScatter) {
     FrfEstimate frf = noise(20 + seed, 150, 0);  // of variance 1
     frf.noise_variance.resize(0, 0);
     frf.response.array() += 300.0;
-    const ResidualVerdict right = judge_constant(frf, 300.0);
+    const ResidualVerdict right = judge(frf, 300.0);
     EXPECT_EQ(right.variance, ResidualVariance::scatter);
     if (!right.explained) ++told;
-    const ResidualVerdict wrong = judge_constant(frf, 298.0);
+    const ResidualVerdict wrong = judge(frf, 298.0);
     EXPECT_FALSE(wrong.explained);
     EXPECT_THAT(wrong.reason, HasSubstr("times what neighbouring lines differ by"));
   }
@@ -175,9 +164,9 @@ TEST(ResidualVerdict, WithoutWeightsOrLinesNothingIsJudged) {
   FrfEstimate frf = noise(17, 100, 0);
   frf.response *= 100.0;
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(frf.response.rows(), 100);
-  EXPECT_TRUE(judge(frf, weights).explained);
+  EXPECT_TRUE(judge(frf, 0.0, weights).explained);
   weights(0, 5) = 1.0;
-  EXPECT_FALSE(judge(frf, weights).explained);
+  EXPECT_FALSE(judge(frf, 0.0, weights).explained);
   frf = noise(17, 11, 0);
   frf.noise_variance.resize(0, 0);
   const ResidualVerdict verdict = judge(frf);
