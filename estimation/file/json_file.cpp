@@ -60,6 +60,14 @@ double JsonNode::number_or(const std::string& key, double fallback) const {
   return has(key) && !member(key).raw().is_null() ? member(key).number() : fallback;
 }
 
+std::optional<double> JsonNode::optional_number(const std::string& key) const {
+  return has(key) ? std::optional(member(key).number()) : std::nullopt;
+}
+
+std::string JsonNode::text_or_empty(const std::string& key) const {
+  return has(key) ? member(key).text() : std::string();
+}
+
 long long JsonNode::integer(long long lowest, long long highest) const {
   if (!value_.is_number_integer()) fail("must be a whole number");
   const auto number = value_.get<long long>();

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ class JsonNode {
   double positive() const;                                          ///< > 0
   /// An optional member; null is the same as missing and is written for unknown numbers.
   double number_or(const std::string& key, double fallback) const;
+  std::optional<double> optional_number(const std::string& key) const;  ///< not null if it is there
+  std::string text_or_empty(const std::string& key) const;
   long long integer(long long lowest, long long highest) const;
   std::string text() const;
   std::vector<double> numbers() const;

@@ -48,6 +48,14 @@ void add_shapes(const Submodel& s, Json& out) {
   add_shape("input_shape", mode.input_shape, s.shape_std->input_shape, complex, out);
 }
 
+void add_pole(const PoleEstimate& pole, Json& out) {
+  out["natural_frequency_hz"] = pole.natural_frequency_hz;
+  out["damping_ratio"] = pole.damping_ratio;
+  if (pole.natural_frequency_std_hz)
+    out["natural_frequency_std_hz"] = *pole.natural_frequency_std_hz;
+  if (pole.damping_ratio_std) out["damping_ratio_std"] = *pole.damping_ratio_std;
+}
+
 /// Unknown values are NaN, which is written as null.
 Json submodel_to_json(const Submodel& s) {
   Json out;
@@ -58,20 +66,15 @@ Json submodel_to_json(const Submodel& s) {
   for (const Eigen::MatrixXd& std : s.numerator_std)
     out["numerator_std"].push_back(matrix_to_json(std));
   if (s.is_mode()) {
-    out["natural_frequency_hz"] = s.natural_frequency_hz();
-    out["damping_ratio"] = s.damping_ratio();
-    if (s.natural_frequency_std_hz) out["natural_frequency_std_hz"] = *s.natural_frequency_std_hz;
-    if (s.damping_ratio_std) out["damping_ratio_std"] = *s.damping_ratio_std;
+    add_pole({s.natural_frequency_hz(), s.damping_ratio(), s.natural_frequency_std_hz,
+              s.damping_ratio_std},
+             out);
     if (s.verdict) out["verdict"] = to_string(*s.verdict);
     add_shapes(s, out);
   }
   for (const PoleEstimate& pole : s.poles) {
     Json item;
-    item["natural_frequency_hz"] = pole.natural_frequency_hz;
-    item["damping_ratio"] = pole.damping_ratio;
-    if (pole.natural_frequency_std_hz)
-      item["natural_frequency_std_hz"] = *pole.natural_frequency_std_hz;
-    if (pole.damping_ratio_std) item["damping_ratio_std"] = *pole.damping_ratio_std;
+    add_pole(pole, item);
     out["poles"].push_back(std::move(item));
   }
   if (s.residue_rank) out["residue_rank"] = *s.residue_rank;
@@ -100,14 +103,9 @@ Eigen::MatrixXd matrix_from_json(const JsonNode& node, std::size_t rows, std::si
 }
 
 PoleEstimate pole_from_json(const JsonNode& node) {
-  PoleEstimate pole;
-  pole.natural_frequency_hz = node.member("natural_frequency_hz").positive();
-  pole.damping_ratio = node.member("damping_ratio").number();
-  if (node.has("natural_frequency_std_hz"))
-    pole.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
-  if (node.has("damping_ratio_std"))
-    pole.damping_ratio_std = node.member("damping_ratio_std").number();
-  return pole;
+  return {node.member("natural_frequency_hz").positive(), node.member("damping_ratio").number(),
+          node.optional_number("natural_frequency_std_hz"),
+          node.optional_number("damping_ratio_std")};
 }
 
 /// numerator_std: as many matrices as `numerator`, no negative entries.
@@ -164,10 +162,8 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
   if (s.numerator.size() > s.denominator.size() + static_cast<std::size_t>(s.integrators))
     node.member("numerator")
         .fail("has a higher degree than the denominator: the submodel is improper");
-  if (node.has("natural_frequency_std_hz"))
-    s.natural_frequency_std_hz = node.member("natural_frequency_std_hz").number();
-  if (node.has("damping_ratio_std"))
-    s.damping_ratio_std = node.member("damping_ratio_std").number();
+  s.natural_frequency_std_hz = node.optional_number("natural_frequency_std_hz");
+  s.damping_ratio_std = node.optional_number("damping_ratio_std");
   if (node.has("verdict")) s.verdict = from_word<ModeVerdict>(node.member("verdict").text());
   if (node.has("poles"))
     for (const JsonNode& pole : node.member("poles").elements())
@@ -204,11 +200,11 @@ Eigen::VectorXd delay_deviations_from_json(const JsonNode& root, const std::stri
 FitRecord fit_from_json(const JsonNode& node) {
   FitRecord fit;
   fit.cost = node.number_or("cost", 0.0);
-  if (node.has("weighting")) fit.weighting = node.member("weighting").text();
+  fit.weighting = node.text_or_empty("weighting");
   if (node.has("iterations"))
     fit.iterations = static_cast<int>(node.member("iterations").integer(0, 1'000'000'000));
-  if (node.has("status")) fit.status = node.member("status").text();
-  if (node.has("message")) fit.message = node.member("message").text();
+  fit.status = node.text_or_empty("status");
+  fit.message = node.text_or_empty("message");
   fit.relative_rms_error =
       node.number_or("relative_rms_error", std::numeric_limits<double>::quiet_NaN());
   if (node.has("band_hz")) {

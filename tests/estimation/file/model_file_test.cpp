@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -66,20 +65,17 @@ AdditiveModel full_model() {
 
 class ModelFile : public testing::Test {
  protected:
-  /// Changes the JSON of a good file, and reads it.
-  template <typename Change>
-  auto reading(const Change& change) {
+  /// Reads a good file after an operation of a JSON patch.
+  void expect_patch_refused(const std::string& operation, const std::string& place,
+                            const std::string& what) {
     write_model(file_, full_model());
-    Json root = Json::parse(text_of(file_));
-    change(root);
-    write_text(file_, root.dump());
-    return [this] { (void)read_model(file_); };
-  }
-  void expect_format_error(const std::function<void(Json&)>& change, const std::string& place,
-                           const std::string& what) {
-    EXPECT_THAT(reading(change), testing::ThrowsMessage<FormatError>(
-                                     AllOf(HasSubstr(file_.string()), HasSubstr(place),
-                                           HasSubstr(what), testing::Not(HasSubstr("\n")))));
+    const Json patch = Json::array({Json::parse(operation)});
+    write_text(file_, Json::parse(text_of(file_)).patch(patch).dump());
+    EXPECT_THAT(
+        [this] { (void)read_model(file_); },
+        testing::ThrowsMessage<FormatError>(AllOf(HasSubstr(file_.string()), HasSubstr(place),
+                                                  HasSubstr(what), testing::Not(HasSubstr("\n")))))
+        << operation;
   }
 
   test::TemporaryDirectory directory_;
@@ -222,19 +218,6 @@ TEST_F(ModelFile, EveryHoldIsReadAsWritten) {
 
 // Refusals ---------------------------------------------------------------------------------------
 
-TEST_F(ModelFile, DeviationsThatDoNotBelongToTheNumerators) {
-  const auto changed = [](const auto& change) {
-    return [change](Json& root) { change(root["submodels"][1]["numerator_std"]); };
-  };
-  expect_format_error(changed([](Json& std) { std.erase(1); }), "numerator_std",
-                      "as many matrices as");
-  expect_format_error([](Json& root) { root["output_delay_std_s"][1] = -1e-6; },
-                      "output_delay_std_s", "negative standard deviation");
-  expect_format_error(changed([](Json& std) { std[0][1][2] = -1.0; }), "numerator_std",
-                      "negative standard deviation");
-  expect_format_error(changed([](Json& std) { std[0].erase(1); }), "numerator_std", "2 rows");
-}
-
 TEST_F(ModelFile, ThatIsNotThereIsAFileError) {
   EXPECT_THAT([this] { (void)read_model(directory_ / "no.json"); },
               testing::ThrowsMessage<FileError>(HasSubstr("no.json")));
@@ -274,77 +257,55 @@ TEST_F(ModelFile, WhatIsNotJsonOrNotOfThisFormat) {
   }
 }
 
-TEST_F(ModelFile, MissingKeys) {
+TEST_F(ModelFile, FaultsAreNamedWithTheirPlace) {
+  const auto remove = [](const std::string& path) {
+    return R"({"op": "remove", "path": ")" + path + "\"}";
+  };
   for (const char* key : {"inputs", "outputs", "submodels"})
-    expect_format_error([&](Json& root) { root.erase(key); }, "/", key);
+    expect_patch_refused(remove(std::string("/") + key), "/", key);
   for (const char* key : {"integrators", "denominator", "numerator"})
-    expect_format_error([&](Json& root) { root["submodels"][1].erase(key); }, "/submodels/1", key);
-}
-
-TEST_F(ModelFile, AnotherVersion) {
-  expect_format_error([](Json& root) { root["format_version"] = 2; }, "/format_version",
-                      "is 2; must be 1");
-  expect_format_error([](Json& root) { root["format_version"] = "1"; }, "/format_version",
-                      "whole number");
-}
-
-TEST_F(ModelFile, NumbersThatAreNone) {
-  // NaN and infinity become null in JSON.
-  const Json nothing;
-  expect_format_error([&](Json& root) { root["submodels"][1]["numerator"][0][1][2] = nothing; },
-                      "/submodels/1/numerator/0/1/2", "number");
-  expect_format_error([&](Json& root) { root["submodels"][1]["denominator"][1] = nothing; },
-                      "/submodels/1/denominator/1", "number");
-  expect_format_error([&](Json& root) { root["input_delay_s"][0] = "fast"; }, "/input_delay_s/0",
-                      "number");
-  expect_format_error([&](Json& root) { root["sample_rate_hz"] = -1.0; }, "/sample_rate_hz",
-                      "must be 0 or more");
-  expect_format_error([&](Json& root) { root["fit"]["cost"] = "low"; }, "/fit/cost", "number");
-  expect_format_error([&](Json& root) { root["cost_history"][1] = nothing; }, "/cost_history/1",
-                      "number");
-}
-
-TEST_F(ModelFile, WrongShapes) {
-  expect_format_error([](Json& root) { root["submodels"][0]["numerator"][0].erase(1); },
-                      "/submodels/0/numerator/0", "2 rows");
-  expect_format_error([](Json& root) { root["submodels"][0]["numerator"][0][1].erase(0); },
-                      "/submodels/0/numerator/0/1", "3 numbers");
-  expect_format_error([](Json& root) { root["submodels"][0]["numerator"] = 1.0; },
-                      "/submodels/0/numerator", "list");
-  expect_format_error([](Json& root) { root["submodels"][0]["numerator"] = Json::array(); },
-                      "/submodels/0/numerator", "at least one");
-  expect_format_error([](Json& root) { root["submodels"][0] = "mode"; }, "/submodels/0", "object");
-  expect_format_error([](Json& root) { root["input_delay_s"].push_back(0.0); }, "/input_delay_s",
-                      "3 numbers");
-  expect_format_error([](Json& root) { root["output_delay_s"].erase(0); }, "/output_delay_s",
-                      "2 numbers");
-  expect_format_error([](Json& root) { root["inputs"] = Json::array(); }, "/inputs",
-                      "at least one");
-  expect_format_error([](Json& root) { root["inputs"][1] = 7; }, "/inputs/1", "string");
-  expect_format_error([](Json& root) { root["fit"]["band_hz"] = Json::array({1.0}); },
-                      "/fit/band_hz", "two");
-}
-
-TEST_F(ModelFile, SubmodelsThatAreNoModels) {
-  expect_format_error([](Json& root) { root["submodels"][1]["denominator"][0] = 2.0; },
-                      "/submodels/1/denominator", "start with 1");
-  expect_format_error([](Json& root) { root["submodels"][1]["denominator"] = Json::array(); },
-                      "/submodels/1/denominator", "start with 1");
-  expect_format_error([](Json& root) { root["submodels"][1]["denominator"][2] = 0.0; },
-                      "/submodels/1/denominator", "end with 0");
-  expect_format_error([](Json& root) { root["submodels"][1]["integrators"] = 3; },
-                      "/submodels/1/integrators", "0 to 2");
-  expect_format_error([](Json& root) { root["submodels"][1]["integrators"] = 0.5; },
-                      "/submodels/1/integrators", "whole number");
-  expect_format_error(
-      [](Json& root) {
-        Json& numerator = root["submodels"][0]["numerator"];
-        const Json matrix = numerator[0];
-        for (int i = 0; i < 3; ++i) numerator.push_back(matrix);
-      },
-      "/submodels/0/numerator", "improper");
-  expect_format_error([](Json& root) { root["hold"] = "first-order"; }, "/hold",
-                      "none, phase, sinc or exact");
+    expect_patch_refused(remove(std::string("/submodels/1/") + key), "/submodels/1", key);
+  const auto replace = [](const std::string& path, const std::string& value) {
+    return R"({"op": "replace", "path": ")" + path + R"(", "value": )" + value + "}";
+  };
+  struct Fault {
+    std::string path;
+    const char* value;  ///< null: NaN and infinity, as JSON has them
+    const char* what;
+  };
+  for (const Fault& fault : std::vector<Fault>{
+           {"/format_version", "2", "is 2; must be 1"},
+           {"/format_version", "\"1\"", "whole number"},
+           {"/submodels/1/numerator/0/1/2", "null", "number"},
+           {"/submodels/1/denominator/1", "null", "number"},
+           {"/input_delay_s/0", "\"fast\"", "number"},
+           {"/sample_rate_hz", "-1.0", "must be 0 or more"},
+           {"/fit/cost", "\"low\"", "number"},
+           {"/cost_history/1", "null", "number"},
+           {"/submodels/0/numerator", "1.0", "list"},
+           {"/submodels/0/numerator", "[]", "at least one"},
+           {"/submodels/0", "\"mode\"", "object"},
+           {"/submodels/0/numerator/0", "[[1, 2, 3]]", "2 rows"},
+           {"/submodels/0/numerator/0/1", "[1, 2]", "3 numbers"},
+           {"/input_delay_s", "[0, 0, 0, 0]", "3 numbers"},
+           {"/output_delay_s", "[0]", "2 numbers"},
+           {"/inputs", "[]", "at least one"},
+           {"/inputs/1", "7", "string"},
+           {"/fit/band_hz", "[1.0]", "two"},
+           {"/submodels/1/denominator", "[2.0, 0.1, 0.1]", "start with 1"},
+           {"/submodels/1/denominator", "[]", "start with 1"},
+           {"/submodels/1/denominator", "[1, 0.1, 0]", "end with 0"},
+           {"/submodels/1/integrators", "3", "0 to 2"},
+           {"/submodels/1/integrators", "0.5", "whole number"},
+           {"/submodels/3/numerator", "[[[1, 2, 3], [4, 5, 6]], [[1, 2, 3], [4, 5, 6]]]",
+            "improper"},
+           {"/hold", "\"first-order\"", "none, phase, sinc or exact"},
+           {"/output_delay_std_s", "[1e-6, -1e-6]", "negative standard deviation"},
+           {"/submodels/1/numerator_std", "[[[1, 2, 3], [4, 5, 6]]]", "as many matrices as"},
+           {"/submodels/1/numerator_std/0", "[[1, 2, 3], [4, 5, -1]]",
+            "negative standard deviation"},
+           {"/submodels/1/numerator_std/0", "[[1, 2, 3]]", "2 rows"}})
+    expect_patch_refused(replace(fault.path, fault.value), fault.path, fault.what);
 }
 
 TEST_F(ModelFile, NamesThatAreNotUtf8AreWrittenReadably) {
