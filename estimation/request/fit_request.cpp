@@ -61,18 +61,11 @@ class FitDefaults {
   }
 
   void choose_hold() {
-    HoldModel& hold = setup_.options.hold;
-    if (request_.hold) {
-      hold = *request_.hold;
-      return;
-    }
-    if (setup_.frf.hold == Hold::zoh) {
-      hold = HoldModel::exact;
-      note("hold: exact, the response was measured through a zero-order hold");
-    } else {
-      hold = HoldModel::none;
-      note("hold: none, the response is that of a continuous-time plant");
-    }
+    const bool held = setup_.frf.hold == Hold::zoh;
+    setup_.options.hold = request_.hold.value_or(held ? HoldModel::exact : HoldModel::none);
+    if (request_.hold) return;
+    note(held ? "hold: exact, the response was measured through a zero-order hold"
+              : "hold: none, the response is that of a continuous-time plant");
   }
 
   void choose_delay() {
@@ -80,19 +73,14 @@ class FitDefaults {
     const FrfEstimate& frf = setup_.frf;
     if (request_.delay) {
       take_delay(*request_.delay);
-      return;
-    }
-    if (known_delay_s_) {
+    } else if (known_delay_s_) {
       options.delay_s = *known_delay_s_;
-      return;
-    }
-    if (frf.hold == Hold::zoh && options.hold != HoldModel::none) {
+    } else if (frf.hold == Hold::zoh && options.hold != HoldModel::none) {
       options.delay = DelayModel::estimate;
       note("delay: estimated, one for the plant");
-      return;
+    } else {
+      note("delay: none");
     }
-    options.delay = DelayModel::fixed;
-    note("delay: none");
   }
 
   void choose_weighting() {
@@ -151,6 +139,10 @@ class FitDefaults {
 
  private:
   void note(std::string text) { setup_.notes.push_back(std::move(text)); }
+  void warn(const std::string& text) {
+    setup_.warnings.push_back(text);
+    note(text);
+  }
 
   void take_delay(const DelayRequest& delay) {
     FitOptions& options = setup_.options;
@@ -175,22 +167,20 @@ class FitDefaults {
     LineScatter scatter = line_scatter(frf, request_.threads);
     if (!scatter.shows_distortion()) return false;
     if (lines_are_coarse(frf, scatter, request_.threads)) {
-      setup_.warnings.push_back(
+      warn(
           "weighting by period-to-period variance. The line-to-line scatter is larger, but the "
           "lines are too coarse to separate distortion from resonances: halve the spacing or "
           "measure several realizations");
-      note(setup_.warnings.back());
       return false;
     }
     frf.total_variance = std::move(scatter.variance);
     frf.total_dof = scatter.dof;
     setup_.options.weighting = Weighting::total_variance;
-    setup_.warnings.push_back(fmt::format(
+    warn(fmt::format(
         "weighting by the scatter of neighbouring lines, {:.3g} times the period-to-period "
         "variance (median): the plant appears nonlinear, and one realization is too few to measure "
         "the distortion; measure several realizations",
         scatter.over_noise));
-    note(setup_.warnings.back());
     return true;
   }
 
@@ -204,12 +194,10 @@ class FitDefaults {
     const std::string nonlinear = nonlinearity_sentence(frf);
     if (nonlinear.empty() && !differ) return false;
     weigh_by_total_variance();
-    setup_.warnings.push_back(
-        "weighting: total_variance; " +
-        (nonlinear.empty() ? "realizations differ by more than their periods, because of a "
-                             "transient or a drift: increase transient_periods or realizations"
-                           : nonlinear));
-    note(setup_.warnings.back());
+    warn("weighting: total_variance; " +
+         (nonlinear.empty() ? "realizations differ by more than their periods, because of a "
+                              "transient or a drift: increase transient_periods or realizations"
+                            : nonlinear));
     return true;
   }
 
@@ -236,8 +224,7 @@ class FitDefaults {
     read_weights(request_.weight_file, setup_.frf, options, whole_);
     const std::string missing = channels_without_weight(setup_.frf, options);
     if (missing.empty()) return;
-    setup_.warnings.push_back(missing);
-    note(missing);
+    warn(missing);
   }
 
   const FitRequest& request_;
