@@ -12,6 +12,15 @@ struct Candidate {
   double worth = 0.0;
 };
 
+Eigen::MatrixXcd as_columns(const std::vector<ModeShape>& modes,
+                            Eigen::VectorXcd ModeShape::*shape) {
+  Eigen::MatrixXcd out(modes.empty() ? 0 : (modes[0].*shape).size(),
+                       static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    out.col(static_cast<Eigen::Index>(m)) = modes[m].*shape;
+  return out;
+}
+
 bool is_share(double value) { return value > 0.0 && value <= 1.0; }
 
 std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
@@ -47,19 +56,11 @@ Eigen::MatrixXd modal_assurance(const Eigen::MatrixXcd& a, const Eigen::MatrixXc
 }
 
 Eigen::MatrixXcd output_shapes(const std::vector<ModeShape>& modes) {
-  Eigen::MatrixXcd out(modes.empty() ? 0 : modes[0].output_shape.size(),
-                       static_cast<Eigen::Index>(modes.size()));
-  for (std::size_t m = 0; m < modes.size(); ++m)
-    out.col(static_cast<Eigen::Index>(m)) = modes[m].output_shape;
-  return out;
+  return as_columns(modes, &ModeShape::output_shape);
 }
 
 Eigen::MatrixXcd input_shapes(const std::vector<ModeShape>& modes) {
-  Eigen::MatrixXcd out(modes.empty() ? 0 : modes[0].input_shape.size(),
-                       static_cast<Eigen::Index>(modes.size()));
-  for (std::size_t m = 0; m < modes.size(); ++m)
-    out.col(static_cast<Eigen::Index>(m)) = modes[m].input_shape;
-  return out;
+  return as_columns(modes, &ModeShape::input_shape);
 }
 
 std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,

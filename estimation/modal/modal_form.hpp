@@ -21,7 +21,6 @@ namespace stageid {
 ///
 /// A residue of higher rank is represented by its largest singular value; `not_rank_one` is the relative size
 /// of the next one. An overdamped mode (two real poles) is described at its slower pole.
-/// what that leaves out. An overdamped mode (two real poles) is described at its slower pole.
 struct ModeShape {
   std::size_t submodel = 0;  ///< index into the model's
   double natural_frequency_hz = 0.0;
