@@ -40,6 +40,14 @@ FrfEstimate measured(const AdditiveModel& model, HoldModel hold) {
   return test::frf_of(problem);
 }
 
+/// A stage, and its response through the exact hold.
+class ValidationOfAStage : public testing::Test {
+ protected:
+  AdditiveModel model = stage_model(HoldModel::exact);
+  FrfEstimate frf = measured(model, HoldModel::exact);
+};
+using ResponseLike = ValidationOfAStage;
+
 /// Adds noise of the variance in the FRF, or of `factor` times it.
 void add_noise(FrfEstimate& frf, std::uint64_t seed, double factor = 1.0) {
   test::RandomNumbers random(seed);
@@ -49,13 +57,23 @@ void add_noise(FrfEstimate& frf, std::uint64_t seed, double factor = 1.0) {
       frf.response(c, k) += std::sqrt(factor * frf.noise_variance(c, k)) * random.circular();
 }
 
-TEST(Validation, ATrueModelIsWithinTheNoise) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
+/// Makes the variances those of so many degrees of freedom.
+void scatter_variances(FrfEstimate& frf, std::uint64_t seed, int dof) {
+  test::RandomNumbers random(seed);
+  for (double& variance : frf.noise_variance.reshaped()) {
+    double sum = 0.0;
+    for (int i = 0; i < dof; ++i) sum += std::norm(random.circular());
+    variance *= sum / dof;
+  }
+  frf.noise_dof = dof;
+}
+
+TEST_F(ValidationOfAStage, ATrueModelIsWithinTheNoise) {
   int too_coloured = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    FrfEstimate frf = measured(model, HoldModel::exact);
-    add_noise(frf, seed);
-    const Validation result = validate(model, frf);
+    FrfEstimate noisy = frf;
+    add_noise(noisy, seed);
+    const Validation result = validate(model, noisy);
     const double values = 6.0 * 1500.0;
     // |e|^2 is Exp(1): mean 1 and deviation 1 each.
     EXPECT_NEAR(result.chi_square_per_dof, 1.0, 4.5 / std::sqrt(values));
@@ -70,18 +88,9 @@ TEST(Validation, ATrueModelIsWithinTheNoise) {
 }
 
 // Variances from few degrees of freedom: |e|^2 over them is F(2, 2 nu).
-TEST(Validation, CountsWhatVariancesFromFewDegreesOfFreedomExceed) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, CountsWhatVariancesFromFewDegreesOfFreedomExceed) {
   add_noise(frf, 71);
-  test::RandomNumbers random(72);
-  constexpr int kDof = 4;
-  for (double& variance : frf.noise_variance.reshaped()) {
-    double sum = 0.0;
-    for (int i = 0; i < kDof; ++i) sum += std::norm(random.circular());
-    variance *= sum / kDof;
-  }
-  frf.noise_dof = kDof;
+  scatter_variances(frf, 72, 4);
   const Validation result = validate(model, frf);
   EXPECT_NEAR(result.whitened_above_95, 0.05, 4.5 * std::sqrt(0.05 * 0.95 / 9000.0));
   frf.noise_dof = 0.0;  // taken for exact
@@ -113,9 +122,7 @@ TEST(Validation, TheWhitenessLimitIsTheOneItSays) {
   EXPECT_LE(above, 40);
 }
 
-TEST(Validation, AModelThatIsWrongShowsInEveryFigure) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, AModelThatIsWrongShowsInEveryFigure) {
   add_noise(frf, 3);
   AdditiveModel wrong = model;
   const std::vector<double> a = test::mode_coefficients(303.0, 0.02);
@@ -128,9 +135,7 @@ TEST(Validation, AModelThatIsWrongShowsInEveryFigure) {
 }
 
 // One realization: the lines scatter by more than the variance from periods, about a smooth response.
-TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
   add_noise(frf, 4, 4.0);
   const Validation result = validate(model, frf);
   EXPECT_TRUE(result.explained) << result.reason;
@@ -140,9 +145,7 @@ TEST(Validation, ScatterOfTheLinesExplainsWhatTheNoiseDoesNot) {
 }
 
 // With too few lines for a scatter, only the noise is known.
-TEST(Validation, NoiseThatIsLargerThanToldShowsInChiSquare) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, NoiseThatIsLargerThanToldShowsInChiSquare) {
   add_noise(frf, 4, 25.0);
   frf = select_band(std::move(frf), 600.0, 625.0);
   const Validation result = validate(model, frf);
@@ -172,9 +175,7 @@ TEST(Validation, ErrorsAreThoseOfTheirDefinitions) {
   EXPECT_EQ(result.whiteness_limit, 0.0);
 }
 
-TEST(Validation, TotalVarianceServesWhereNoNoiseVarianceIs) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, TotalVarianceServesWhereNoNoiseVarianceIs) {
   add_noise(frf, 5);
   frf.total_variance = frf.noise_variance;
   frf.noise_variance.resize(0, 0);
@@ -182,45 +183,36 @@ TEST(Validation, TotalVarianceServesWhereNoNoiseVarianceIs) {
 }
 
 // A variance that is itself the mean of nu squares: the ratio is F(2, 2 nu).
-TEST(Validation, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  EXPECT_EQ(validate(model, measured(model, HoldModel::exact)).expected_chi_square, 9.0 / 8.0)
+TEST_F(ValidationOfAStage, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
+  EXPECT_EQ(validate(model, frf).expected_chi_square, 9.0 / 8.0)
       << "without variances: of the scatter of twelve lines about three terms";
   for (const int nu : {4, 9}) {
-    FrfEstimate frf = measured(model, HoldModel::exact);
-    add_noise(frf, 7);
-    EXPECT_EQ(validate(model, frf).expected_chi_square, 1.0) << "exact variances";
-    test::RandomNumbers random(static_cast<std::uint64_t>(nu));
-    for (double& variance : frf.noise_variance.reshaped()) {
-      double sum = 0.0;
-      for (int i = 0; i < nu; ++i) sum += std::norm(random.circular());
-      variance *= sum / nu;
-    }
-    frf.noise_dof = nu;
-    const Validation result = validate(model, frf);
+    FrfEstimate noisy = frf;
+    add_noise(noisy, 7);
+    EXPECT_EQ(validate(model, noisy).expected_chi_square, 1.0) << "exact variances";
+    scatter_variances(noisy, static_cast<std::uint64_t>(nu), nu);
+    const Validation result = validate(model, noisy);
     EXPECT_DOUBLE_EQ(result.expected_chi_square, nu / (nu - 1.0));
     // F(2, 2 nu) has the variance nu^3 / ((nu - 1)^2 (nu - 2)).
     const double deviation = std::sqrt(std::pow(nu, 3) / (std::pow(nu - 1, 2) * (nu - 2)));
     EXPECT_NEAR(result.chi_square_per_dof, result.expected_chi_square,
                 4.5 * deviation / std::sqrt(9000.0));
   }
-  FrfEstimate one = measured(model, HoldModel::exact);
-  add_noise(one, 7);
-  one.noise_dof = 1.0;
-  EXPECT_EQ(validate(model, one).expected_chi_square, 0.0) << "no mean";
+  add_noise(frf, 7);
+  frf.noise_dof = 1.0;
+  EXPECT_EQ(validate(model, frf).expected_chi_square, 0.0) << "no mean";
 }
 
-TEST(Validation, ChannelsMustMatchByName) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, ChannelsMustMatchByName) {
   const auto message =
       testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("different channels"));
   frf.inputs.names[1] = "other";
   EXPECT_THAT([&] { (void)validate(model, frf); }, message);
-  frf = measured(model, HoldModel::exact);
+  frf.inputs.names[1] = model.inputs.names[1];
   std::swap(frf.outputs.names[0], frf.outputs.names[1]);
   EXPECT_THAT([&] { (void)validate(model, frf); }, message);
-  frf = select_channels(measured(model, HoldModel::exact), {"a1", "a2"}, {"z1", "z2"});
+  std::swap(frf.outputs.names[0], frf.outputs.names[1]);
+  frf = select_channels(frf, {"a1", "a2"}, {"z1", "z2"});
   EXPECT_THAT([&] { (void)validate(model, frf); }, message);
 }
 
@@ -231,19 +223,16 @@ double distance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b) {
   return ((a - b).cwiseAbs().array() / b.cwiseAbs().array()).maxCoeff();
 }
 
-TEST(ResponseLike, SampledDataAreComparedThroughHoldAndDelay) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  EXPECT_LT(distance(response_like(model, measured(model, HoldModel::exact)),
-                     test::reference_response(model, measured(model, HoldModel::exact).frequency_hz,
-                                              HoldModel::exact)),
+TEST_F(ResponseLike, SampledDataAreComparedThroughHoldAndDelay) {
+  EXPECT_LT(distance(response_like(model, frf),
+                     test::reference_response(model, frf.frequency_hz, HoldModel::exact)),
             1e-9);
 }
 
-TEST(ResponseLike, ContinuousDataAreComparedWithoutThem) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
+TEST_F(ResponseLike, ContinuousDataAreComparedWithoutThem) {
   AdditiveModel bare = model;
   bare.input_delay_s.setZero();
-  FrfEstimate frf = measured(bare, HoldModel::none);
+  frf = measured(bare, HoldModel::none);
   EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-12);
   // A model that was fitted to such data with a delay keeps it.
   AdditiveModel continuous = model;
@@ -252,9 +241,7 @@ TEST(ResponseLike, ContinuousDataAreComparedWithoutThem) {
   EXPECT_LT(distance(response_like(continuous, frf), frf.response), 1e-12);
 }
 
-TEST(ResponseLike, DataThatHaveLostHoldAndDelayMeetAModelThatLosesThemToo) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ResponseLike, DataThatHaveLostHoldAndDelayMeetAModelThatLosesThemToo) {
   frf.delay_s = 1.1e-4;  // not quite the model's
   const double T = 1e-4;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
@@ -266,9 +253,7 @@ TEST(ResponseLike, DataThatHaveLostHoldAndDelayMeetAModelThatLosesThemToo) {
 }
 
 // Hold level "phase": e^{-j omega (delay_s + T/2)} is divided out, the magnitude is unchanged.
-TEST(ResponseLike, DataThatHaveLostTheirDelayMeetAModelThatLosesItToo) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ResponseLike, DataThatHaveLostTheirDelayMeetAModelThatLosesItToo) {
   frf.delay_s = 1.1e-4;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const std::complex<double> s(0.0, 2.0 * std::numbers::pi * frf.frequency_hz[k]);
@@ -278,40 +263,30 @@ TEST(ResponseLike, DataThatHaveLostTheirDelayMeetAModelThatLosesItToo) {
   EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-9);
 }
 
-TEST(ResponseLike, AContinuousModelOfCompensatedDataIsTakenAsItIs) {
-  const AdditiveModel model = stage_model(HoldModel::none);
-  FrfEstimate frf = measured(model, HoldModel::none);
+TEST_F(ResponseLike, AContinuousModelOfCompensatedDataIsTakenAsItIs) {
+  model = stage_model(HoldModel::none);
+  frf = measured(model, HoldModel::none);
   frf.hold = Hold::zoh;
   frf.compensated = Compensation::hold;
   EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-12);
 }
 
-TEST(ResponseLike, NeedsASampleRateForSampledData) {
-  AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ResponseLike, NeedsASampleRateForSampledData) {
   model.sample_rate_hz = 0.0;
   EXPECT_THROW((void)response_like(model, frf), std::invalid_argument);
 }
 
-TEST(Validation, OtherUnitsAreAnotherResponse) {
-  AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, OtherUnitsAreAnotherResponse) {
   model.outputs.units = {"m", "m"};
   frf.outputs.units = {"m", ""};  // unknown: nothing is said against it
   EXPECT_NO_THROW(validate(model, frf));
   frf.outputs.units = {"m", "mm"};
-  try {
-    validate(model, frf);
-    FAIL() << "millimetres taken for metres";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(),
-                ::testing::HasSubstr(model.outputs.names[1] + " is in m in the model"));
-  }
+  EXPECT_THAT([&] { validate(model, frf); },
+              testing::ThrowsMessage<std::invalid_argument>(
+                  testing::HasSubstr(model.outputs.names[1] + " is in m in the model")));
 }
 
-TEST(Validation, AChannelOfNoiseDoesNotDecideTheRelativeError) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, AChannelOfNoiseDoesNotDecideTheRelativeError) {
   add_noise(frf, 5);
   frf.noise_dof = 8.0;
   AdditiveModel decoupled = model;
@@ -325,9 +300,7 @@ TEST(Validation, AChannelOfNoiseDoesNotDecideTheRelativeError) {
   EXPECT_NEAR(result.channel_error[0], 0.01, 0.002);
 }
 
-TEST(Validation, OfAZeroResponseThereIsNoRelativeError) {
-  const AdditiveModel model = stage_model(HoldModel::exact);
-  FrfEstimate frf = measured(model, HoldModel::exact);
+TEST_F(ValidationOfAStage, OfAZeroResponseThereIsNoRelativeError) {
   frf.response.setZero();
   const Validation result = validate(model, frf);
   EXPECT_TRUE(std::isnan(result.relative_rms_error));
