@@ -150,6 +150,68 @@ inline std::vector<Eigen::MatrixXcd> joint_jacobian(const DenseProblem& problem,
   return out;
 }
 
+/// M = sum Re{J^H W J}, e = sum Re{J^H W vec E} of all parameters with W written out.
+struct DenseEquations {
+  Eigen::MatrixXd M;
+  Eigen::VectorXd e;
+};
+template <typename Weights>
+DenseEquations dense_equations(const DenseProblem& at, const Eigen::MatrixXcd& G, DelayModel delay,
+                               const Weights& weights) {
+  const std::vector<Eigen::MatrixXcd> J = joint_jacobian(at, delay);
+  const Eigen::MatrixXcd E = G - reference_response(at.model, at.frequency_hz, at.hold);
+  DenseEquations out{Eigen::MatrixXd::Zero(J[0].cols(), J[0].cols()),
+                     Eigen::VectorXd::Zero(J[0].cols())};
+  for (std::size_t k = 0; k < J.size(); ++k) {
+    const Eigen::MatrixXcd JW = J[k].adjoint() * weights(k);
+    out.M += (JW * J[k]).real();
+    out.e += (JW * E.col(static_cast<Eigen::Index>(k))).real();
+  }
+  return out;
+}
+
+inline Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& M) {
+  const Eigen::VectorXd scale = M.diagonal().cwiseSqrt().cwiseInverse();
+  return scale.asDiagonal() * (scale.asDiagonal() * M * scale.asDiagonal()).fullPivLu().inverse() *
+         scale.asDiagonal();
+}
+
+/// The reported deviations of a mode against those of f = 1 / (2 pi sqrt a_2) and zeta = a_1 / (2 sqrt a_2).
+/// @param C covariance of a_1, a_2
+inline void expect_mode_deviations(const Submodel& s, const Eigen::Matrix2d& C, double relative) {
+  const double a1 = s.denominator[1];
+  const double a2 = s.denominator[2];
+  const double f_std = 0.5 * s.natural_frequency_hz() / a2 * std::sqrt(C(1, 1));
+  const double zeta_std = s.damping_ratio() * std::sqrt(C(0, 0) / (a1 * a1) - C(0, 1) / (a1 * a2) +
+                                                        C(1, 1) / (4.0 * a2 * a2));
+  ASSERT_TRUE(s.natural_frequency_std_hz && s.damping_ratio_std);
+  EXPECT_NEAR(*s.natural_frequency_std_hz, f_std, relative * f_std);
+  EXPECT_NEAR(*s.damping_ratio_std, zeta_std, relative * zeta_std);
+}
+
+/// The 2 x 3 stage with modes of rank one, one disturbance on both outputs, and inputs that repeat what the controller
+/// makes of it.
+struct RankOneStage {
+  DenseProblem problem = noisy_stage(HoldModel::exact, 0.0);
+  CorrelatedNoise noise;
+
+  RankOneStage() {
+    RandomNumbers random(12);
+    for (Submodel& s : problem.model.submodels) {
+      if (!s.is_mode()) continue;
+      const Eigen::VectorXd phi{{random.uniform(0.5, 1.5), random.uniform(0.5, 1.5)}};
+      const Eigen::VectorXd psi{{random.normal(), random.normal(), random.normal()}};
+      s.numerator[0] = s.denominator[2] * phi * psi.transpose();
+    }
+    problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
+    noise = correlated_noise(problem, 0.01, 0.9);
+  }
+  FrfEstimate measured_with(std::uint64_t seed) const {
+    RandomNumbers random(seed);
+    return measured(problem, noise, random);
+  }
+};
+
 /// One measurement of the 2 x 3 stage with strongly correlated noise.
 struct Measurement {
   DenseProblem problem = noisy_stage(HoldModel::exact, 0.0);

@@ -31,4 +31,13 @@ inline Eigen::MatrixXcd noisy(RandomNumbers& random, const DenseProblem& problem
   return G;
 }
 
+/// A measurement of it with noise of such a variance, which the FRF knows.
+inline FrfEstimate noisy_frf(RandomNumbers& random, const DenseProblem& problem,
+                             const Eigen::MatrixXd& variance) {
+  FrfEstimate frf = frf_of(problem);
+  frf.response = noisy(random, problem, variance);
+  frf.noise_variance = variance;
+  return frf;
+}
+
 }  // namespace stageid::test

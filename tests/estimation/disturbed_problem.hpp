@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <vector>
 
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
@@ -34,5 +35,17 @@ inline void measure_and_disturb(RandomNumbers& random, DenseProblem& problem, do
       B.array() *= 1.0 + 0.3 * random_matrix(random, B.rows(), B.cols()).array();
   }
 }
+
+/// A problem evaluated at the parameters of its model.
+struct Evaluated {
+  FitProblem fit;
+  FitParameters beta;
+  std::vector<BasisGroup> groups;
+  explicit Evaluated(const DenseProblem& problem, DelayModel delay = DelayModel::fixed,
+                     bool derivatives = true)
+      : fit(fit_problem(problem, delay)),
+        beta(fit_parameters(problem)),
+        groups(evaluate_groups(fit, beta, derivatives)) {}
+};
 
 }  // namespace stageid::test

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <utility>
 #include <vector>
 
@@ -55,6 +57,24 @@ inline AdditiveModel moved(const AdditiveModel& model, double frequency_factor,
     start.submodels.push_back(s);
   }
   return start;
+}
+
+/// Repetitions of a measurement, and the bounds of a sample variance over the true one: chi^2 of 149 degrees of freedom
+/// over its mean lies in here with 99.99 %, 1 +- 3.9 sqrt(2 / 149) with its skewness (Wilson and Hilferty).
+inline constexpr int kRuns = 150;
+inline constexpr double kLowestRatio = 0.62;
+inline constexpr double kHighestRatio = 1.52;
+
+/// The sample variances of quantities x runs.
+inline Eigen::ArrayXd scatter_of(const Eigen::MatrixXd& values) {
+  const Eigen::VectorXd mean = values.rowwise().mean();
+  return (values.colwise() - mean).rowwise().squaredNorm() / static_cast<double>(values.cols() - 1);
+}
+
+inline void expect_honest(const Eigen::ArrayXd& scatter, const Eigen::ArrayXd& reported) {
+  const Eigen::ArrayXd ratio = scatter / reported;
+  EXPECT_GT(ratio.minCoeff(), kLowestRatio) << ratio.transpose();
+  EXPECT_LT(ratio.maxCoeff(), kHighestRatio) << ratio.transpose();
 }
 
 }  // namespace stageid::test

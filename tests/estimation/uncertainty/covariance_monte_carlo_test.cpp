@@ -12,14 +12,9 @@ namespace test_covariance_monte_carlo {
 
 using test::covariance_stage;
 using test::DenseProblem;
+using test::kRuns;
 using test::noisy;
 using test::options_with;
-
-constexpr int kRuns = 150;
-// chi^2 of 149 degrees of freedom over its mean lies in here with 99.99 %: 1 +- 3.9 sqrt(2 / 149)
-// with its skewness (Wilson and Hilferty).
-constexpr double kLowest = 0.62;
-constexpr double kHighest = 1.52;
 
 /// Fits kRuns noisy measurements. Checks the scatter relative to the reported deviations, also of the response.
 void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool tell_variance) {
@@ -61,24 +56,16 @@ void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool te
     response_ratio[run] = ratio.mean();
     channel_ratio += ratio.rowwise().mean() / kRuns;
   }
+  test::expect_honest(test::scatter_of(values), reported);
   for (Eigen::Index q = 0; q < kQuantities; ++q) {
-    const double mean = values.row(q).mean();
-    const double scatter = (values.row(q).array() - mean).square().sum() / (kRuns - 1);
-    EXPECT_GT(scatter / reported[q], kLowest) << "quantity " << q;
-    EXPECT_LT(scatter / reported[q], kHighest) << "quantity " << q;
     // Unbiased within the scatter of the mean.
     const Submodel& truth = problem.model.submodels[static_cast<std::size_t>(q / 2) + 1];
-    EXPECT_NEAR(mean, q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
+    EXPECT_NEAR(values.row(q).mean(),
+                q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
                 4.0 * std::sqrt(reported[q] / kRuns));
   }
-  for (Eigen::Index q = 0; q < n_numerators; ++q) {
-    const double scatter =
-        (numerators.row(q).array() - numerators.row(q).mean()).square().sum() / (kRuns - 1);
-    EXPECT_GT(scatter / numerators_reported[q], kLowest) << "numerator " << q;
-    EXPECT_LT(scatter / numerators_reported[q], kHighest) << "numerator " << q;
-  }
-  const double error = std::sqrt((response_ratio.array() - response_ratio.mean()).square().sum() /
-                                 (kRuns - 1) / kRuns);
+  test::expect_honest(test::scatter_of(numerators), numerators_reported);
+  const double error = std::sqrt(test::scatter_of(response_ratio.transpose())[0] / kRuns);
   EXPECT_NEAR(response_ratio.mean(), 1.0, 4.0 * error);
   // A channel has 4 numerators and a share of the poles: about 8 real degrees a run.
   for (const double ratio : channel_ratio)
@@ -150,12 +137,7 @@ TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
       reported[i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
     }
   }
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const double scatter =
-        (values.row(i).array() - values.row(i).mean()).square().sum() / (kRuns - 1);
-    EXPECT_GT(scatter / reported[i], kLowest) << "mode " << i;
-    EXPECT_LT(scatter / reported[i], kHighest) << "mode " << i;
-  }
+  test::expect_honest(test::scatter_of(values), reported);
 }
 
 }  // namespace test_covariance_monte_carlo

@@ -18,6 +18,7 @@ namespace test_likelihood_fit {
 
 using test::correlated_noise;
 using test::CorrelatedNoise;
+using test::DenseEquations;
 using test::DenseProblem;
 using test::Measurement;
 using test::options_with;
@@ -35,30 +36,11 @@ double dense_cost(const AdditiveModel& model, const FrfEstimate& frf,
   return sum / (2.0 * static_cast<double>(frf.lines()));
 }
 
-/// M = sum Re{J^H W J}, e = sum Re{J^H W vec E} with W written out.
-struct DenseEquations {
-  Eigen::MatrixXd M;
-  Eigen::VectorXd e;
-};
 DenseEquations dense_equations(const DenseProblem& at, const FrfEstimate& frf,
                                const CorrelatedNoise& noise, DelayModel delay) {
-  const std::vector<Eigen::MatrixXcd> J = test::joint_jacobian(at, delay);
-  const Eigen::MatrixXcd E =
-      frf.response - test::reference_response(at.model, at.frequency_hz, at.hold);
-  DenseEquations out{Eigen::MatrixXd::Zero(J[0].cols(), J[0].cols()),
-                     Eigen::VectorXd::Zero(J[0].cols())};
-  for (std::size_t k = 0; k < J.size(); ++k) {
-    const Eigen::MatrixXcd JW = J[k].adjoint() * noise.covariance(k).inverse();
-    out.M += (JW * J[k]).real();
-    out.e += (JW * E.col(static_cast<Eigen::Index>(k))).real();
-  }
-  return out;
-}
-
-Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& M) {
-  const Eigen::VectorXd scale = M.diagonal().cwiseSqrt().cwiseInverse();
-  return scale.asDiagonal() * (scale.asDiagonal() * M * scale.asDiagonal()).fullPivLu().inverse() *
-         scale.asDiagonal();
+  return test::dense_equations(at, frf.response, delay, [&](std::size_t k) -> Eigen::MatrixXcd {
+    return noise.covariance(k).inverse();
+  });
 }
 
 /// max_i |e_i| / sqrt(M_ii sum E^H W E).
@@ -172,21 +154,12 @@ Eigen::MatrixXd expect_fisher_deviations(const Measurement& m) {
   DenseProblem at = m.problem;
   at.model = fit.model;
   const Eigen::MatrixXd C =
-      0.5 * scaled_inverse(dense_equations(at, m.frf, m.noise, DelayModel::estimate).M);
-  for (std::size_t i = 1; i < 4; ++i) {
-    const Submodel& s = fit.model.submodels[i];
-    const auto a = 2 * static_cast<Eigen::Index>(i) - 2;
-    const double a1 = s.denominator[1];
-    const double a2 = s.denominator[2];
-    const double f_std = 0.5 * s.natural_frequency_hz() / a2 * std::sqrt(C(a + 1, a + 1));
-    const double zeta_std =
-        s.damping_ratio() * std::sqrt(C(a, a) / (a1 * a1) - C(a, a + 1) / (a1 * a2) +
-                                      C(a + 1, a + 1) / (4.0 * a2 * a2));
-    // Conjugate gradients to 1e-2 in the norm of the arrow, variances to its square, and the true norm
-    // is larger by the condition of the correlations, 1e3 here, at its worst.
-    EXPECT_NEAR(*s.natural_frequency_std_hz, f_std, 5e-3 * f_std);
-    EXPECT_NEAR(*s.damping_ratio_std, zeta_std, 5e-3 * zeta_std);
-  }
+      0.5 * test::scaled_inverse(dense_equations(at, m.frf, m.noise, DelayModel::estimate).M);
+  // Conjugate gradients to 1e-2 in the norm of the arrow, variances to its square, and the true norm is larger by the
+  // condition of the correlations, 1e3 here, at its worst.
+  for (Eigen::Index i = 0; i < 3; ++i)
+    test::expect_mode_deviations(fit.model.submodels[static_cast<std::size_t>(i) + 1],
+                                 C.block<2, 2>(2 * i, 2 * i), 5e-3);
   const std::vector<Eigen::MatrixXcd> J = test::joint_jacobian(at, DelayModel::estimate);
   Eigen::MatrixXd ratio = fit.response_variance;
   for (Eigen::Index k = 0; k < ratio.cols(); ++k) {
