@@ -1,6 +1,5 @@
 #include "estimation/equations/arrow_system.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -15,13 +14,22 @@ constexpr Eigen::Index kAtOnce = 16;  // channels eliminated together
 
 }  // namespace
 
-bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x) {
-  const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
+ScaledNormalEquations::ScaledNormalEquations(const Eigen::MatrixXd& M)
+    : scale_(M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse()) {
+  Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
+  // Far below the rounding of the sums; needed only to factorize coinciding poles.
   scaled.diagonal().array() += 1e-14;
-  const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
-  if (factor.info() != Eigen::Success) return false;
-  x = scale.asDiagonal() * factor.solve(scale.asDiagonal() * b);
+  factor_.compute(scaled);
+}
+
+Eigen::MatrixXd ScaledNormalEquations::solve(const Eigen::MatrixXd& b) const {
+  return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * b);
+}
+
+bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x) {
+  const ScaledNormalEquations equations(M);
+  if (!equations.ok()) return false;
+  x = equations.solve(b);
   return x.allFinite();
 }
 
@@ -41,19 +49,13 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
                          ChannelEquationsUse use)
-    : problem_(problem),
-      beta_(beta),
-      method_(method),
-      range_(part),
-      use_(use),
-      columns_(derivative_columns(problem)) {
+    : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
   const Eigen::Index globals = problem.globals();
   M_.setZero(globals, globals);
   e_.setZero(globals);
   schur_.setZero(globals, globals);
   schur_e_.setZero(globals);
   if (keeps()) channels_.resize(static_cast<std::size_t>(part.count));
-  if (method != FitMethod::gn) equation_error_columns(problem, beta, Y_re_, Y_im_);
   for (const BasisGroup& group : groups) {
     const Eigen::Index* all = group.channels.data();
     const Eigen::Index* all_end = all + group.channels.size();
@@ -65,23 +67,19 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
       add_few(group, begin, end);
       continue;
     }
-    const GroupProducts products(problem, group, columns_, method);
+    const GroupProducts products(shared_, group);
     for (const TileRange& block : member_blocks(begin - all, end - begin, problem.size()))
-      if (regular_) add_block(group, products, block);
+      if (regular_) add_block(products, block);
   }
   schur_ += M_;
   schur_e_ += e_;
 }
 
-void ArrowSystem::add_block(const BasisGroup& group, const GroupProducts& products,
-                            const TileRange& block) {
-  const std::vector<Eigen::Index> members(
-      group.channels.begin() + block.first_member,
-      group.channels.begin() + block.first_member + block.members);
+void ArrowSystem::add_block(const GroupProducts& products, const TileRange& block) {
+  const auto first_member = products.group.channels.begin() + block.first_member;
+  const std::vector<Eigen::Index> members(first_member, first_member + block.members);
   const Eigen::MatrixXd B = rows_of(beta_.B, members);
-  const ComplexColumns Y{Y_re_, Y_im_};
-  const LineSums sums = line_sums(problem_, group, products, block, B, columns_,
-                                  method_ == FitMethod::gn ? nullptr : &Y, method_);
+  const LineSums sums = line_sums(products, block, B);
   add_denominators(sums);
   std::vector<Channel> passing;
   for (Eigen::Index first = 0; first < block.members && regular_; first += kAtOnce) {
@@ -113,12 +111,10 @@ ArrowSystem::Channel& ArrowSystem::kept(Eigen::Index c) {
 
 void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
                           const Eigen::Index* end) {
-  const ComplexColumns Y{Y_re_, Y_im_};
   std::vector<ChannelEquations> own(static_cast<std::size_t>(end - begin));
   for_each_task(problem_.threads, static_cast<int>(own.size()), [&](int r) {
     const auto at = static_cast<std::size_t>(r);
-    own[at] = channel_equations(problem_, beta_, group, begin[r], columns_,
-                                method_ == FitMethod::gn ? nullptr : &Y, method_);
+    own[at] = channel_equations(shared_, beta_, group, begin[r]);
   });
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index globals = problem_.globals();
@@ -139,17 +135,17 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
 
 void ArrowSystem::add_denominators(const LineSums& sums) {
   const Eigen::Index n_a = problem_.denominators();
-  const auto n_d = static_cast<Eigen::Index>(columns_.size());
+  const auto n_d = static_cast<Eigen::Index>(shared_.columns.size());
   for (Eigen::Index d = 0; d < n_d; ++d)
     for (Eigen::Index o = 0; o < n_d; ++o) {
-      const Eigen::Index p = columns_[static_cast<std::size_t>(d)].parameter;
-      const Eigen::Index q = columns_[static_cast<std::size_t>(o)].parameter;
+      const Eigen::Index p = shared_.columns[static_cast<std::size_t>(d)].parameter;
+      const Eigen::Index q = shared_.columns[static_cast<std::size_t>(o)].parameter;
       M_(p, q) += d >= o ? sums.DD(d, o) : sums.DD(o, d);
     }
   e_.head(n_a) += sums.ZE;
-  if (method_ == FitMethod::gn) return;
+  if (shared_.method == FitMethod::gn) return;
   M_.topLeftCorner(n_a, n_a) -= sums.ZY;
-  if (method_ != FitMethod::sk) return;
+  if (shared_.method != FitMethod::sk) return;
   M_.topLeftCorner(n_a, n_a) += sums.YY - sums.ZY.transpose();
   e_.head(n_a) -= sums.YE;
 }
@@ -158,17 +154,18 @@ void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Ei
                               Channel& channel) const {
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index n_a = problem_.denominators();
-  const auto n_d = static_cast<Eigen::Index>(columns_.size());
+  const auto n_d = static_cast<Eigen::Index>(shared_.columns.size());
   channel.bb = from_triangle(sums.FF.col(member), n_f);
   channel.ab.setZero(problem_.globals(), n_f);
   const auto FD = sums.FD.col(member).reshaped(n_d, n_f);
   for (Eigen::Index d = 0; d < n_d; ++d) {
-    const auto [function, parameter] = columns_[static_cast<std::size_t>(d)];
+    const auto [function, parameter] = shared_.columns[static_cast<std::size_t>(d)];
     channel.ab.row(parameter) += B(member, function) * FD.row(d);
   }
-  if (method_ == FitMethod::sk) channel.ab.topRows(n_a) -= sums.FY.col(member).reshaped(n_a, n_f);
+  if (shared_.method == FitMethod::sk)
+    channel.ab.topRows(n_a) -= sums.FY.col(member).reshaped(n_a, n_f);
   channel.ba = channel.ab.transpose();
-  if (method_ == FitMethod::riv)
+  if (shared_.method == FitMethod::riv)
     channel.ba.leftCols(n_a) -= sums.FY.col(member).reshaped(n_a, n_f).transpose();
   channel.e = sums.FE.col(member);
 }
@@ -182,15 +179,15 @@ void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eig
     channel.ba.col(t) += sums.TF.col(member);
     e_[t] += sums.TE[member];
     for (const Eigen::Index o : delays) M_(t, o) += sums.TT[member];
-    for (std::size_t d = 0; d < columns_.size(); ++d) {
-      const auto [f, p] = columns_[d];
+    for (std::size_t d = 0; d < shared_.columns.size(); ++d) {
+      const auto [f, p] = shared_.columns[d];
       const double value = B(member, f) * sums.TD(static_cast<Eigen::Index>(d), member);
       M_(t, p) += value;
       M_(p, t) += value;
     }
-    if (method_ == FitMethod::gn) continue;
+    if (shared_.method == FitMethod::gn) continue;
     M_.row(t).head(n_a) -= sums.TY.col(member).transpose();
-    if (method_ == FitMethod::sk) M_.col(t).head(n_a) -= sums.TY.col(member);
+    if (shared_.method == FitMethod::sk) M_.col(t).head(n_a) -= sums.TY.col(member);
   }
 }
 
@@ -233,19 +230,6 @@ Eigen::VectorXd ArrowSystem::solve_schur(const Eigen::VectorXd& right_side, doub
   hold_unknowns(frozen, scaled);
   for (const Eigen::Index i : frozen) rhs[i] = 0.0;
   return scale.cwiseProduct(scaled.partialPivLu().solve(rhs));
-}
-
-ArrowSystem::Step ArrowSystem::solve(double damping) const {
-  Step step;
-  if (!regular_) return step;
-  step.globals = problem_.globals() > 0 ? solve_globals(damping) : Eigen::VectorXd();
-  step.B.resize(problem_.channels(), problem_.functions());
-  for (std::size_t c = 0; c < channels_.size(); ++c) {
-    const Channel& channel = channels_[c];
-    step.B.row(static_cast<Eigen::Index>(c)) = (channel.x - channel.Z * step.globals).transpose();
-  }
-  step.ok = step.globals.allFinite() && step.B.allFinite();
-  return step;
 }
 
 Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side, double damping,

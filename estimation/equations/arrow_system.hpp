@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
@@ -44,15 +45,8 @@ class ArrowSystem {
               const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
 
-  struct Step {
-    Eigen::VectorXd globals;
-    Eigen::MatrixXd B;  ///< n_c x n_f
-    bool ok = false;    ///< false: the equations are singular
-  };
-  /// Solves with `damping` times the diagonal of the Schur complement added to it.
-  Step solve(double damping) const;
-  /// Solves for the globals only, for use if numerators are re-solved afterwards.
-  /// `frozen` globals remain unchanged.
+  /// The step of the globals with `damping` times the diagonal of the Schur complement added to it; that of the
+  /// numerators of a channel is then x - Z times it. `frozen` globals remain unchanged.
   Eigen::VectorXd solve_globals(double damping, const std::vector<Eigen::Index>& frozen = {}) const;
 
   /// M^-1 times a right-hand side other than e, both (globals, vec B); the same damping. @pre regular()
@@ -86,7 +80,7 @@ class ArrowSystem {
   /// Destinations of the equations of these channels: storage, or `passing`.
   std::vector<Channel*> places(const Eigen::Index* channels, Eigen::Index count,
                                std::vector<Channel>& passing);
-  void add_block(const BasisGroup& group, const GroupProducts& products, const TileRange& block);
+  void add_block(const GroupProducts& products, const TileRange& block);
   void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
   void add_denominators(const LineSums& sums);
   void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
@@ -99,12 +93,9 @@ class ArrowSystem {
 
   const FitProblem& problem_;
   const FitParameters& beta_;
-  FitMethod method_;
   ChannelRange range_;
   ChannelEquationsUse use_;
-  std::vector<DerivativeColumn> columns_;
-  Eigen::MatrixXd Y_re_;  // equation_error_columns()
-  Eigen::MatrixXd Y_im_;
+  EquationMethod shared_;
   Eigen::MatrixXd M_;
   Eigen::VectorXd e_;
   std::vector<Channel> channels_;
@@ -117,7 +108,17 @@ class ArrowSystem {
 void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M);
 
 /// Solves M x = b for symmetric positive M, scaled to unit diagonal; b may have several columns.
-/// @returns false if M is singular to rounding.
+class ScaledNormalEquations {
+ public:
+  explicit ScaledNormalEquations(const Eigen::MatrixXd& M);
+  bool ok() const { return factor_.info() == Eigen::Success; }
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+/// The same at once. @returns false if M is singular to rounding.
 bool solve_scaled(const Eigen::MatrixXd& M, const Eigen::MatrixXd& b, Eigen::MatrixXd& x);
 
 }  // namespace stageid

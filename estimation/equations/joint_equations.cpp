@@ -9,7 +9,6 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kTileLines = 256;
 constexpr int kMostIterations = 1000;
 
 /// Calls task(first line, lines) for every tile, tiles in parallel, and adds the results in order.
@@ -44,12 +43,11 @@ JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& 
       columns_(derivative_columns(problem)),
       arrow_(problem, beta, groups, FitMethod::gn) {
   if (problem.delays() > 0) {
-    T_re_.resize(problem.channels(), problem.size());
-    T_im_.resize(problem.channels(), problem.size());
+    T_.resize(problem.channels(), problem.size());
     for (const BasisGroup& group : groups) {
       const Eigen::MatrixXd B = rows_of(beta.B, group.channels);
-      T_re_(group.channels, Eigen::all) = B * group.T_re.transpose();
-      T_im_(group.channels, Eigen::all) = B * group.T_im.transpose();
+      T_.re(group.channels, Eigen::all) = B * group.T.re.transpose();
+      T_.im(group.channels, Eigen::all) = B * group.T.im.transpose();
     }
   }
   e_ = weighted_adjoint(
@@ -88,13 +86,13 @@ Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Eigen
     coefficients << rows_of(dB, group.channels), rows_of(beta_.B, group.channels);
     Eigen::MatrixXd re = Eigen::MatrixXd::Zero(lines, 2 * n_f);
     Eigen::MatrixXd im = Eigen::MatrixXd::Zero(lines, 2 * n_f);
-    re.leftCols(n_f) = group.F_re.middleRows(first, lines);
-    im.leftCols(n_f) = group.F_im.middleRows(first, lines);
+    re.leftCols(n_f) = group.F.re.middleRows(first, lines);
+    im.leftCols(n_f) = group.F.im.middleRows(first, lines);
     for (std::size_t d = 0; d < columns_.size(); ++d) {
       const auto [function, parameter] = columns_[d];
       const auto column = static_cast<Eigen::Index>(d);
-      re.col(n_f + function) += v[parameter] * group.D_re.col(column).segment(first, lines);
-      im.col(n_f + function) += v[parameter] * group.D_im.col(column).segment(first, lines);
+      re.col(n_f + function) += v[parameter] * group.D.re.col(column).segment(first, lines);
+      im.col(n_f + function) += v[parameter] * group.D.im.col(column).segment(first, lines);
     }
     Eigen::MatrixXcd part(coefficients.rows(), lines);
     part.real() = coefficients * re.transpose();
@@ -105,8 +103,8 @@ Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Eigen
   for (Eigen::Index c = 0; c < problem_.channels(); ++c) {
     double delay = 0.0;
     for (const Eigen::Index t : delay_parameters(problem_, c)) delay += v[t];
-    change.row(c).real() += delay * T_re_.row(c).segment(first, lines);
-    change.row(c).imag() += delay * T_im_.row(c).segment(first, lines);
+    change.row(c).real() += delay * T_.re.row(c).segment(first, lines);
+    change.row(c).imag() += delay * T_.im.row(c).segment(first, lines);
   }
   return change;
 }
@@ -123,7 +121,7 @@ void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
     const Eigen::MatrixXd re = rows_of(X_re, group.channels);
     const Eigen::MatrixXd im = rows_of(X_im, group.channels);
     const Eigen::MatrixXd of_group =
-        re * group.F_re.middleRows(first, lines) + im * group.F_im.middleRows(first, lines);
+        re * group.F.re.middleRows(first, lines) + im * group.F.im.middleRows(first, lines);
     for (std::size_t r = 0; r < group.channels.size(); ++r)
       e_b.row(group.channels[r]) += of_group.row(static_cast<Eigen::Index>(r));
     const Eigen::MatrixXd B = rows_of(beta_.B, group.channels);
@@ -132,13 +130,13 @@ void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
     for (std::size_t d = 0; d < columns_.size(); ++d) {
       const auto [function, parameter] = columns_[d];
       const auto column = static_cast<Eigen::Index>(d);
-      sum[parameter] += group.D_re.col(column).segment(first, lines).dot(BX_re.col(function)) +
-                        group.D_im.col(column).segment(first, lines).dot(BX_im.col(function));
+      sum[parameter] += group.D.re.col(column).segment(first, lines).dot(BX_re.col(function)) +
+                        group.D.im.col(column).segment(first, lines).dot(BX_im.col(function));
     }
   }
   if (problem_.delays() == 0) return;
-  const Eigen::VectorXd TX = T_re_.middleCols(first, lines).cwiseProduct(X_re).rowwise().sum() +
-                             T_im_.middleCols(first, lines).cwiseProduct(X_im).rowwise().sum();
+  const Eigen::VectorXd TX = T_.re.middleCols(first, lines).cwiseProduct(X_re).rowwise().sum() +
+                             T_.im.middleCols(first, lines).cwiseProduct(X_im).rowwise().sum();
   for (Eigen::Index c = 0; c < problem_.channels(); ++c)
     for (const Eigen::Index t : delay_parameters(problem_, c)) sum[t] += TX[c];
 }

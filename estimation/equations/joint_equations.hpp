@@ -57,8 +57,7 @@ class JointEquations {
   const FitParameters& beta_;
   const std::vector<BasisGroup>& groups_;
   std::vector<DerivativeColumn> columns_;
-  Eigen::MatrixXd T_re_;  // n_c x N: dP/d delay; empty if the delays are fixed
-  Eigen::MatrixXd T_im_;
+  SplitMatrix T_;  // n_c x N: dP/d delay; empty if the delays are fixed
   ArrowSystem arrow_;
   Eigen::VectorXd e_;
 };

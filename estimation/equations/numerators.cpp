@@ -1,9 +1,9 @@
 #include "estimation/equations/numerators.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <cmath>
 
+#include "estimation/equations/arrow_system.hpp"
 #include "estimation/products/weighted_products.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
@@ -12,45 +12,27 @@ namespace {
 
 constexpr double kSlightGain = 1e-3;
 
-/// Solves the scaled normal equations of one channel.
-class ScaledNormalEquations {
- public:
-  explicit ScaledNormalEquations(const Eigen::MatrixXd& M) {
-    scale_ = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd scaled = scale_.asDiagonal() * M * scale_.asDiagonal();
-    // Far below the rounding of the sums; needed only to factorize coinciding poles.
-    scaled.diagonal().array() += 1e-14;
-    factor_.compute(scaled);
-  }
-  bool ok() const { return factor_.info() == Eigen::Success; }
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const {
-    return scale_.asDiagonal() * factor_.solve(scale_.asDiagonal() * b);
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-};
-
 /// sums += sum Re{conj(F) W E} of a tile.
 void add_weighted_gradient(const BasisGroup& group, Eigen::Index first, const DataTile& data,
                            Eigen::MatrixXd& sums) {
   const Eigen::Index n = data.W.cols();
   const Eigen::MatrixXd WE_re = data.W.cwiseProduct(data.E_re);
   const Eigen::MatrixXd WE_im = data.W.cwiseProduct(data.E_im);
-  sums.noalias() += group.F_re.middleRows(first, n).transpose() * WE_re.transpose();
-  sums.noalias() += group.F_im.middleRows(first, n).transpose() * WE_im.transpose();
+  sums.noalias() += group.F.re.middleRows(first, n).transpose() * WE_re.transpose();
+  sums.noalias() += group.F.im.middleRows(first, n).transpose() * WE_im.transpose();
 }
 
-/// Sums of the normal equations of a block of channels; one column per channel.
-struct GramSums {
-  Eigen::MatrixXd FF;  ///< triangle x members: sum W Re{conj(F_i) F_j}
-  Eigen::MatrixXd S;   ///< members x base columns: sum W |first|^2 base; see PairReduction
-  Eigen::MatrixXd FG;  ///< n_f x members: sum Re{conj(F) W G}
-  GramSums& operator+=(const GramSums& other) {
+/// Sums over the lines of a block of channels; one column per channel.
+struct NumeratorSums {
+  Eigen::MatrixXd FF;    ///< triangle x members: sum W Re{conj(F_i) F_j}; if requested
+  Eigen::MatrixXd S;     ///< members x base columns: sum W |first|^2 base; see PairReduction
+  Eigen::MatrixXd FE;    ///< n_f x members: sum Re{conj(F) W E}
+  double squares = 0.0;  ///< sum W |E|^2
+  NumeratorSums& operator+=(const NumeratorSums& other) {
     FF += other.FF;
     S += other.S;
-    FG += other.FG;
+    FE += other.FE;
+    squares += other.squares;
     return *this;
   }
 };
@@ -63,11 +45,11 @@ class OwnGrams {
 
   void add(const BasisGroup& group, Eigen::Index first, const DataTile& data) {
     const Eigen::Index n = data.W.cols();
-    Eigen::MatrixXd X(group.F_re.cols(), 2 * n);
+    Eigen::MatrixXd X(group.F.re.cols(), 2 * n);
     for (std::size_t r = 0; r < grams_.size(); ++r) {
       const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
-      X.leftCols(n) = group.F_re.middleRows(first, n).transpose() * root.asDiagonal();
-      X.rightCols(n) = group.F_im.middleRows(first, n).transpose() * root.asDiagonal();
+      X.leftCols(n) = group.F.re.middleRows(first, n).transpose() * root.asDiagonal();
+      X.rightCols(n) = group.F.im.middleRows(first, n).transpose() * root.asDiagonal();
       grams_[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
     }
   }
@@ -86,56 +68,11 @@ class OwnGrams {
   std::vector<Eigen::MatrixXd> grams_;
 };
 
-/// The products of all functions of a group, shared by all of its blocks.
-PairReduction function_pairs(const FitProblem& problem, const BasisGroup& group) {
-  return {group.fractions, group.fractions.F, group.fractions.F,
-          triangular_pairs(problem.functions())};
-}
-
-GramSums gram_sums(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
-                   const TileRange& block) {
-  const bool few = group.few;
-  const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
-  const ComplexColumns F{group.F_re, group.F_im};
-  GramSums all = sum_over_shares<GramSums>(block, problem.threads, [&](const TileRange& share) {
-    GramSums sums;
-    sums.FF.setZero(static_cast<Eigen::Index>(few ? pairs.pairs().size() : pairs.direct().size()),
-                    share.members);
-    sums.FG.setZero(problem.functions(), share.members);
-    sums.S.setZero(share.members, base);
-    OwnGrams own(few ? share.members : 0, problem.functions());
-    DataTile data;
-    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
-      data.load(problem, group, share, {}, first, n);
-      if (few) {
-        own.add(group, first, data);
-      } else {
-        add_pair_sums(data.W, F, F, pairs.direct(), first, sums.FF);
-        add_fraction_sums(data.W, group.fractions, first, sums.S);
-      }
-      add_weighted_gradient(group, first, data, sums.FG);
-    });
-    if (few) own.pack(sums.FF);
-    return sums;
-  });
-  if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
-  return all;
-}
-
-struct ResidualSums {
-  Eigen::MatrixXd FE;    ///< n_f x members: sum Re{conj(F) W E}
-  double squares = 0.0;  ///< sum W |E|^2
-  ResidualSums& operator+=(const ResidualSums& other) {
-    FE += other.FE;
-    squares += other.squares;
-    return *this;
-  }
-};
-
-ResidualSums residual_sums(const FitProblem& problem, const BasisGroup& group,
-                           const TileRange& block, const Eigen::MatrixXd& B) {
-  return sum_over_shares<ResidualSums>(block, problem.threads, [&](const TileRange& share) {
-    ResidualSums sums;
+/// The sums without FF and S. @param B numerators, members x n_f
+NumeratorSums residual_sums(const FitProblem& problem, const BasisGroup& group,
+                            const TileRange& block, const Eigen::MatrixXd& B) {
+  return sum_over_shares<NumeratorSums>(block, problem.threads, [&](const TileRange& share) {
+    NumeratorSums sums;
     sums.FE.setZero(problem.functions(), share.members);
     DataTile data;
     for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
@@ -145,6 +82,37 @@ ResidualSums residual_sums(const FitProblem& problem, const BasisGroup& group,
     });
     return sums;
   });
+}
+
+/// The sums for numerators of zero.
+NumeratorSums gram_sums(const FitProblem& problem, const BasisGroup& group,
+                        const PairReduction& pairs, const TileRange& block) {
+  const bool few = group.few;
+  const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
+  const auto add = [&](const TileRange& share) {
+    NumeratorSums sums;
+    sums.FF.setZero(static_cast<Eigen::Index>(few ? pairs.pairs().size() : pairs.direct().size()),
+                    share.members);
+    sums.FE.setZero(problem.functions(), share.members);
+    sums.S.setZero(share.members, base);
+    OwnGrams own(few ? share.members : 0, problem.functions());
+    DataTile data;
+    for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
+      data.load(problem, group, share, {}, first, n);
+      if (few) {
+        own.add(group, first, data);
+      } else {
+        add_pair_sums(data.W, group.F, group.F, pairs.direct(), first, sums.FF);
+        add_fraction_sums(data.W, group.fractions, first, sums.S);
+      }
+      add_weighted_gradient(group, first, data, sums.FE);
+    });
+    if (few) own.pack(sums.FF);
+    return sums;
+  };
+  NumeratorSums all = sum_over_shares<NumeratorSums>(block, problem.threads, add);
+  if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
+  return all;
 }
 
 std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, Eigen::Index n_f) {
@@ -160,7 +128,7 @@ std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, E
 /// because they are quadratic; they are summed again only if that is a large part of them.
 bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
                  const TileRange& block, Eigen::MatrixXd& B, double& squares) {
-  const GramSums gram = gram_sums(problem, group, pairs, block);
+  const NumeratorSums gram = gram_sums(problem, group, pairs, block);
   const std::vector<ScaledNormalEquations> factors = normal_equations(gram.FF, problem.functions());
   for (const ScaledNormalEquations& channel : factors)
     if (!channel.ok()) return false;
@@ -170,8 +138,8 @@ bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairR
       out.row(r) = factors[static_cast<std::size_t>(r)].solve(right_sides.col(r)).transpose();
     return out;
   };
-  B = solve(gram.FG);
-  const ResidualSums rest = residual_sums(problem, group, block, B);
+  B = solve(gram.FE);
+  const NumeratorSums rest = residual_sums(problem, group, block, B);
   const Eigen::MatrixXd refinement = solve(rest.FE);
   B += refinement;
   const double gain = refinement.cwiseProduct(rest.FE.transpose()).sum();
@@ -197,20 +165,31 @@ void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit 
   }
 }
 
+/// Calls visit(group, pairs, block) for all channels in blocks until it returns false. @returns whether it never did
+template <typename Visit>
+bool visit_blocks(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+  for (const BasisGroup& group : groups) {
+    // The products of all functions, shared by all blocks.
+    const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
+                              triangular_pairs(problem.functions()));
+    for (const TileRange& block :
+         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size()))
+      if (!visit(group, pairs, block)) return false;
+  }
+  return true;
+}
+
 /// Calls visit(c, M) for every channel with its normal equations, the members of a block in parallel.
 template <typename Visit>
 void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
-  for (const BasisGroup& group : groups) {
-    const PairReduction pairs = function_pairs(problem, group);
-    for (const TileRange& block :
-         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
-      const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
-      for_each_task(problem.threads, static_cast<int>(FF.cols()), [&](int r) {
-        visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
-              from_triangle(FF.col(r), problem.functions()));
-      });
-    }
-  }
+  visit_blocks(problem, groups, [&](const auto& group, const auto& pairs, const auto& block) {
+    const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
+    for_each_task(problem.threads, static_cast<int>(FF.cols()), [&](int r) {
+      visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
+            from_triangle(FF.col(r), problem.functions()));
+    });
+    return true;
+  });
 }
 
 }  // namespace
@@ -220,17 +199,15 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
   B.setZero(problem.channels(), problem.functions());
   double sum = 0.0;
   Eigen::MatrixXd of_block;
-  for (const BasisGroup& group : groups) {
-    const PairReduction pairs = function_pairs(problem, group);
-    for (const TileRange& block :
-         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size())) {
-      double squares = 0.0;
-      if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
-      sum += squares;
-      for (Eigen::Index r = 0; r < block.members; ++r)
-        B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
-    }
-  }
+  const auto solve = [&](const auto& group, const auto& pairs, const auto& block) {
+    double squares = 0.0;
+    if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
+    sum += squares;
+    for (Eigen::Index r = 0; r < block.members; ++r)
+      B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
+    return true;
+  };
+  if (!visit_blocks(problem, groups, solve)) return false;
   cost = sum / (2.0 * static_cast<double>(problem.size()));
   return std::isfinite(cost);
 }
@@ -245,7 +222,7 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
       const Eigen::Index N = problem.size();
       const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
       Eigen::MatrixXd A(2 * N, problem.functions());
-      A << root.asDiagonal() * group.F_re, root.asDiagonal() * group.F_im;
+      A << root.asDiagonal() * group.F.re, root.asDiagonal() * group.F.im;
       Eigen::VectorXd rest(2 * N);
       rest << root.cwiseProduct(problem.G->row(c).real().transpose()),
           root.cwiseProduct(problem.G->row(c).imag().transpose());

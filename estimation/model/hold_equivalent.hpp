@@ -29,6 +29,9 @@ struct SplitMatrix {
     im.setZero(rows, cols);
   }
   Eigen::Index cols() const noexcept { return re.cols(); }
+  SplitMatrix middle_rows(Eigen::Index first, Eigen::Index count) const {
+    return {re.middleRows(first, count), im.middleRows(first, count)};
+  }
   std::complex<double> operator()(Eigen::Index row, Eigen::Index col) const {
     return {re(row, col), im(row, col)};
   }

@@ -103,10 +103,10 @@ bool is_trustworthy(const FitRecord& record);
 /// Covariances of the parameters and the response of a fit, see dense_covariances(). Parameters: denominator
 /// coefficients in the order of the submodels, free delays, vec B (channels x functions).
 struct FitCovariance {
-  Eigen::MatrixXd sandwich;           ///< of the estimate; source of the standard deviations
-  Eigen::MatrixXd likelihood;         ///< [2 sum Re{J^H W J}]^-1
-  Eigen::MatrixXd response_variance;  ///< (n_y n_u) x N: E|dP|^2
-  Eigen::MatrixXd response_radius;    ///< |dP| is below this with probability 0.95
+  Eigen::MatrixXd sandwich;                ///< of the estimate; source of the standard deviations
+  Eigen::MatrixXd likelihood;              ///< [2 sum Re{J^H W J}]^-1
+  Eigen::MatrixXd response_variance = {};  ///< (n_y n_u) x N: E|dP|^2
+  Eigen::MatrixXd response_radius = {};    ///< |dP| is below this with probability 0.95
 };
 
 /// The rank of the residue of a mode that the data require.

@@ -126,14 +126,10 @@ std::vector<SubmodelPlace> submodel_places(const FitProblem& problem) {
 }
 
 void resize(const FitProblem& problem, WantedBasis wanted, BasisGroup& group) {
-  const auto set = [&](Eigen::Index columns, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-    re.resize(problem.size(), columns);
-    im.resize(problem.size(), columns);
-  };
-  set(problem.functions(), group.F_re, group.F_im);
   const auto derivatives = static_cast<Eigen::Index>(derivative_columns(problem).size());
-  if (wanted.gradient) set(derivatives, group.D_re, group.D_im);
-  if (wanted.delay) set(problem.functions(), group.T_re, group.T_im);
+  group.F.resize(problem.size(), problem.functions());
+  if (wanted.gradient) group.D.resize(problem.size(), derivatives);
+  if (wanted.delay) group.T.resize(problem.size(), problem.functions());
 }
 
 void evaluate_fractions(const FitProblem& problem, const HoldEquivalent& through,
@@ -157,17 +153,17 @@ void evaluate_submodel(const FitProblem& problem, const HoldEquivalent& through,
                        WantedBasis wanted, SubmodelBasis& basis, BasisGroup& group) {
   evaluate_basis(through, problem.shapes[i], beta.a[i], wanted, basis);
   const Eigen::Index functions = basis.value.cols();
-  group.F_re.middleCols(place.function, functions) = basis.value.re;
-  group.F_im.middleCols(place.function, functions) = basis.value.im;
+  group.F.re.middleCols(place.function, functions) = basis.value.re;
+  group.F.im.middleCols(place.function, functions) = basis.value.im;
   Eigen::Index d = place.derivative;
   for (Eigen::Index c = 0; c < basis.gradient.cols(); ++c) {
     if (problem.is_held(place.parameter + c % problem.shapes[i].order)) continue;
-    group.D_re.col(d) = basis.gradient.re.col(c);
-    group.D_im.col(d++) = basis.gradient.im.col(c);
+    group.D.re.col(d) = basis.gradient.re.col(c);
+    group.D.im.col(d++) = basis.gradient.im.col(c);
   }
   if (!wanted.delay) return;
-  group.T_re.middleCols(place.function, functions) = basis.delay.re;
-  group.T_im.middleCols(place.function, functions) = basis.delay.im;
+  group.T.re.middleCols(place.function, functions) = basis.delay.re;
+  group.T.im.middleCols(place.function, functions) = basis.delay.im;
 }
 
 /// The number of products of the functions grows with their square.

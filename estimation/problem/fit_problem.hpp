@@ -71,12 +71,9 @@ constexpr Eigen::Index kManyFunctions = 64;
 struct BasisGroup {
   double delay_s = 0.0;
   std::vector<Eigen::Index> channels;
-  Eigen::MatrixXd F_re;  ///< N x n_f
-  Eigen::MatrixXd F_im;
-  Eigen::MatrixXd D_re;  ///< N x n_d, see DerivativeColumn; empty unless requested
-  Eigen::MatrixXd D_im;
-  Eigen::MatrixXd T_re;  ///< N x n_f: derivative to the delay; empty unless delays are free
-  Eigen::MatrixXd T_im;
+  SplitMatrix F;              ///< N x n_f
+  SplitMatrix D;              ///< N x n_d, see DerivativeColumn; empty unless requested
+  SplitMatrix T;              ///< N x n_f: derivative to the delay; empty unless delays are free
   bool few = false;           ///< the products are multiplied out per channel
   FractionColumns fractions;  ///< unless few
 };

@@ -17,8 +17,8 @@ void subtract_model(const FitProblem& problem, const std::vector<BasisGroup>& gr
                     Eigen::MatrixXd& im) {
   const Eigen::Index lines = re.cols();
   for (const BasisGroup& group : groups) {
-    const auto F_re = group.F_re.middleRows(first, lines);
-    const auto F_im = group.F_im.middleRows(first, lines);
+    const auto F_re = group.F.re.middleRows(first, lines);
+    const auto F_im = group.F.im.middleRows(first, lines);
     const bool all = group.channels.size() == static_cast<std::size_t>(problem.channels());
     if (all) {
       re.noalias() -= B * F_re.transpose();

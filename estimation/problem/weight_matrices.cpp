@@ -17,7 +17,6 @@ constexpr double kSemidefinite = -1e-10;  // rounding of the smallest eigenvalue
 constexpr double kSmallestPivot = 1e-12;  // of a correlation matrix
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
-[[noreturn]] void refuse_indefinite(const std::string& what) { throw IndefiniteWeights(what); }
 
 std::string line_name(const FrfEstimate& frf, Eigen::Index k) {
   return fmt::format("line {} ({} Hz)", k, frf.frequency_hz[k]);
@@ -47,7 +46,7 @@ Eigen::MatrixXcd inverse_or_refuse(const FrfEstimate& frf, const Eigen::MatrixXc
   Eigen::MatrixXcd inverse;
   if (is_hermitian(M)) inverse = definite_inverse(M);
   if (inverse.size() == 0)
-    refuse_indefinite(
+    throw IndefiniteWeights(
         fmt::format("weighting likelihood: {} of {} is not Hermitian and positive definite; {}",
                     name, line_name(frf, k), remedy));
   return inverse;
@@ -66,7 +65,7 @@ void require_factors(const FrfEstimate& frf) {
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index y = 0; y < n_y; ++y)
       if (!(frf.residual_covariance_re(y * (n_y + 1), k) > 0.0))
-        refuse_indefinite(
+        throw IndefiniteWeights(
             fmt::format("weighting likelihood: residual_covariance of {} on {} is not positive; "
                         "exclude the output",
                         frf.outputs.names[static_cast<std::size_t>(y)], line_name(frf, k)));
@@ -145,7 +144,7 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
           line_name(frf, k)));
     const Eigen::MatrixXcd inverse = definite_inverse(W_k);
     if (inverse.size() == 0 && !is_semidefinite(W_k))
-      refuse_indefinite(
+      throw IndefiniteWeights(
           fmt::format("weight matrix of {}: is not positive semidefinite, so the cost has no "
                       "minimum; correct it",
                       line_name(frf, k)));
@@ -159,8 +158,8 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
   return out;
 }
 
-void WeightMatrices::between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines,
-                             Eigen::ArrayXd& re, Eigen::ArrayXd& im) const {
+SplitMatrix WeightMatrices::between(Eigen::Index c, Eigen::Index d, Eigen::Index first,
+                                    Eigen::Index lines) const {
   const Eigen::Index n_c = marginal_.rows();
   Eigen::ArrayXcd W(lines);
   if (whole_.size() > 0) {
@@ -172,8 +171,7 @@ void WeightMatrices::between(Eigen::Index c, Eigen::Index d, Eigen::Index first,
     W = inputs_.row(d / n_y + n_u * (c / n_y)).segment(first, lines).transpose().array() *
         outputs_.row(c % n_y + n_y * (d % n_y)).segment(first, lines).transpose().array();
   }
-  re = W.real();
-  im = W.imag();
+  return {W.real().matrix(), W.imag().matrix()};
 }
 
 void WeightMatrices::apply(Eigen::Index first, Eigen::MatrixXcd& tile) const {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "estimation/model/hold_equivalent.hpp"
 #include "estimation/problem/fit_options.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -37,9 +38,8 @@ class WeightMatrices {
   /// Multiplies column j of `tile` (n_c x lines) by W_k, k = first + j.
   void apply(Eigen::Index first, Eigen::MatrixXcd& tile) const;
 
-  /// W_k(c, d) of two channels on some lines.
-  void between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines,
-               Eigen::ArrayXd& re, Eigen::ArrayXd& im) const;
+  /// W_k(c, d) of two channels on some lines, lines x 1.
+  SplitMatrix between(Eigen::Index c, Eigen::Index d, Eigen::Index first, Eigen::Index lines) const;
 
   /// Their best diagonal approximation, n_c x N: 1 / (W_k^-1)_cc, the inverse variance of the channel if W_k = Cov(vec
   /// G)^-1; W_cc if a W_k of the user is singular.

@@ -1,31 +1,29 @@
 #include "estimation/products/channel_equations.hpp"
 
-#include <algorithm>
+#include <complex>
 
 namespace stageid {
 
-void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns, LineRange lines,
-                    Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
+                           const BasisGroup& group, Eigen::Index c, LineRange lines) {
   const auto on_lines = [lines](const auto& matrix) {
     return matrix.middleRows(lines.first, lines.count);
   };
-  re.setZero(lines.count, problem.globals());
-  im.setZero(lines.count, problem.globals());
-  for (std::size_t d = 0; d < columns.size(); ++d) {
-    const auto column = static_cast<Eigen::Index>(d);
-    re.col(columns[d].parameter) +=
-        beta.B(c, columns[d].function) * on_lines(group.D_re).col(column);
-    im.col(columns[d].parameter) +=
-        beta.B(c, columns[d].function) * on_lines(group.D_im).col(column);
+  SplitMatrix out;
+  out.set_zero(lines.count, problem.globals());
+  Eigen::Index d = 0;
+  for (const auto& [function, parameter] : derivative_columns(problem)) {
+    out.re.col(parameter) += beta.B(c, function) * on_lines(group.D.re).col(d);
+    out.im.col(parameter) += beta.B(c, function) * on_lines(group.D.im).col(d++);
   }
-  if (problem.delay == DelayModel::fixed) return;
-  const Eigen::VectorXd t_re = on_lines(group.T_re) * beta.B.row(c).transpose();
-  const Eigen::VectorXd t_im = on_lines(group.T_im) * beta.B.row(c).transpose();
+  if (problem.delay == DelayModel::fixed) return out;
+  const Eigen::VectorXd t_re = on_lines(group.T.re) * beta.B.row(c).transpose();
+  const Eigen::VectorXd t_im = on_lines(group.T.im) * beta.B.row(c).transpose();
   for (const Eigen::Index t : delay_parameters(problem, c)) {
-    re.col(t) = t_re;
-    im.col(t) = t_im;
+    out.re.col(t) = t_re;
+    out.im.col(t) = t_im;
   }
+  return out;
 }
 
 namespace {
@@ -54,33 +52,54 @@ ChannelEquations scattered(const ChannelEquations& of_free, Eigen::Index functio
 
 }  // namespace
 
-ChannelEquations channel_equations(const FitProblem& problem, const FitParameters& beta,
-                                   const BasisGroup& group, Eigen::Index c,
-                                   const std::vector<DerivativeColumn>& columns,
-                                   const ComplexColumns* Y, FitMethod method) {
+EquationMethod::EquationMethod(const FitProblem& of, const FitParameters& beta, FitMethod of_method)
+    : problem(of), method(of_method), columns(derivative_columns(of)) {
+  if (method == FitMethod::gn) return;
+  Y.set_zero(problem.size(), problem.denominators());
+  const HoldEquivalent through(problem.lines, 0.0);
+  Eigen::Index column = 0;
+  SplitMatrix fraction;
+  for (const Eigen::VectorXd& a : beta.a) {
+    for (const std::complex<double> lambda : roots(a)) {
+      through.reciprocal(lambda, fraction);
+      for (Eigen::Index q = 1; q <= a.size(); ++q) {
+        const std::complex<double> c = equation_error_residue(through, a, lambda, q);
+        Y.re.col(column + q - 1) += c.real() * fraction.re - c.imag() * fraction.im;
+        Y.im.col(column + q - 1) += c.real() * fraction.im + c.imag() * fraction.re;
+      }
+    }
+    if (!through.exact() && a.size() > 0)
+      Y.re.col(column + a.size() - 1).array() += 1.0 / a[a.size() - 1];
+    column += a.size();
+  }
+}
+
+ChannelEquations channel_equations(const EquationMethod& shared, const FitParameters& beta,
+                                   const BasisGroup& group, Eigen::Index c) {
+  const FitProblem& problem = shared.problem;
   const Eigen::Index N = problem.size();
   const Eigen::Index n_f = problem.functions();
   const Eigen::Index n_a = problem.denominators();
   const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
   const Eigen::VectorXd E_re =
-      problem.G->row(c).real().transpose() - group.F_re * beta.B.row(c).transpose();
+      problem.G->row(c).real().transpose() - group.F.re * beta.B.row(c).transpose();
   const Eigen::VectorXd E_im =
-      problem.G->row(c).imag().transpose() - group.F_im * beta.B.row(c).transpose();
+      problem.G->row(c).imag().transpose() - group.F.im * beta.B.row(c).transpose();
   Eigen::VectorXd E(2 * N);
   E << root.cwiseProduct(E_re), root.cwiseProduct(E_im);
 
   // Real and imaginary parts stacked, weighted: J of the instrument, Phi of the regressor.
-  Eigen::MatrixXd re;
-  Eigen::MatrixXd im;
-  global_columns(problem, beta, group, c, columns, {0, N}, re, im);
+  const SplitMatrix of_globals = global_columns(problem, beta, group, c, {0, N});
   const std::vector<Eigen::Index> free = free_globals(problem);
   const auto n_free = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd J(2 * N, n_f + n_free);
-  J.topLeftCorner(N, n_f) = root.asDiagonal() * group.F_re;
-  J.bottomLeftCorner(N, n_f) = root.asDiagonal() * group.F_im;
+  J.topLeftCorner(N, n_f) = root.asDiagonal() * group.F.re;
+  J.bottomLeftCorner(N, n_f) = root.asDiagonal() * group.F.im;
   for (Eigen::Index i = 0; i < n_free; ++i) {
-    J.col(n_f + i).head(N) = root.cwiseProduct(re.col(free[static_cast<std::size_t>(i)]));
-    J.col(n_f + i).tail(N) = root.cwiseProduct(im.col(free[static_cast<std::size_t>(i)]));
+    J.col(n_f + i).head(N) =
+        root.cwiseProduct(of_globals.re.col(free[static_cast<std::size_t>(i)]));
+    J.col(n_f + i).tail(N) =
+        root.cwiseProduct(of_globals.im.col(free[static_cast<std::size_t>(i)]));
   }
 
   const auto symmetric = [&](const Eigen::MatrixXd& X) -> ChannelEquations {
@@ -91,17 +110,17 @@ ChannelEquations channel_equations(const FitProblem& problem, const FitParameter
   const auto full = [&](const ChannelEquations& of_free) {
     return scattered(of_free, n_f, problem.globals(), free);
   };
-  if (method == FitMethod::gn) return full(symmetric(J));
+  if (shared.method == FitMethod::gn) return full(symmetric(J));
   Eigen::MatrixXd Phi = J;
   for (Eigen::Index i = 0; i < n_free; ++i) {
     const Eigen::Index p = free[static_cast<std::size_t>(i)];
     if (p >= n_a) break;
-    const auto y_re = Y->re.col(p);
-    const auto y_im = Y->im.col(p);
+    const auto y_re = shared.Y.re.col(p);
+    const auto y_im = shared.Y.im.col(p);
     Phi.col(n_f + i).head(N) -= y_re.cwiseProduct(E.head(N)) - y_im.cwiseProduct(E.tail(N));
     Phi.col(n_f + i).tail(N) -= y_re.cwiseProduct(E.tail(N)) + y_im.cwiseProduct(E.head(N));
   }
-  if (method == FitMethod::sk) return full(symmetric(Phi));
+  if (shared.method == FitMethod::sk) return full(symmetric(Phi));
   return full({J.transpose() * Phi, J.transpose() * E});
 }
 

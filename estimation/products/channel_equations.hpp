@@ -13,10 +13,21 @@ struct LineRange {
   Eigen::Index count = 0;
 };
 
-/// Columns d vec(P)_c / d globals for one channel, lines x globals each.
-void global_columns(const FitProblem& problem, const FitParameters& beta, const BasisGroup& group,
-                    Eigen::Index c, const std::vector<DerivativeColumn>& columns, LineRange lines,
-                    Eigen::MatrixXd& re, Eigen::MatrixXd& im);
+/// Columns d vec(P)_c / d globals for one channel, lines x globals.
+SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
+                           const BasisGroup& group, Eigen::Index c, LineRange lines);
+
+/// What the equations of all channels have in common.
+struct EquationMethod {
+  EquationMethod(const FitProblem& of, const FitParameters& beta, FitMethod method);
+
+  const FitProblem& problem;
+  FitMethod method;
+  std::vector<DerivativeColumn> columns;
+  /// d log A_i / d a_q on every line, one column per denominator coefficient, N x n_a: s^q / A_i. With exact hold, A_i
+  /// is the product of z - e^{lambda T} over its roots, and Y is the same in z. Empty for gn.
+  SplitMatrix Y;
+};
 
 /// The part of one channel in M d_beta = e (arrow_system.hpp), order (functions, globals).
 struct ChannelEquations {
@@ -26,10 +37,7 @@ struct ChannelEquations {
 
 /// The equations of channel c from its own columns, as one matrix product. For groups of few channels, for which the
 /// products shared between channels by line_sums() cost more than they save.
-/// @param Y from equation_error_columns(); empty for gn
-ChannelEquations channel_equations(const FitProblem& problem, const FitParameters& beta,
-                                   const BasisGroup& group, Eigen::Index c,
-                                   const std::vector<DerivativeColumn>& columns,
-                                   const ComplexColumns* Y, FitMethod method);
+ChannelEquations channel_equations(const EquationMethod& method, const FitParameters& beta,
+                                   const BasisGroup& group, Eigen::Index c);
 
 }  // namespace stageid

@@ -1,27 +1,23 @@
 #include "estimation/products/line_sums.hpp"
 
-#include <complex>
-
 namespace stageid {
 namespace {
 
 /// The sums of one share of channels and lines, tile by tile.
 class Share {
  public:
-  Share(const FitProblem& problem, const BasisGroup& group, const GroupProducts& products,
-        const Eigen::MatrixXd& B, const std::vector<DerivativeColumn>& columns,
-        const ComplexColumns* Y, FitMethod method, const TileRange& range)
-      : problem_(problem),
-        group_(group),
-        products_(products),
+  Share(const GroupProducts& products, const Eigen::MatrixXd& B, const TileRange& range)
+      : products_(products),
+        group_(products.group),
+        columns_(products.method.columns),
+        problem_(products.method.problem),
+        method_(products.method.method),
+        Y_(products.method.Y),
         B_(B),
-        columns_(columns),
-        Y_(Y),
-        method_(method),
         range_(range),
-        n_f_(problem.functions()),
-        n_a_(problem.denominators()),
-        n_d_(static_cast<Eigen::Index>(columns.size())) {
+        n_f_(problem_.functions()),
+        n_a_(problem_.denominators()),
+        n_d_(static_cast<Eigen::Index>(columns_.size())) {
     BB_.resize(range.members, static_cast<Eigen::Index>(products.functions.size()));
     Eigen::Index p = 0;
     for (const auto& [functions, pairs] : products.functions)
@@ -59,12 +55,12 @@ class Share {
     sums_.FE.setZero(n_f_, members);
     sums_.DD.setZero(n_d_, n_d_);
     sums_.ZE.setZero(n_a_);
-    if (Y_ != nullptr) {
+    if (regresses()) {
       direct(products_.FY, sums_.FY);
       sums_.S_re.setZero(members, simple_columns());
       sums_.S_im = sums_.S_re;
+      sums_.ZY.setZero(n_a_, n_a_);
     }
-    if (Y_ != nullptr) sums_.ZY.setZero(n_a_, n_a_);
     if (method_ == FitMethod::sk) sums_.YY.setZero(n_a_, n_a_);
     if (method_ == FitMethod::sk) sums_.YE.setZero(n_a_);
     if (problem_.delays() == 0) return;
@@ -72,9 +68,10 @@ class Share {
     sums_.TD.setZero(n_d_, members);
     sums_.TT.setZero(members);
     sums_.TE.setZero(members);
-    if (Y_ != nullptr) sums_.TY.setZero(n_a_, members);
+    if (regresses()) sums_.TY.setZero(n_a_, members);
   }
 
+  bool regresses() const { return method_ != FitMethod::gn; }
   auto tile(const Eigen::MatrixXd& columns) const { return columns.middleRows(first_, n_); }
 
   Eigen::Index simple_columns() const {
@@ -85,7 +82,7 @@ class Share {
     const FractionColumns& fractions = group_.fractions;
     if (fractions.pairs() == 0) return;
     add_fraction_sums(W_, fractions, first_, sums_.S);
-    if (Y_ == nullptr) return;
+    if (!regresses()) return;
     const Eigen::VectorXd re = tile(fractions.first.re);
     const Eigen::VectorXd im = tile(fractions.first.im);
     const auto base = fractions.base.block(first_, 0, n_, simple_columns());
@@ -96,13 +93,12 @@ class Share {
   }
 
   void add_numerators() {
-    const ComplexColumns F{group_.F_re, group_.F_im};
+    const SplitMatrix& F = group_.F;
     add_pair_sums(W_, F, F, products_.FF.direct(), first_, sums_.FF);
-    add_pair_sums(W_, F, {group_.D_re, group_.D_im}, products_.FD.direct(), first_, sums_.FD);
-    if (Y_ != nullptr)
-      add_pair_sums(WE_re_, WE_im_, F, *Y_, products_.FY.direct(), first_, sums_.FY);
-    sums_.FE.noalias() += tile(group_.F_re).transpose() * WE_re_.transpose();
-    sums_.FE.noalias() += tile(group_.F_im).transpose() * WE_im_.transpose();
+    add_pair_sums(W_, F, group_.D, products_.FD.direct(), first_, sums_.FD);
+    if (regresses()) add_pair_sums(WE_re_, WE_im_, F, Y_, products_.FY.direct(), first_, sums_.FY);
+    sums_.FE.noalias() += tile(group_.F.re).transpose() * WE_re_.transpose();
+    sums_.FE.noalias() += tile(group_.F.im).transpose() * WE_im_.transpose();
   }
 
   void add_denominators() {
@@ -114,19 +110,19 @@ class Share {
     Eigen::MatrixXd Z_im = Eigen::MatrixXd::Zero(n_, n_a_);
     for (Eigen::Index d = 0; d < n_d_; ++d) {
       const auto [f, p] = columns_[static_cast<std::size_t>(d)];
-      const auto D_re = group_.D_re.col(d).segment(first_, n_);
-      const auto D_im = group_.D_im.col(d).segment(first_, n_);
+      const auto D_re = group_.D.re.col(d).segment(first_, n_);
+      const auto D_im = group_.D.im.col(d).segment(first_, n_);
       Z_re.col(p) += D_re.cwiseProduct(R_re.col(f)) + D_im.cwiseProduct(R_im.col(f));
       Z_im.col(p) += D_re.cwiseProduct(R_im.col(f)) - D_im.cwiseProduct(R_re.col(f));
     }
     sums_.ZE += Z_re.colwise().sum().transpose();
-    if (Y_ == nullptr) return;
-    sums_.ZY.noalias() += Z_re.transpose() * tile(Y_->re);
-    sums_.ZY.noalias() -= Z_im.transpose() * tile(Y_->im);
+    if (!regresses()) return;
+    sums_.ZY.noalias() += Z_re.transpose() * tile(Y_.re);
+    sums_.ZY.noalias() -= Z_im.transpose() * tile(Y_.im);
     if (method_ != FitMethod::sk) return;
-    sums_.YY.noalias() += tile(Y_->re).transpose() * (power_.asDiagonal() * tile(Y_->re));
-    sums_.YY.noalias() += tile(Y_->im).transpose() * (power_.asDiagonal() * tile(Y_->im));
-    sums_.YE.noalias() += tile(Y_->re).transpose() * power_;
+    sums_.YY.noalias() += tile(Y_.re).transpose() * (power_.asDiagonal() * tile(Y_.re));
+    sums_.YY.noalias() += tile(Y_.im).transpose() * (power_.asDiagonal() * tile(Y_.im));
+    sums_.YE.noalias() += tile(Y_.re).transpose() * power_;
   }
 
   /// The channels are summed before the derivatives are multiplied, which gives one matrix product for all pairs of
@@ -141,41 +137,41 @@ class Share {
       Eigen::Index weighted = -1;
       for (const auto& [l, r] : pairs) {
         if (weighted != l) {
-          re = w.cwiseProduct(group_.D_re.col(l).segment(first_, n_));
-          im = w.cwiseProduct(group_.D_im.col(l).segment(first_, n_));
+          re = w.cwiseProduct(group_.D.re.col(l).segment(first_, n_));
+          im = w.cwiseProduct(group_.D.im.col(l).segment(first_, n_));
           weighted = l;
         }
-        sums_.DD(l, r) += re.dot(group_.D_re.col(r).segment(first_, n_)) +
-                          im.dot(group_.D_im.col(r).segment(first_, n_));
+        sums_.DD(l, r) += re.dot(group_.D.re.col(r).segment(first_, n_)) +
+                          im.dot(group_.D.im.col(r).segment(first_, n_));
       }
     }
   }
 
   void add_delays() {
-    const Eigen::MatrixXd T_re = B_ * tile(group_.T_re).transpose();
-    const Eigen::MatrixXd T_im = B_ * tile(group_.T_im).transpose();
+    const Eigen::MatrixXd T_re = B_ * tile(group_.T.re).transpose();
+    const Eigen::MatrixXd T_im = B_ * tile(group_.T.im).transpose();
     const Eigen::MatrixXd WT_re = W_.cwiseProduct(T_re);
     const Eigen::MatrixXd WT_im = W_.cwiseProduct(T_im);
-    sums_.TF.noalias() += tile(group_.F_re).transpose() * WT_re.transpose();
-    sums_.TF.noalias() += tile(group_.F_im).transpose() * WT_im.transpose();
-    sums_.TD.noalias() += tile(group_.D_re).transpose() * WT_re.transpose();
-    sums_.TD.noalias() += tile(group_.D_im).transpose() * WT_im.transpose();
+    sums_.TF.noalias() += tile(group_.F.re).transpose() * WT_re.transpose();
+    sums_.TF.noalias() += tile(group_.F.im).transpose() * WT_im.transpose();
+    sums_.TD.noalias() += tile(group_.D.re).transpose() * WT_re.transpose();
+    sums_.TD.noalias() += tile(group_.D.im).transpose() * WT_im.transpose();
     sums_.TT += (WT_re.cwiseProduct(T_re) + WT_im.cwiseProduct(T_im)).rowwise().sum();
     const Eigen::MatrixXd TE = T_re.cwiseProduct(WE_re_) + T_im.cwiseProduct(WE_im_);
     sums_.TE += TE.rowwise().sum();
-    if (Y_ == nullptr) return;
-    sums_.TY.noalias() += tile(Y_->re).transpose() * TE.transpose();
-    sums_.TY.noalias() -= tile(Y_->im).transpose() *
+    if (!regresses()) return;
+    sums_.TY.noalias() += tile(Y_.re).transpose() * TE.transpose();
+    sums_.TY.noalias() -= tile(Y_.im).transpose() *
                           (T_re.cwiseProduct(WE_im_) - T_im.cwiseProduct(WE_re_)).transpose();
   }
 
-  const FitProblem& problem_;
-  const BasisGroup& group_;
   const GroupProducts& products_;
-  const Eigen::MatrixXd& B_;
+  const BasisGroup& group_;
   const std::vector<DerivativeColumn>& columns_;
-  const ComplexColumns* Y_;
+  const FitProblem& problem_;
   FitMethod method_;
+  const SplitMatrix& Y_;
+  const Eigen::MatrixXd& B_;
   TileRange range_;
   Eigen::Index n_f_, n_a_, n_d_;
   Eigen::MatrixXd BB_;  // members x pairs of functions with direct products of derivatives
@@ -189,16 +185,15 @@ class Share {
 };
 
 /// Adds the products that were reduced to fractions to their sums.
-void expand(const GroupProducts& products, const std::vector<DerivativeColumn>& columns,
-            const Eigen::MatrixXd& B, int threads, LineSums& sums) {
+void expand(const GroupProducts& products, const Eigen::MatrixXd& B, int threads, LineSums& sums) {
   sums.FF = products.FF.expand(sums.S, sums.FF, threads);
   sums.FD = products.FD.expand(sums.S, sums.FD, threads);
   if (sums.FY.cols() > 0) sums.FY = products.FY.expand(sums.S_re, sums.S_im, sums.FY, threads);
   products.DD.for_each_pair(threads, [&](std::size_t p) {
     if (!products.DD.is_reduced(p)) return;
     const auto [l, r] = products.DD.pairs()[p];
-    const auto left = B.col(columns[static_cast<std::size_t>(l)].function);
-    const auto right = B.col(columns[static_cast<std::size_t>(r)].function);
+    const auto left = B.col(products.method.columns[static_cast<std::size_t>(l)].function);
+    const auto right = B.col(products.method.columns[static_cast<std::size_t>(r)].function);
     sums.DD(l, r) += products.DD.weighted_sum(p, sums.S, left.cwiseProduct(right));
   });
 }
@@ -206,75 +201,40 @@ void expand(const GroupProducts& products, const std::vector<DerivativeColumn>& 
 }  // namespace
 
 LineSums& LineSums::operator+=(const LineSums& other) {
-  FF += other.FF;
-  FD += other.FD;
-  FY += other.FY;
-  FE += other.FE;
-  DD += other.DD;
-  ZY += other.ZY;
-  ZE += other.ZE;
-  YY += other.YY;
-  YE += other.YE;
-  TF += other.TF;
-  TD += other.TD;
-  TY += other.TY;
-  TT += other.TT;
-  TE += other.TE;
-  S += other.S;
-  S_re += other.S_re;
-  S_im += other.S_im;
+  using Sums = LineSums;
+  for (Eigen::MatrixXd Sums::*sum :
+       {&Sums::FF, &Sums::FD, &Sums::FY, &Sums::FE, &Sums::DD, &Sums::ZY, &Sums::YY, &Sums::TF,
+        &Sums::TD, &Sums::TY, &Sums::S, &Sums::S_re, &Sums::S_im})
+    this->*sum += other.*sum;
+  for (Eigen::VectorXd Sums::*sum : {&Sums::ZE, &Sums::YE, &Sums::TT, &Sums::TE})
+    this->*sum += other.*sum;
   return *this;
 }
 
-GroupProducts::GroupProducts(const FitProblem& problem, const BasisGroup& group,
-                             const std::vector<DerivativeColumn>& columns, FitMethod method)
-    : FF(group.fractions, group.fractions.F, group.fractions.F,
-         triangular_pairs(problem.functions())),
+GroupProducts::GroupProducts(const EquationMethod& of_method, const BasisGroup& of_group)
+    : method(of_method),
+      group(of_group),
+      FF(group.fractions, group.fractions.F, group.fractions.F,
+         triangular_pairs(method.problem.functions())),
       FD(group.fractions, group.fractions.F, group.fractions.D,
-         all_pairs(problem.functions(), static_cast<Eigen::Index>(columns.size()))),
+         all_pairs(method.problem.functions(), static_cast<Eigen::Index>(method.columns.size()))),
       FY(group.fractions, group.fractions.F, group.fractions.Y,
-         all_pairs(problem.functions(), method == FitMethod::gn ? 0 : problem.denominators())),
+         all_pairs(method.problem.functions(), method.Y.cols())),
       DD(group.fractions, group.fractions.D, group.fractions.D,
-         triangular_pairs(static_cast<Eigen::Index>(columns.size()))) {
+         triangular_pairs(static_cast<Eigen::Index>(method.columns.size()))) {
   for (const auto& [l, r] : DD.direct()) {
-    const Eigen::Index f = columns[static_cast<std::size_t>(l)].function;
-    const Eigen::Index g = columns[static_cast<std::size_t>(r)].function;
+    const Eigen::Index f = method.columns[static_cast<std::size_t>(l)].function;
+    const Eigen::Index g = method.columns[static_cast<std::size_t>(r)].function;
     functions[{f, g}].push_back({l, r});
   }
 }
 
-void equation_error_columns(const FitProblem& problem, const FitParameters& beta,
-                            Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  re.resize(problem.size(), problem.denominators());
-  im.resize(problem.size(), problem.denominators());
-  const HoldEquivalent through(problem.lines, 0.0);
-  Eigen::Index column = 0;
-  SplitMatrix fraction;
-  for (const Eigen::VectorXd& a : beta.a) {
-    re.middleCols(column, a.size()).setZero();
-    im.middleCols(column, a.size()).setZero();
-    for (const std::complex<double> lambda : roots(a)) {
-      through.reciprocal(lambda, fraction);
-      for (Eigen::Index q = 1; q <= a.size(); ++q) {
-        const std::complex<double> c = equation_error_residue(through, a, lambda, q);
-        re.col(column + q - 1) += c.real() * fraction.re - c.imag() * fraction.im;
-        im.col(column + q - 1) += c.real() * fraction.im + c.imag() * fraction.re;
-      }
-    }
-    if (!through.exact() && a.size() > 0)
-      re.col(column + a.size() - 1).array() += 1.0 / a[a.size() - 1];
-    column += a.size();
-  }
-}
-
-LineSums line_sums(const FitProblem& problem, const BasisGroup& group,
-                   const GroupProducts& products, const TileRange& block, const Eigen::MatrixXd& B,
-                   const std::vector<DerivativeColumn>& columns, const ComplexColumns* Y,
-                   FitMethod method) {
-  LineSums sums = sum_over_shares<LineSums>(block, problem.threads, [&](const TileRange& share) {
-    return Share(problem, group, products, B, columns, Y, method, share).run();
-  });
-  expand(products, columns, B, problem.threads, sums);
+LineSums line_sums(const GroupProducts& products, const TileRange& block,
+                   const Eigen::MatrixXd& B) {
+  const int threads = products.method.problem.threads;
+  LineSums sums = sum_over_shares<LineSums>(
+      block, threads, [&](const TileRange& share) { return Share(products, B, share).run(); });
+  expand(products, B, threads, sums);
   return sums;
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "estimation/products/weighted_products.hpp"
+#include "estimation/products/channel_equations.hpp"
 
 namespace stageid {
 
@@ -32,16 +32,12 @@ struct LineSums {
   LineSums& operator+=(const LineSums& other);
 };
 
-/// Y: d log A_i / d a_q on every line, one column per denominator coefficient, N x n_a: s^q / A_i. With exact hold,
-/// A_i is the product of z - e^{lambda T} over its roots, and Y is the same in z.
-void equation_error_columns(const FitProblem& problem, const FitParameters& beta,
-                            Eigen::MatrixXd& re, Eigen::MatrixXd& im);
-
 /// The products needed for the sums of the channels of a group, shared by all of its blocks.
 struct GroupProducts {
-  GroupProducts(const FitProblem& problem, const BasisGroup& group,
-                const std::vector<DerivativeColumn>& columns, FitMethod method);
+  GroupProducts(const EquationMethod& method, const BasisGroup& group);
 
+  const EquationMethod& method;
+  const BasisGroup& group;
   PairReduction FF, FD, FY, DD;  ///< FY: empty for gn
   /// The direct pairs of DD, by the functions whose derivatives they are.
   std::map<std::pair<Eigen::Index, Eigen::Index>, std::vector<ColumnPair>> functions;
@@ -49,10 +45,6 @@ struct GroupProducts {
 
 /// @param block channels of the group
 /// @param B their numerators, members x n_f
-/// @param Y from equation_error_columns(); empty for gn
-LineSums line_sums(const FitProblem& problem, const BasisGroup& group,
-                   const GroupProducts& products, const TileRange& block, const Eigen::MatrixXd& B,
-                   const std::vector<DerivativeColumn>& columns, const ComplexColumns* Y,
-                   FitMethod method);
+LineSums line_sums(const GroupProducts& products, const TileRange& block, const Eigen::MatrixXd& B);
 
 }  // namespace stageid

@@ -7,22 +7,18 @@
 namespace stageid {
 namespace {
 
-struct Columns {
-  Eigen::MatrixXd re;
-  Eigen::MatrixXd im;
-};
-
 /// Adds the products of channel c and the following ones on a tile of lines.
-void add_channel(const ChannelPairs& pairs, const std::vector<Columns>& X, Eigen::Index c,
+void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
                  LineRange lines, const std::vector<FunctionSet>& sets,
                  std::vector<Eigen::MatrixXd>& out) {
-  const Columns& left = X[static_cast<std::size_t>(c)];
-  Columns right;
-  Eigen::ArrayXd w_re;
-  Eigen::ArrayXd w_im;
+  const SplitMatrix& left = X[static_cast<std::size_t>(c)];
+  SplitMatrix right;
   for (Eigen::Index d = c; d < pairs.channels; ++d) {
-    if (!pairs.between(c, d, lines, w_re, w_im)) continue;
-    const Columns& other = X[static_cast<std::size_t>(d)];
+    const SplitMatrix weight = pairs.between(c, d, lines);
+    if (weight.cols() == 0) continue;
+    const auto w_re = weight.re.col(0).array();
+    const auto w_im = weight.im.col(0).array();
+    const SplitMatrix& other = X[static_cast<std::size_t>(d)];
     right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
     right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
     for (std::size_t s = 0; s < sets.size(); ++s) {
@@ -47,14 +43,12 @@ std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
     const Eigen::Index n = pairs.channels * static_cast<Eigen::Index>(set.size());
     out.emplace_back(Eigen::MatrixXd::Zero(n, n));
   }
-  std::vector<Columns> X(static_cast<std::size_t>(pairs.channels));
+  std::vector<SplitMatrix> X(static_cast<std::size_t>(pairs.channels));
   const auto channels = static_cast<int>(pairs.channels);
   for (Eigen::Index first = 0; first < pairs.lines; first += kTileLines) {
     const LineRange lines = {first, std::min(kTileLines, pairs.lines - first)};
-    for_each_task(pairs.threads, channels, [&](int c) {
-      Columns& own = X[static_cast<std::size_t>(c)];
-      pairs.columns(c, lines, own.re, own.im);
-    });
+    for_each_task(pairs.threads, channels,
+                  [&](int c) { X[static_cast<std::size_t>(c)] = pairs.columns(c, lines); });
     for_each_task(pairs.threads, channels,
                   [&](int c) { add_channel(pairs, X, c, lines, sets, out); });
   }

@@ -16,12 +16,9 @@ struct ChannelPairs {
   Eigen::Index channels = 0;
   Eigen::Index lines = 0;
   int threads = 1;
-  std::function<void(Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im)>
-      columns;
-  /// W(c, d) on some lines; false: zero.
-  std::function<bool(Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
-                     Eigen::ArrayXd& im)>
-      between;
+  std::function<SplitMatrix(Eigen::Index c, LineRange lines)> columns;
+  /// W(c, d) on some lines, lines x 1; empty: zero.
+  std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, LineRange lines)> between;
 };
 
 /// sum_k Re{X_c^H W(c, d) X_d} of the columns in a set, for every set: element (c + n_c p, d + n_c q) belongs to

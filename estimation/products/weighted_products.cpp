@@ -2,12 +2,27 @@
 
 #include <algorithm>
 #include <complex>
+#include <numeric>
 
 namespace stageid {
 namespace {
 
 constexpr Eigen::Index kBlockPairs = 192;
 constexpr Eigen::Index kShares = 8;  // per block, if there are that many tiles of lines
+
+/// sums(p, .) += V times the product of a pair, which `fill` writes; a block of pairs at a time.
+template <typename Fill>
+void add_products(const Eigen::MatrixXd& V, const std::vector<ColumnPair>& pairs,
+                  Eigen::MatrixXd& sums, const Fill& fill) {
+  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
+  Eigen::MatrixXd products(V.cols(), std::min(kBlockPairs, n_pairs));
+  for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
+    const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
+    for (Eigen::Index p = 0; p < count; ++p)
+      fill(pairs[static_cast<std::size_t>(first + p)], products.col(p));
+    sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * V.transpose();
+  }
+}
 
 }  // namespace
 
@@ -85,8 +100,8 @@ void DataTile::load(const FitProblem& problem, const BasisGroup& group, const Ti
     });
   }
   if (B.size() == 0) return;
-  E_re.noalias() -= B * group.F_re.middleRows(first_line, lines).transpose();
-  E_im.noalias() -= B * group.F_im.middleRows(first_line, lines).transpose();
+  E_re.noalias() -= B * group.F.re.middleRows(first_line, lines).transpose();
+  E_im.noalias() -= B * group.F.im.middleRows(first_line, lines).transpose();
 }
 
 double DataTile::squares() const {
@@ -105,46 +120,37 @@ void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fraction
   S.noalias() += weighted * fractions.base.block(first_line, 0, W.cols(), S.cols());
 }
 
-void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
+void add_pair_sums(const Eigen::MatrixXd& W, const SplitMatrix& X, const SplitMatrix& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums) {
   const Eigen::Index n = W.cols();
-  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
-  Eigen::MatrixXd products(n, std::min(kBlockPairs, n_pairs));
-  for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
-    const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
-    for (Eigen::Index p = 0; p < count; ++p) {
-      const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-      products.col(p) =
-          X.re.col(i).segment(first_line, n).cwiseProduct(Y.re.col(j).segment(first_line, n)) +
-          X.im.col(i).segment(first_line, n).cwiseProduct(Y.im.col(j).segment(first_line, n));
-    }
-    sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * W.transpose();
-  }
+  add_products(W, pairs, sums, [&](ColumnPair pair, auto&& product) {
+    const auto [i, j] = pair;
+    product = X.re.col(i).segment(first_line, n).cwiseProduct(Y.re.col(j).segment(first_line, n)) +
+              X.im.col(i).segment(first_line, n).cwiseProduct(Y.im.col(j).segment(first_line, n));
+  });
 }
 
-void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
-                   const ComplexColumns& X, const ComplexColumns& Y,
-                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
-                   Eigen::MatrixXd& sums) {
+void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im, const SplitMatrix& X,
+                   const SplitMatrix& Y, const std::vector<ColumnPair>& pairs,
+                   Eigen::Index first_line, Eigen::MatrixXd& sums) {
   const Eigen::Index n = V_re.cols();
-  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
   Eigen::MatrixXd V(V_re.rows(), 2 * n);
   V << V_re, -V_im;
-  Eigen::MatrixXd products(2 * n, std::min(kBlockPairs, n_pairs));
-  for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
-    const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
-    for (Eigen::Index p = 0; p < count; ++p) {
-      const auto [i, j] = pairs[static_cast<std::size_t>(first + p)];
-      const auto x_re = X.re.col(i).segment(first_line, n);
-      const auto x_im = X.im.col(i).segment(first_line, n);
-      const auto y_re = Y.re.col(j).segment(first_line, n);
-      const auto y_im = Y.im.col(j).segment(first_line, n);
-      products.col(p).head(n) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
-      products.col(p).tail(n) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
-    }
-    sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * V.transpose();
-  }
+  add_products(V, pairs, sums, [&](ColumnPair pair, auto&& product) {
+    const auto x_re = X.re.col(pair.left).segment(first_line, n);
+    const auto x_im = X.im.col(pair.left).segment(first_line, n);
+    const auto y_re = Y.re.col(pair.right).segment(first_line, n);
+    const auto y_im = Y.im.col(pair.right).segment(first_line, n);
+    product.head(n) = x_re.cwiseProduct(y_re) + x_im.cwiseProduct(y_im);
+    product.tail(n) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);
+  });
+}
+
+std::vector<Eigen::Index> indices(Eigen::Index first, Eigen::Index count) {
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(count));
+  std::iota(out.begin(), out.end(), first);
+  return out;
 }
 
 Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows) {

@@ -15,12 +15,6 @@ std::vector<ColumnPair> triangular_pairs(Eigen::Index n);  ///< left >= right
 Eigen::MatrixXd from_triangle(const Eigen::Ref<const Eigen::VectorXd>& triangle, Eigen::Index n);
 std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right);  ///< left outermost
 
-/// Complex columns as two real matrices, N x n each.
-struct ComplexColumns {
-  const Eigen::MatrixXd& re;
-  const Eigen::MatrixXd& im;
-};
-
 constexpr Eigen::Index kTileLines = 256;  // the tiles of weights and products remain in the cache
 
 /// Some channels of a group on some lines: the unit of work of one task.
@@ -77,16 +71,18 @@ void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fraction
 /// sums(p, c) += sum_k W(c, k) Re{ conj(X(k, left_p)) Y(k, right_p) } over lines first_line + k, for pairs that are
 /// multiplied out. The products are functions of frequency only and shared by all channels, so this is one (pairs x
 /// lines) (lines x channels) matrix product.
-void add_pair_sums(const Eigen::MatrixXd& W, const ComplexColumns& X, const ComplexColumns& Y,
+void add_pair_sums(const Eigen::MatrixXd& W, const SplitMatrix& X, const SplitMatrix& Y,
                    const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
                    Eigen::MatrixXd& sums);
 
 /// The same with complex weights V: sum_k Re{ conj(X) Y V }. Double precision here too: in single precision, the
 /// refined-IV step from a start with large residuals is wrong by up to a percent.
-void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im,
-                   const ComplexColumns& X, const ComplexColumns& Y,
-                   const std::vector<ColumnPair>& pairs, Eigen::Index first_line,
-                   Eigen::MatrixXd& sums);
+void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im, const SplitMatrix& X,
+                   const SplitMatrix& Y, const std::vector<ColumnPair>& pairs,
+                   Eigen::Index first_line, Eigen::MatrixXd& sums);
+
+/// first, first + 1, ...
+std::vector<Eigen::Index> indices(Eigen::Index first, Eigen::Index count);
 
 /// Rows `rows` of a matrix.
 Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows);

@@ -92,8 +92,8 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   for (const BasisGroup& group : groups)
     for (const Eigen::Index c : group.channels) {
       const Eigen::VectorXd w = problem.weights(c);
-      const Eigen::MatrixXd M = group.F_re.transpose() * w.asDiagonal() * group.F_re +
-                                group.F_im.transpose() * w.asDiagonal() * group.F_im;
+      const Eigen::MatrixXd M = group.F.re.transpose() * w.asDiagonal() * group.F.re +
+                                group.F.im.transpose() * w.asDiagonal() * group.F.im;
       const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * M *
                                                                  scale.asDiagonal());

@@ -22,7 +22,6 @@
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/start/delay_search.hpp"
-#include "estimation/uncertainty/mode_deviation.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {

@@ -56,13 +56,19 @@ double residual_scale(double per_degree, bool likelihood) {
   return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
 }
 
-Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                           LineRange lines) {
-  const Eigen::ArrayXd W = problem.W->row(c).segment(lines.first, lines.count).transpose();
-  if (!noise.variance) return W.sqrt();
-  const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);
-  const auto divisor = noise.variance->divisor.segment(lines.first, lines.count);
-  return W * (variance.transpose().array() / divisor).sqrt();
+SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
+                         LineRange lines, SplitMatrix columns) {
+  Eigen::ArrayXd scale = problem.W->row(c).segment(lines.first, lines.count).transpose();
+  if (noise.variance) {
+    const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);
+    const auto divisor = noise.variance->divisor.segment(lines.first, lines.count);
+    scale *= (variance.transpose().array() / divisor).sqrt();
+  } else {
+    scale = scale.sqrt().eval();
+  }
+  columns.re.array().colwise() *= scale;
+  columns.im.array().colwise() *= scale;
+  return columns;
 }
 
 FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {

@@ -50,8 +50,8 @@ double covariance_scale(const FitProblem& problem, double cost, Eigen::Index par
 /// @pre noise.variance is known
 FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 
-/// W C^1/2 of one channel on some lines, for correlated_gram().
-Eigen::ArrayXd noise_scale(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                           LineRange lines);
+/// Columns of one channel on some lines, times W C^1/2; for correlated_gram().
+SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
+                         LineRange lines, SplitMatrix columns);
 
 }  // namespace stageid

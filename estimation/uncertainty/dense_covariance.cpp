@@ -4,8 +4,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -14,7 +15,7 @@
 #include "estimation/problem/weight_matrices.hpp"
 #include "estimation/uncertainty/low_rank_covariance.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
-#include "estimation/uncertainty/response_errors.hpp"
+#include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 namespace {
@@ -39,7 +40,7 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
   return out;
 }
 
-/// Z of the functions of the channels in a set, in the order of DenseCovariance.
+/// Z of the functions of the channels in a set, in the order of dense_covariances().
 template <typename Row>
 Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionSet& set, const Row& row) {
   Eigen::MatrixXd out(problem.channels() * static_cast<Eigen::Index>(set.size()),
@@ -75,27 +76,25 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   pairs.channels = problem.channels();
   pairs.lines = noise.correlation.known() ? problem.size() : 0;
   pairs.threads = problem.threads;
-  pairs.columns = [&](Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
+  pairs.columns = [&](Eigen::Index c, LineRange lines) {
     const auto at = static_cast<std::size_t>(c);
-    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
     const Eigen::MatrixXd& inverse = covariance.channels[at].equations_inverse;
-    re = weight.matrix().asDiagonal() *
-         (group_of[at]->F_re.middleRows(lines.first, lines.count) * inverse);
-    im = weight.matrix().asDiagonal() *
-         (group_of[at]->F_im.middleRows(lines.first, lines.count) * inverse);
+    const auto& [F_re, F_im] = group_of[at]->F;
+    return noise_scaled(problem, noise, c, lines,
+                        {F_re.middleRows(lines.first, lines.count) * inverse,
+                         F_im.middleRows(lines.first, lines.count) * inverse});
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
-                      Eigen::ArrayXd& im) {
-    return c != d && noise.correlation.of_channels(c, d, lines, re, im);
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines) {
+    return c == d ? SplitMatrix{} : noise.correlation.of_channels(c, d, lines);
   };
   std::vector<Eigen::MatrixXd> out = pair_grams(pairs, sets);
   for (Eigen::MatrixXd& matrix : out) matrix *= half;
   return out;
 }
 
-std::vector<DenseCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
-                                                const FitResult& result, const FitOptions& options,
-                                                const std::vector<FunctionSet>& sets) {
+std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
+                                              const FitResult& result, const FitOptions& options,
+                                              const std::vector<FunctionSet>& sets) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
   const ParameterCovariance known = parameter_covariance(
@@ -103,7 +102,7 @@ std::vector<DenseCovariance> of_free_numerators(const FrfEstimate& frf, const En
   if (known.channels.empty()) return {};
   const double half = 0.5 * known.residual_scale;
   std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, sets);
-  std::vector<DenseCovariance> out;
+  std::vector<FitCovariance> out;
   for (std::size_t s = 0; s < sets.size(); ++s) {
     const FunctionSet& set = sets[s];
     const auto channel = [&](Eigen::Index c) -> const ChannelCovariance& {
@@ -147,15 +146,15 @@ Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
   return T * C * T.transpose();
 }
 
-std::vector<DenseCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
-                                            const FitResult& result, const FitOptions& options,
-                                            const std::vector<FunctionSet>& sets) {
+std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
+                                          const FitResult& result, const FitOptions& options,
+                                          const std::vector<FunctionSet>& sets) {
   ResidueFactors factors(fit.problem, fit.beta, options);
   factors.project(fit.beta, Eigen::MatrixXd::Ones(fit.problem.channels(), fit.problem.functions()));
-  const LowRankParameters free =
+  const FitCovariance free =
       low_rank_parameters(fit.problem, fit.beta, fit.groups, result.model.fit.cost, factors,
                           data_noise(frf, options.weighting), result.frozen);
-  std::vector<DenseCovariance> out;
+  std::vector<FitCovariance> out;
   if (free.sandwich.size() == 0) return out;
   for (const FunctionSet& set : sets)
     out.push_back({of_factors(fit.problem, fit.beta, factors, set, free.sandwich),
@@ -173,15 +172,11 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
   pairs.channels = problem.channels();
   pairs.lines = problem.size();
   pairs.threads = problem.threads;
-  pairs.columns = [&](Eigen::Index c, LineRange lines, Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-    const BasisGroup& group = *group_of[static_cast<std::size_t>(c)];
-    re = group.F_re.middleRows(lines.first, lines.count);
-    im = group.F_im.middleRows(lines.first, lines.count);
+  pairs.columns = [&](Eigen::Index c, LineRange lines) {
+    return group_of[static_cast<std::size_t>(c)]->F.middle_rows(lines.first, lines.count);
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
-                      Eigen::ArrayXd& im) {
-    fit.matrices->between(c, d, lines.first, lines.count, re, im);
-    return true;
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines) {
+    return fit.matrices->between(c, d, lines.first, lines.count);
   };
   const Eigen::Index globals = problem.globals();
   Eigen::MatrixXd M(equations.size(), equations.size());
@@ -194,19 +189,18 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
   return M;
 }
 
-std::vector<DenseCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
-                                                const FitOptions& options,
-                                                const std::vector<FunctionSet>& sets) {
+std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
+                                              const FitOptions& options,
+                                              const std::vector<FunctionSet>& sets) {
   const FitProblem& problem = fit.problem;
   const double per_degree =
       residual_per_degree(problem, result.model.fit.cost, problem.parameters());
   const double half = 0.5 * residual_scale(per_degree, weighs_by_variance(options.weighting));
   const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
   if (!inverse.allFinite()) return {};
-  std::vector<DenseCovariance> out;
+  std::vector<FitCovariance> out;
   for (const FunctionSet& set : sets) {
-    std::vector<Eigen::Index> places(static_cast<std::size_t>(problem.globals()));
-    std::iota(places.begin(), places.end(), Eigen::Index{0});
+    std::vector<Eigen::Index> places = indices(0, problem.globals());
     for (const Eigen::Index f : set)
       for (Eigen::Index c = 0; c < problem.channels(); ++c)
         places.push_back(problem.globals() + c + problem.channels() * f);
@@ -232,26 +226,98 @@ bool has_deviations(const FitResult& result) {
                      [](const Submodel& s) { return !s.numerator_std.empty(); });
 }
 
-std::vector<DenseCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
-                                            const FitResult& result, const FitOptions& options,
-                                            const std::vector<FunctionSet>& sets) {
+std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
+                                          const FitResult& result, const FitOptions& options,
+                                          const std::vector<FunctionSet>& sets) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (!are_affordable(fit, sets)) return {};
-  std::vector<DenseCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, sets)
-                                     : low_rank
-                                         ? of_given_ranks(frf, fit, result, options, sets)
-                                         : of_free_numerators(frf, fit, result, options, sets);
-  for (DenseCovariance& one : out)
+  std::vector<FitCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, sets)
+                                   : low_rank   ? of_given_ranks(frf, fit, result, options, sets)
+                                              : of_free_numerators(frf, fit, result, options, sets);
+  for (FitCovariance& one : out)
     for (Eigen::MatrixXd* matrix : {&one.sandwich, &one.likelihood})  // symmetric to the last bit
       *matrix = (0.5 * frf.correlated_lines * (*matrix + matrix->transpose())).eval();
   return out;
 }
 
+constexpr double kOutside = 0.05;
+
+double probability_above(double r, double relation) {
+  constexpr int kPoints = 200;  // the midpoint rule of a smooth periodic function
+  double sum = 0.0;
+  for (int i = 0; i < kPoints; ++i) {
+    const double t = (i + 0.5) / kPoints * std::numbers::pi / 2.0;
+    const double along = (1.0 + relation) * std::pow(std::cos(t), 2);
+    sum += std::exp(-r * r / (along + (1.0 - relation) * std::pow(std::sin(t), 2)));
+  }
+  return sum / kPoints;
+}
+
+/// error_quantile_95() interpolated in a table, within 1e-5.
+class QuantileTable {
+ public:
+  QuantileTable() {
+    for (std::size_t i = 0; i < values_.size(); ++i)
+      values_[i] = error_quantile_95(static_cast<double>(i) / kIntervals);
+  }
+  double operator()(double relation) const {
+    const double x = std::clamp(relation, 0.0, 1.0) * kIntervals;
+    const auto i = std::min(static_cast<std::size_t>(x), std::size_t{kIntervals - 1});
+    return std::lerp(values_[i], values_[i + 1], x - static_cast<double>(i));
+  }
+
+ private:
+  static constexpr int kIntervals = 256;
+  std::array<double, kIntervals + 1> values_{};
+};
+
+/// The parameters that a channel's response depends on.
+std::vector<Eigen::Index> own_parameters(const FitProblem& problem, Eigen::Index c) {
+  std::vector<Eigen::Index> own = indices(0, problem.globals());
+  for (Eigen::Index f = 0; f < problem.functions(); ++f)
+    own.push_back(problem.globals() + c + problem.channels() * f);
+  return own;
+}
+
+/// FitCovariance::response_variance and response_radius from the covariance of the parameters. Errors of a model are
+/// not circular: few parameters move P along few directions.
+void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
+  const FitProblem& problem = fit.problem;
+  const QuantileTable quantile;
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
+  covariance.response_variance.resize(problem.channels(), problem.size());
+  covariance.response_radius.resize(problem.channels(), problem.size());
+  for_each_task(problem.threads, static_cast<int>(problem.channels()), [&](int c) {
+    const BasisGroup& group = *group_of[static_cast<std::size_t>(c)];
+    const std::vector<Eigen::Index> own = own_parameters(problem, c);
+    const Eigen::MatrixXd C = covariance.sandwich(own, own);
+    for (Eigen::Index first = 0; first < problem.size(); first += kTileLines) {
+      const LineRange lines = {first, std::min(kTileLines, problem.size() - first)};
+      const SplitMatrix of_globals = global_columns(problem, fit.beta, group, c, lines);
+      Eigen::MatrixXd re(lines.count, C.rows());
+      Eigen::MatrixXd im(lines.count, C.rows());
+      re << of_globals.re, group.F.re.middleRows(first, lines.count);
+      im << of_globals.im, group.F.im.middleRows(first, lines.count);
+      const Eigen::MatrixXd half = re * C;
+      const Eigen::ArrayXd real = half.cwiseProduct(re).rowwise().sum();
+      const Eigen::ArrayXd imaginary = (im * C).cwiseProduct(im).rowwise().sum();
+      const Eigen::ArrayXd between = half.cwiseProduct(im).rowwise().sum();
+      for (Eigen::Index i = 0; i < lines.count; ++i) {
+        const double variance = std::max(real[i] + imaginary[i], 0.0);
+        const double relation = std::hypot(real[i] - imaginary[i], 2.0 * between[i]);
+        covariance.response_variance(c, first + i) = variance;
+        covariance.response_radius(c, first + i) =
+            std::sqrt(variance) * quantile(variance > 0.0 ? relation / variance : 0.0);
+      }
+    }
+  });
+}
+
 }  // namespace
 
-std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
-                                               const FitOptions& options,
-                                               const std::vector<FunctionSet>& sets) {
+std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
+                                             const FitOptions& options,
+                                             const std::vector<FunctionSet>& sets) {
   if (!has_deviations(result)) return {};
   return covariances_of(frf, ended_fit(frf, result, options), result, options, sets);
 }
@@ -262,7 +328,7 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
     return;
   }
   const Ended fit = ended_fit(frf, result, options);
-  std::vector<DenseCovariance> all =
+  std::vector<FitCovariance> all =
       covariances_of(frf, fit, result, options, {all_functions(result.model)});
   if (all.empty()) {
     result.decisions.push_back(
@@ -271,26 +337,31 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
                     kMostParameters));
     return;
   }
-  result.covariance.sandwich = std::move(all.front().sandwich);
-  result.covariance.likelihood = std::move(all.front().likelihood);
-  fill_response_errors(fit.problem, fit.beta, fit.groups, result.covariance);
+  result.covariance = std::move(all.front());
+  fill_response_errors(fit, result.covariance);
+}
+
+double error_quantile_95(double relation) {
+  double low = 1.0;
+  double high = 3.0;
+  while (high - low > 1e-9) {
+    const double middle = 0.5 * (low + high);
+    (probability_above(middle, relation) > kOutside ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
 }
 
 FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel) {
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < submodel; ++i)
     first += static_cast<Eigen::Index>(model.submodels[i].numerator.size());
-  FunctionSet out(model.submodels[submodel].numerator.size());
-  std::iota(out.begin(), out.end(), first);
-  return out;
+  return indices(first, static_cast<Eigen::Index>(model.submodels[submodel].numerator.size()));
 }
 
 FunctionSet all_functions(const AdditiveModel& model) {
   std::size_t count = 0;
   for (const Submodel& s : model.submodels) count += s.numerator.size();
-  FunctionSet out(count);
-  std::iota(out.begin(), out.end(), Eigen::Index{0});
-  return out;
+  return indices(0, static_cast<Eigen::Index>(count));
 }
 
 }  // namespace stageid

@@ -9,28 +9,27 @@
 
 namespace stageid {
 
-/// Covariance of all globals (denominator coefficients in the order of the submodels, then free delays), followed by
-/// the numerators of some functions, vec of channels x functions.
-struct DenseCovariance {
-  /// Of the estimate, 1/2 M^-1 K M^-1 (see parameter_covariance()); the standard deviations are from this one.
-  Eigen::MatrixXd sandwich;
-  /// 1/2 M^-1 = [2 sum Re{J^H W J}]^-1: the covariance if W were the inverse covariance of the noise.
-  Eigen::MatrixXd likelihood;
-};
-
 /// All sets together may have as many numbers as one set with this many rows.
 constexpr Eigen::Index kMostParameters = 4000;
 
 /// The covariances whose diagonals parameter_covariance() and related functions compute, including those between
-/// channels; one per set. With weight matrices they are exact: M is formed and inverted.
+/// channels; one per set. Each is of all globals (denominator coefficients in the order of the submodels, then free
+/// delays), followed by the numerators of the functions in the set, vec of channels x functions, without response
+/// parts. The sandwich is 1/2 M^-1 K M^-1, the likelihood 1/2 M^-1 = [2 sum Re{J^H W J}]^-1. With weight matrices they
+/// are exact: M is formed and inverted.
 /// @param result of fit_additive_model() with these data and options
 /// @returns empty if the fit has no standard deviations, or the sets exceed kMostParameters
-std::vector<DenseCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
-                                               const FitOptions& options,
-                                               const std::vector<FunctionSet>& sets);
+std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
+                                             const FitOptions& options,
+                                             const std::vector<FunctionSet>& sets);
 
 /// Fills FitResult::covariance, or adds a decision with the reason why there is none.
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
+
+/// 95 % quantile of |z| / sqrt(E|z|^2) of a complex Gaussian z of mean zero;
+/// `relation` = |E z^2| / E|z|^2: 1.731 for 0 (circular), 1.960 for 1 (on a line).
+///   P(|z| > r) = 2/pi int_0^{pi/2} exp(-r^2 / ((1 + rho) cos^2 t + (1 - rho) sin^2 t)) dt,  E|z|^2 = 1
+double error_quantile_95(double relation);
 
 /// The functions of submodel i: their indices among those of a channel.
 FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel);

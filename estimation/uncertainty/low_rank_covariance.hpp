@@ -5,16 +5,12 @@
 
 namespace stageid {
 
-/// Covariance of the free parameters of a fit with residues of given rank, see low_rank_covariance().
-struct LowRankParameters {
-  Eigen::MatrixXd sandwich;     ///< 1/2 N^-1 (T^T K T) N^-1; empty if N is singular
-  Eigen::MatrixXd likelihood;   ///< 1/2 N^-1
-  double residual_scale = 1.0;  ///< factor included in both
-};
-LowRankParameters low_rank_parameters(const FitProblem& problem, const FitParameters& beta,
-                                      const std::vector<BasisGroup>& groups, double cost,
-                                      const ResidueFactors& factors, const DataNoise& noise,
-                                      const std::vector<Eigen::Index>& frozen);
+/// Covariance of the free parameters of a fit with residues of given rank, see low_rank_covariance():
+/// 1/2 N^-1 (T^T K T) N^-1 and 1/2 N^-1, times covariance_scale(). Empty if N is singular.
+FitCovariance low_rank_parameters(const FitProblem& problem, const FitParameters& beta,
+                                  const std::vector<BasisGroup>& groups, double cost,
+                                  const ResidueFactors& factors, const DataNoise& noise,
+                                  const std::vector<Eigen::Index>& frozen);
 
 /// Covariance of a fit with residues of given rank, first order and sandwich form as in
 /// parameter_covariance(): with the Jacobian J T of the free parameters (see ResidueFactors),

@@ -3,7 +3,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "estimation/modal/modal_form.hpp"
@@ -142,12 +141,11 @@ void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, Fi
       sets.push_back(functions_of(result.model, i));
     }
   if (modes.empty()) return;
-  const std::vector<DenseCovariance> covariances = dense_covariances(frf, result, options, sets);
+  const std::vector<FitCovariance> covariances = dense_covariances(frf, result, options, sets);
   for (std::size_t m = 0; m < covariances.size(); ++m) {
     Submodel& mode = result.model.submodels[modes[m]];
     Eigen::Index first = 0;
-    for (std::size_t i = 0; i < modes[m]; ++i)
-      first += static_cast<Eigen::Index>(result.model.submodels[i].denominator.size()) - 1;
+    for (std::size_t i = 0; i < modes[m]; ++i) first += result.model.submodels[i].order();
     const Eigen::MatrixXd& C = covariances[m].sandwich;
     const Eigen::Index numerators =
         mode.numerator[0].size() * static_cast<Eigen::Index>(mode.numerator.size());

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <numeric>
 
 #include "excitation/threads/worker_pool.hpp"
 
@@ -12,39 +11,27 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channels
 
-/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined. @param C (a, b, line) -> complex
+/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined; 1 for a = b. @param C (a, b, line) -> complex
 template <typename Covariance>
-void correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, LineRange lines,
-                    Eigen::ArrayXd& re, Eigen::ArrayXd& im) {
-  re.resize(lines.count);
-  im.resize(lines.count);
-  for (Eigen::Index i = 0; i < lines.count; ++i) {
+SplitMatrix correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, LineRange lines) {
+  SplitMatrix out{Eigen::MatrixXd::Ones(lines.count, 1), Eigen::MatrixXd::Zero(lines.count, 1)};
+  for (Eigen::Index i = 0; a != b && i < lines.count; ++i) {
     const Eigen::Index k = lines.first + i;
     const double power = C(a, a, k).real() * C(b, b, k).real();
     const std::complex<double> rho = power > 0.0 ? C(a, b, k) / std::sqrt(power) : 0.0;
-    re[i] = rho.real();
-    im[i] = rho.imag();
+    out.re(i, 0) = rho.real();
+    out.im(i, 0) = rho.imag();
   }
+  return out;
 }
 
-/// to += (s_re + i s_im) from, line by line.
-void add_scaled(const Eigen::ArrayXd& s_re, const Eigen::ArrayXd& s_im,
-                const Eigen::MatrixXd& from_re, const Eigen::MatrixXd& from_im, Eigen::Index from,
-                Eigen::MatrixXd& to_re, Eigen::MatrixXd& to_im, Eigen::Index to) {
-  to_re.col(to).array() += s_re * from_re.col(from).array() - s_im * from_im.col(from).array();
-  to_im.col(to).array() += s_re * from_im.col(from).array() + s_im * from_re.col(from).array();
-}
-
-OutputColumns zeros(Eigen::Index outputs, Eigen::Index lines, Eigen::Index n) {
-  const std::vector<Eigen::MatrixXd> part(static_cast<std::size_t>(outputs),
-                                          Eigen::MatrixXd::Zero(lines, n));
-  return {part, part};
-}
-
-std::vector<Eigen::Index> all_of(Eigen::Index n) {
-  std::vector<Eigen::Index> places(static_cast<std::size_t>(n));
-  std::iota(places.begin(), places.end(), Eigen::Index{0});
-  return places;
+/// Column `to` += factor times column `from`, line by line.
+void add_scaled(const SplitMatrix& factor, const SplitMatrix& X, Eigen::Index from, SplitMatrix& Y,
+                Eigen::Index to) {
+  const auto re = factor.re.col(0).array();
+  const auto im = factor.im.col(0).array();
+  Y.re.col(to).array() += re * X.re.col(from).array() - im * X.im.col(from).array();
+  Y.im.col(to).array() += re * X.im.col(from).array() + im * X.re.col(from).array();
 }
 
 /// Correlated grams of the inputs, one tile of lines after another.
@@ -76,20 +63,20 @@ class GramOfTiles {
  private:
   /// The parameters of the columns of (S kron R) X.
   std::vector<Eigen::Index> columns_of(std::size_t u) const {
-    return correlation_.between_inputs() ? all_of(n_) : inputs_.parameters[u];
+    return correlation_.between_inputs() ? indices(0, n_) : inputs_.parameters[u];
   }
 
   void read(int u, LineRange lines) {
     OutputColumns& X = X_[static_cast<std::size_t>(u)];
-    X.re.resize(static_cast<std::size_t>(problem_.n_outputs));
-    X.im.resize(X.re.size());
-    for (std::size_t y = 0; y < X.re.size(); ++y)
-      inputs_.columns(u, static_cast<Eigen::Index>(y), lines, X.re[y], X.im[y]);
+    X.resize(static_cast<std::size_t>(problem_.n_outputs));
+    for (std::size_t y = 0; y < X.size(); ++y)
+      X[y] = inputs_.columns(u, static_cast<Eigen::Index>(y), lines);
     Y_[static_cast<std::size_t>(u)] = correlation_.of_outputs(X, lines);
   }
 
   OutputColumns with_other_inputs(int u, LineRange lines) const {
-    OutputColumns Z = zeros(problem_.n_outputs, lines.count, n_);
+    OutputColumns Z(static_cast<std::size_t>(problem_.n_outputs));
+    for (SplitMatrix& of_output : Z) of_output.set_zero(lines.count, n_);
     for (std::size_t v = 0; v < Y_.size(); ++v)
       correlation_.add_input(inputs_.first_input + u,
                              inputs_.first_input + static_cast<Eigen::Index>(v), Y_[v],
@@ -107,10 +94,10 @@ class GramOfTiles {
 
   void multiply(std::size_t u, const OutputColumns& Z, LineRange lines) {
     Eigen::MatrixXd& K = K_[u];
-    if (K.size() == 0) K.setZero(X_[u].re.front().cols(), Z.re.front().cols());
-    for (std::size_t y = 0; y < Z.re.size(); ++y) {
-      K.noalias() += X_[u].re[y].transpose() * Z.re[y];
-      K.noalias() += X_[u].im[y].transpose() * Z.im[y];
+    if (K.size() == 0) K.setZero(X_[u].front().cols(), Z.front().cols());
+    for (std::size_t y = 0; y < Z.size(); ++y) {
+      K.noalias() += X_[u][y].re.transpose() * Z[y].re;
+      K.noalias() += X_[u][y].im.transpose() * Z[y].im;
     }
     if (inputs_.use) inputs_.use(static_cast<Eigen::Index>(u), lines, Z);
   }
@@ -134,22 +121,30 @@ NoiseCorrelation::NoiseCorrelation(const FrfEstimate& frf)
   if (frf.input_factor.size() > 0 && n_u_ > 1) S_ = &frf.input_factor;
 }
 
-OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lines) const {
-  const auto C = [this](Eigen::Index y, Eigen::Index z, Eigen::Index k) {
-    const Eigen::Index at = y + n_y_ * z;
+SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, LineRange lines) const {
+  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
+    const Eigen::Index at = a + n_y_ * b;
     return std::complex<double>((*re_)(at, k), (*im_)(at, k));
   };
+  return correlation_of(C, y, z, lines);
+}
+
+SplitMatrix NoiseCorrelation::S(Eigen::Index u, Eigen::Index v, LineRange lines) const {
+  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
+    return (*S_)(a + n_u_ * b, k);
+  };
+  return correlation_of(C, u, v, lines);
+}
+
+OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lines) const {
   OutputColumns Y = X;  // the diagonal of R is one
-  Eigen::ArrayXd re;
-  Eigen::ArrayXd im;
   for (Eigen::Index y = 0; y < n_y_; ++y)
     for (Eigen::Index z = 0; z < n_y_; ++z) {
       if (z == y) continue;
-      const auto to = static_cast<std::size_t>(y);
-      const auto from = static_cast<std::size_t>(z);
-      correlation_of(C, y, z, lines, re, im);
-      for (Eigen::Index p = 0; p < X.re[from].cols(); ++p)
-        add_scaled(re, im, X.re[from], X.im[from], p, Y.re[to], Y.im[to], p);
+      const SplitMatrix rho = R(y, z, lines);
+      const SplitMatrix& from = X[static_cast<std::size_t>(z)];
+      for (Eigen::Index p = 0; p < from.cols(); ++p)
+        add_scaled(rho, from, p, Y[static_cast<std::size_t>(y)], p);
     }
   return Y;
 }
@@ -157,40 +152,22 @@ OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lin
 void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
                                  const std::vector<Eigen::Index>& at, LineRange lines,
                                  OutputColumns& Z) const {
-  Eigen::ArrayXd re = Eigen::ArrayXd::Ones(lines.count);  // the diagonal of S is one
-  Eigen::ArrayXd im = Eigen::ArrayXd::Zero(lines.count);
-  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    return (*S_)(a + n_u_ * b, k);
-  };
-  if (u != v) correlation_of(C, u, v, lines, re, im);
-  for (std::size_t y = 0; y < Y.re.size(); ++y)
+  const SplitMatrix rho = S(u, v, lines);
+  for (std::size_t y = 0; y < Y.size(); ++y)
     for (std::size_t p = 0; p < at.size(); ++p)
-      add_scaled(re, im, Y.re[y], Y.im[y], static_cast<Eigen::Index>(p), Z.re[y], Z.im[y], at[p]);
+      add_scaled(rho, Y[y], static_cast<Eigen::Index>(p), Z[y], at[p]);
 }
 
-bool NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, LineRange lines,
-                                   Eigen::ArrayXd& re, Eigen::ArrayXd& im) const {
-  const auto of_outputs = [this](Eigen::Index y, Eigen::Index z, Eigen::Index k) {
-    const Eigen::Index at = y + n_y_ * z;
-    return std::complex<double>((*re_)(at, k), (*im_)(at, k));
-  };
-  const auto of_inputs = [this](Eigen::Index u, Eigen::Index v, Eigen::Index k) {
-    return (*S_)(u + n_u_ * v, k);
-  };
+SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, LineRange lines) const {
   const Eigen::Index u = c / n_y_;
   const Eigen::Index v = d / n_y_;
-  if (u != v && !between_inputs()) return false;
-  re.setOnes(lines.count);
-  im.setZero(lines.count);
-  if (c % n_y_ != d % n_y_) correlation_of(of_outputs, c % n_y_, d % n_y_, lines, re, im);
-  if (u == v) return true;
-  Eigen::ArrayXd s_re;
-  Eigen::ArrayXd s_im;
-  correlation_of(of_inputs, u, v, lines, s_re, s_im);
-  const Eigen::ArrayXd product = re * s_re - im * s_im;
-  im = (re * s_im + im * s_re).eval();
-  re = product;
-  return true;
+  if (u != v && !between_inputs()) return {};
+  const SplitMatrix of_outputs = R(c % n_y_, d % n_y_, lines);
+  if (u == v) return of_outputs;
+  const auto& [re, im] = of_outputs;
+  const SplitMatrix of_inputs = S(u, v, lines);
+  return {re.cwiseProduct(of_inputs.re) - im.cwiseProduct(of_inputs.im),
+          re.cwiseProduct(of_inputs.im) + im.cwiseProduct(of_inputs.re)};
 }
 
 Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelation& correlation,

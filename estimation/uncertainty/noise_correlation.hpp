@@ -9,11 +9,8 @@
 
 namespace stageid {
 
-/// Columns of all outputs of one input on some lines, one matrix (lines x n) per output.
-struct OutputColumns {
-  std::vector<Eigen::MatrixXd> re;
-  std::vector<Eigen::MatrixXd> im;
-};
+/// Columns of all outputs of one input on some lines: lines x n each.
+using OutputColumns = std::vector<SplitMatrix>;
 
 /// Correlation of the noise of a response, S_k kron R_k on line k: that of the outputs from the residual covariance of
 /// the FRF, that of the inputs from its input factor, both over the deviations. A disturbance force moves several
@@ -34,11 +31,13 @@ class NoiseCorrelation {
   /// Z += S(u, v) Y, adding the n columns of Y to the columns `at` of Z. @pre between_inputs()
   void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
                  const std::vector<Eigen::Index>& at, LineRange lines, OutputColumns& Z) const;
-  /// (S kron R)(c, d) of two channels on some lines. @returns false if it is zero. @pre known()
-  bool of_channels(Eigen::Index c, Eigen::Index d, LineRange lines, Eigen::ArrayXd& re,
-                   Eigen::ArrayXd& im) const;
+  /// (S kron R)(c, d) of two channels on some lines, lines x 1; empty: zero. @pre known()
+  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, LineRange lines) const;
 
  private:
+  SplitMatrix R(Eigen::Index y, Eigen::Index z, LineRange lines) const;
+  SplitMatrix S(Eigen::Index u, Eigen::Index v, LineRange lines) const;
+
   Eigen::Index n_y_ = 0;
   Eigen::Index n_u_ = 0;
   const Eigen::MatrixXd* re_ = nullptr;
@@ -52,9 +51,7 @@ struct CorrelatedColumns {
   /// Per input: the parameters of its columns, in order.
   std::vector<std::vector<Eigen::Index>> parameters;
   /// Columns of an output (0-based) of the input first_input + u, lines x parameters[u].
-  std::function<void(Eigen::Index u, Eigen::Index output, LineRange lines, Eigen::MatrixXd& re,
-                     Eigen::MatrixXd& im)>
-      columns;
+  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, LineRange lines)> columns;
   /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
   /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.
   std::function<void(Eigen::Index u, LineRange lines, const OutputColumns& Z)> use = {};

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 #include <optional>
 
+#include "estimation/model/poles.hpp"
 #include "estimation/products/weighted_products.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
@@ -22,18 +22,12 @@ constexpr double kColumnTolerance = 1e-2;
 
 /// The part of the columns of the globals that the numerators of the channel cannot follow: J_a - F Z, with Z the rows
 /// of M_bb^-1 M_ba of the channel.
-void projected_columns(const FitProblem& problem, const FitParameters& beta,
-                       const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
-                       const std::vector<DerivativeColumn>& columns, LineRange lines,
-                       Eigen::MatrixXd& re, Eigen::MatrixXd& im) {
-  global_columns(problem, beta, group, c, columns, lines, re, im);
-  re -= group.F_re.middleRows(lines.first, lines.count) * Z;
-  im -= group.F_im.middleRows(lines.first, lines.count) * Z;
-}
-
-std::vector<Eigen::Index> all_globals(const FitProblem& problem) {
-  std::vector<Eigen::Index> out(static_cast<std::size_t>(problem.globals()));
-  std::iota(out.begin(), out.end(), Eigen::Index{0});
+SplitMatrix projected_columns(const FitProblem& problem, const FitParameters& beta,
+                              const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
+                              LineRange lines) {
+  SplitMatrix out = global_columns(problem, beta, group, c, lines);
+  out.re -= group.F.re.middleRows(lines.first, lines.count) * Z;
+  out.im -= group.F.im.middleRows(lines.first, lines.count) * Z;
   return out;
 }
 
@@ -75,31 +69,26 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
                                   const PartEquations& part, ChannelRange range,
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
-  const auto columns = derivative_columns(problem);
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
     cross[static_cast<std::size_t>(c)].setZero(problem.globals(), problem.functions());
   CorrelatedColumns inputs;
   inputs.first_input = range.first / n_y;
-  inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y), all_globals(problem));
-  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines, Eigen::MatrixXd& re,
-                       Eigen::MatrixXd& im) {
+  inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y),
+                           indices(0, problem.globals()));
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines) {
     const Eigen::Index c = range.first + n_y * u + y;
-    projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)], part.gn.channel(c).Z,
-                      c, columns, lines, re, im);
-    const Eigen::ArrayXd weight = noise_scale(problem, noise, c, lines);
-    re.array().colwise() *= weight;
-    im.array().colwise() *= weight;
+    return noise_scaled(problem, noise, c, lines,
+                        projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)],
+                                          part.gn.channel(c).Z, c, lines));
   };
   inputs.use = [&](Eigen::Index u, LineRange lines, const OutputColumns& Z) {
     for (Eigen::Index y = 0; y < n_y; ++y) {
-      const auto c = static_cast<std::size_t>(range.first + n_y * u + y);
-      const auto at = static_cast<std::size_t>(y);
-      const Eigen::ArrayXd weight =
-          noise_scale(problem, noise, static_cast<Eigen::Index>(c), lines);
-      const auto F_re = group_of[c]->F_re.middleRows(lines.first, lines.count).array();
-      const auto F_im = group_of[c]->F_im.middleRows(lines.first, lines.count).array();
-      cross[c] += Z.re[at].transpose() * (F_re.colwise() * weight).matrix() +
-                  Z.im[at].transpose() * (F_im.colwise() * weight).matrix();
+      const Eigen::Index c = range.first + n_y * u + y;
+      const auto at = static_cast<std::size_t>(c);
+      const SplitMatrix& of_output = Z[static_cast<std::size_t>(y)];
+      const SplitMatrix F = noise_scaled(problem, noise, c, lines,
+                                         group_of[at]->F.middle_rows(lines.first, lines.count));
+      cross[at] += of_output.re.transpose() * F.re + of_output.im.transpose() * F.im;
     }
   };
   return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
@@ -158,14 +147,11 @@ ChannelVariances channel_variances(const FitProblem& problem, const FitParameter
     out.numerators +=
         (Z * globals).cwiseProduct(Z).rowwise().sum() - 2.0 * (Z * channel.cross).diagonal();
   if (!with_response) return out;
-  out.response = quadratic(group.F_re, group.F_im, channel.own, group.F_re, group.F_im);
+  out.response = quadratic(group.F, channel.own, group.F);
   if (problem.globals() == 0) return out;
-  Eigen::MatrixXd J_re;
-  Eigen::MatrixXd J_im;
-  projected_columns(problem, beta, group, Z, c, derivative_columns(problem), {0, problem.size()},
-                    J_re, J_im);
-  out.response += quadratic(J_re, J_im, globals, J_re, J_im);
-  out.response += 2.0 * quadratic(J_re, J_im, channel.cross, group.F_re, group.F_im);
+  const SplitMatrix J = projected_columns(problem, beta, group, Z, c, {0, problem.size()});
+  out.response += quadratic(J, globals, J);
+  out.response += 2.0 * quadratic(J, channel.cross, group.F);
   return out;
 }
 
@@ -211,6 +197,20 @@ bool fill_channels(ChannelRange range, int threads, const std::function<bool(Eig
   return determined;
 }
 
+/// Free delays are the last globals; one delay of the plant is that of every input.
+void fill_delay_deviations(const FitProblem& problem, const Eigen::MatrixXd& globals,
+                           AdditiveModel& model) {
+  if (problem.delays() == 0) return;
+  const Eigen::VectorXd deviation =
+      globals.diagonal().tail(problem.delays()).cwiseMax(0.0).cwiseSqrt();
+  const bool common = problem.delay == DelayModel::estimate;
+  model.input_delay_std_s.setConstant(problem.n_inputs, deviation[0]);
+  model.output_delay_std_s.setZero(problem.n_outputs);
+  if (common) return;
+  model.input_delay_std_s = deviation.head(problem.n_inputs);
+  model.output_delay_std_s.head(problem.n_outputs - 1) = deviation.tail(problem.n_outputs - 1);
+}
+
 }  // namespace
 
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen) {
@@ -230,11 +230,9 @@ Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::
   return inverse;
 }
 
-Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
-                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
-                          const Eigen::MatrixXd& Y_im) {
-  return (X_re * C).cwiseProduct(Y_re).rowwise().sum() +
-         (X_im * C).cwiseProduct(Y_im).rowwise().sum();
+Eigen::VectorXd quadratic(const SplitMatrix& X, const Eigen::MatrixXd& C, const SplitMatrix& Y) {
+  return (X.re * C).cwiseProduct(Y.re).rowwise().sum() +
+         (X.im * C).cwiseProduct(Y.im).rowwise().sum();
 }
 
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
@@ -363,6 +361,36 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
       });
   if (!determined) return {};
   return out;
+}
+
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model) {
+  fill_delay_deviations(problem, covariance.globals, model);
+  Eigen::Index first = 0;
+  Eigen::Index f = 0;
+  for (Submodel& s : model.submodels) {
+    const Eigen::Index order = s.order();
+    if (s.is_mode()) {
+      const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
+      const double a1 = s.denominator[1];
+      const double a2 = s.denominator[2];
+      const Eigen::Vector2d df(0.0, -0.5 * s.natural_frequency_hz() / a2);
+      const Eigen::Vector2d dz = s.damping_ratio() * Eigen::Vector2d(1.0 / a1, -0.5 / a2);
+      // Zero: the mode is at a bound, so the data do not determine its frequency or damping.
+      if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
+      if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
+        s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
+    } else if (order > 0) {
+      const Eigen::MatrixXd C = covariance.globals.block(first, first, order, order);
+      if (C.diagonal().minCoeff() > 0.0) s.poles = pole_estimates(s.coefficients(), C);
+    }
+    first += order;
+    for (const Eigen::MatrixXd& B : s.numerator)
+      s.numerator_std.emplace_back(
+          covariance.numerator_variance.col(f++)
+              .unaryExpr([](double v) { return v < 0.0 ? 0.0 : std::sqrt(v); })
+              .reshaped(B.rows(), B.cols()));
+  }
 }
 
 }  // namespace stageid

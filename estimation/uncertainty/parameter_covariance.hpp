@@ -68,6 +68,13 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
                                      double scatter_factor, const std::vector<Eigen::Index>& frozen,
                                      bool with_response);
 
+/// Standard deviations of natural frequencies, damping ratios, other poles, delays and numerators of the model, from
+/// the covariance of the parameters by the delta method:
+///   df = -f/2 da_2/a_2,  dzeta = zeta (da_1/a_1 - da_2/(2 a_2)).
+/// A parameter at a bound has none.
+void fill_deviations(const FitProblem& problem, const ParameterCovariance& covariance,
+                     AdditiveModel& model);
+
 // Parts that are also used for fits with other structures.
 
 /// The group of every channel.
@@ -78,8 +85,6 @@ std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen);
 
 /// Diagonal of X C Y^T, real and imaginary parts summed.
-Eigen::VectorXd quadratic(const Eigen::MatrixXd& X_re, const Eigen::MatrixXd& X_im,
-                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& Y_re,
-                          const Eigen::MatrixXd& Y_im);
+Eigen::VectorXd quadratic(const SplitMatrix& X, const Eigen::MatrixXd& C, const SplitMatrix& Y);
 
 }  // namespace stageid

@@ -97,7 +97,7 @@ double operations(const Case& c, FitMethod method) {
     return static_cast<double>(PairReduction(x, left, right, std::move(pairs)).direct().size());
   };
   const Eigen::Index f = p.functions();
-  const Eigen::Index d = group.D_re.cols();
+  const Eigen::Index d = group.D.re.cols();
   const auto simple = static_cast<double>(x.simple_columns());
   double columns = static_cast<double>(x.base.cols()) + simple;
   columns += 2.0 * direct(x.F, x.F, triangular_pairs(f)) + direct(x.F, x.D, all_pairs(f, d));
@@ -155,12 +155,9 @@ void dense_equations(benchmark::State& state) {
   const Case c = make_case(1, 1, 1);
   const FitProblem& p = c.problem;
   const std::vector<BasisGroup> groups = evaluate_groups(p, c.beta, true);
-  const auto columns = derivative_columns(p);
-  std::vector<Eigen::MatrixXd> re(static_cast<std::size_t>(p.channels()));
-  std::vector<Eigen::MatrixXd> im(re.size());
+  std::vector<SplitMatrix> of_globals;
   for (Eigen::Index k = 0; k < p.channels(); ++k)
-    global_columns(p, c.beta, groups[0], k, columns, {0, p.size()}, re[static_cast<std::size_t>(k)],
-                   im[static_cast<std::size_t>(k)]);
+    of_globals.push_back(global_columns(p, c.beta, groups[0], k, {0, p.size()}));
   for (auto _ : state) {
     Eigen::MatrixXd M = Eigen::MatrixXd::Zero(p.parameters(), p.parameters());
     for (Eigen::Index first = 0; first < p.size(); first += kSlice) {
@@ -170,12 +167,14 @@ void dense_equations(benchmark::State& state) {
         const Eigen::VectorXd root = p.weights(k).segment(first, n).cwiseSqrt();
         const auto at = static_cast<std::size_t>(k);
         const Eigen::Index own = p.globals() + k * p.functions();
-        J.block(2 * n * k, 0, n, p.globals()) = root.asDiagonal() * re[at].middleRows(first, n);
-        J.block(2 * n * k + n, 0, n, p.globals()) = root.asDiagonal() * im[at].middleRows(first, n);
+        J.block(2 * n * k, 0, n, p.globals()) =
+            root.asDiagonal() * of_globals[at].re.middleRows(first, n);
+        J.block(2 * n * k + n, 0, n, p.globals()) =
+            root.asDiagonal() * of_globals[at].im.middleRows(first, n);
         J.block(2 * n * k, own, n, p.functions()) =
-            root.asDiagonal() * groups[0].F_re.middleRows(first, n);
+            root.asDiagonal() * groups[0].F.re.middleRows(first, n);
         J.block(2 * n * k + n, own, n, p.functions()) =
-            root.asDiagonal() * groups[0].F_im.middleRows(first, n);
+            root.asDiagonal() * groups[0].F.im.middleRows(first, n);
       }
       M.noalias() += J.transpose() * J;
     }

@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/problem/residual.hpp"
+#include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
 
 namespace stageid {
@@ -52,22 +52,21 @@ DenseProblem general_problem(std::uint64_t seed) {
 
 /// The library's step in the order of the paper's beta.
 Eigen::VectorXd library_step(const DenseProblem& problem, FitMethod method) {
-  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
-  const FitParameters beta = test::fit_parameters(problem);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
-  const Residual E = residual(fit, groups, beta.B);
+  const auto [fit, beta, groups] = test::Evaluated(problem);
   const ArrowSystem system(fit, beta, groups, method);
-  const ArrowSystem::Step step = system.solve(0.0);
-  EXPECT_TRUE(step.ok);
+  EXPECT_TRUE(system.regular());
+  const Eigen::VectorXd step = system.solve_globals(0.0);
   const std::vector<Eigen::Index> first = test::first_of_theta(problem.model);
   Eigen::VectorXd out(first.back());
   Eigen::Index global = 0;
   Eigen::Index function = 0;
   for (std::size_t i = 0; i < fit.shapes.size(); ++i) {
     Eigen::Index at = first[i];
-    for (int q = 0; q < fit.shapes[i].order; ++q) out[at++] = step.globals[global++];
+    for (int q = 0; q < fit.shapes[i].order; ++q) out[at++] = step[global++];
     for (int m = 0; m < fit.shapes[i].functions(); ++m)
-      for (Eigen::Index c = 0; c < problem.channels(); ++c) out[at++] = step.B(c, function + m);
+      for (Eigen::Index c = 0; c < problem.channels(); ++c)
+        out[at++] =
+            system.channel(c).x[function + m] - system.channel(c).Z.row(function + m).dot(step);
     function += fit.shapes[i].functions();
   }
   return out;
@@ -82,36 +81,22 @@ double difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eige
 // 1e-10, and anything that is not the same equation shows in the first digits.
 constexpr double kSameEquation = 1e-8;
 
-TEST(FitStep, RivIsTheBlockDiagonalOfThePapersMatrixEquation) {
+TEST(FitStep, IsThatOfTheEquationsWrittenOutDensely) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
     for (const DenseProblem& problem : {stage_problem(seed), general_problem(seed)}) {
+      SCOPED_TRACE(seed);
       const Eigen::VectorXd beta = test::beta_of(problem.model);
-      const test::PaperStep paper = test::paper_step(problem, test::Left::instrument);
-      const Eigen::VectorXd next = beta + library_step(problem, FitMethod::riv);
-      EXPECT_LT(difference(next, paper.next_beta, beta), kSameEquation) << "seed " << seed;
-      // Not because nothing moves: the step is of the size of the disturbance.
-      EXPECT_GT((paper.next_beta - beta).norm(), 0.01 * beta.norm());
-    }
-}
-
-TEST(FitStep, SkIsThePapersEquationWithTheRegressorAsInstrument) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed)
-    for (const DenseProblem& problem : {stage_problem(seed), general_problem(seed)}) {
-      const Eigen::VectorXd beta = test::beta_of(problem.model);
-      const test::PaperStep paper = test::paper_step(problem, test::Left::regressor);
-      const Eigen::VectorXd next = beta + library_step(problem, FitMethod::sk);
-      EXPECT_LT(difference(next, paper.next_beta, beta), kSameEquation) << "seed " << seed;
-    }
-}
-
-TEST(FitStep, GnIsTheDenseGaussNewtonStep) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed)
-    for (const DenseProblem& problem : {stage_problem(seed), general_problem(seed)}) {
-      const Eigen::VectorXd beta = test::beta_of(problem.model);
-      EXPECT_LT(
-          difference(library_step(problem, FitMethod::gn), test::gauss_newton_step(problem), beta),
-          kSameEquation)
-          << "seed " << seed;
+      const auto expect_same = [&](FitMethod method, const Eigen::VectorXd& step) {
+        EXPECT_LT(difference(library_step(problem, method), step, beta), kSameEquation)
+            << to_string(method);
+        // Not because nothing moves: the step is of the size of the disturbance.
+        EXPECT_GT(step.norm(), 0.01 * beta.norm());
+      };
+      // The block diagonal of the paper's matrix equation; sk has the regressor as instrument.
+      expect_same(FitMethod::riv,
+                  test::paper_step(problem, test::Left::instrument).next_beta - beta);
+      expect_same(FitMethod::sk, test::paper_step(problem, test::Left::regressor).next_beta - beta);
+      expect_same(FitMethod::gn, test::gauss_newton_step(problem));
     }
 }
 
@@ -186,9 +171,7 @@ std::pair<double, double> slope_of_cost(const DenseProblem& problem, double h,
 }
 
 void expect_gradient(const DenseProblem& problem, DelayModel delay) {
-  const FitProblem fit = test::fit_problem(problem, delay);
-  const FitParameters beta = test::fit_parameters(problem);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+  const auto [fit, beta, groups] = test::Evaluated(problem, delay);
   const Residual E = residual(fit, groups, beta.B);
   const double cost =
       test::reference_cost(problem.model, problem.frequency_hz, problem.hold, problem.G, problem.W);
@@ -261,47 +244,16 @@ TEST(FitGradient, IsThatOfTheCostWithADelayAChannel) {
 TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
   // The dense Jacobian of all parameters by differences of the reference response, Gauss-Newton.
   const DenseProblem problem = sampled_problem(15, HoldModel::exact);
-  const FitProblem fit = test::fit_problem(problem, DelayModel::per_channel);
-  const FitParameters beta = test::fit_parameters(problem);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
-  const Residual E = residual(fit, groups, beta.B);
-  const ArrowSystem::Step step = ArrowSystem(fit, beta, groups, FitMethod::gn).solve(0.0);
-  ASSERT_TRUE(step.ok);
-
-  const Eigen::Index n_theta = test::first_of_theta(problem.model).back();
-  const Eigen::Index N = problem.G.cols();
-  const Eigen::Index n_c = problem.channels();
-  Eigen::MatrixXcd J(n_c * N, n_theta + 4);
-  for (Eigen::Index k = 0; k < N; ++k)
-    J.block(k * n_c, 0, n_c, n_theta) = test::instrument_rows(problem, k);
-  for (Eigen::Index d = 0; d < 4; ++d) {
-    const double h = 1e-7;  // seconds: omega h is 1e-3 at the fastest line, its fourth power 1e-12
-    const auto shifted = [&](double by) {
-      AdditiveModel model = problem.model;
-      (d < 2 ? model.input_delay_s[d] : model.output_delay_s[d - 2]) += by;
-      return test::reference_response(model, problem.frequency_hz, problem.hold);
-    };
-    const Eigen::MatrixXcd slope =
-        (8.0 * (shifted(h) - shifted(-h)) - (shifted(2.0 * h) - shifted(-2.0 * h))) / (12.0 * h);
-    J.col(n_theta + d) = slope.reshaped();
-  }
-  const Eigen::MatrixXcd P =
-      test::reference_response(problem.model, problem.frequency_hz, problem.hold);
-  const Eigen::VectorXd W = problem.W.reshaped();
-  Eigen::MatrixXd M = (J.adjoint() * W.cast<std::complex<double>>().asDiagonal() * J).real();
-  Eigen::VectorXd r =
-      (J.adjoint() * W.cast<std::complex<double>>().cwiseProduct((problem.G - P).reshaped()))
-          .real();
-  const Eigen::VectorXd scale = M.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::VectorXd dense = scale.cwiseProduct(
-      (scale.asDiagonal() * M * scale.asDiagonal()).fullPivLu().solve(scale.cwiseProduct(r)));
-  const Eigen::Index n_a = fit.denominators();
-  // Delays: seconds; the error of the finite differences is 1e-9 of a column.
-  for (Eigen::Index d = 0; d < 4; ++d)
-    EXPECT_NEAR(step.globals[n_a + d], dense[n_theta + d], 1e-6 * std::abs(dense[n_theta + d]));
-  const std::vector<Eigen::Index> first = test::first_of_theta(problem.model);
-  EXPECT_NEAR(step.globals[0], dense[first[1]], 1e-6 * std::abs(dense[first[1]]));
-  EXPECT_NEAR(step.globals[3], dense[first[2] + 1], 1e-6 * std::abs(dense[first[2] + 1]));
+  const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::per_channel);
+  const Eigen::VectorXd step = ArrowSystem(fit, beta, groups, FitMethod::gn).solve_globals(0.0);
+  const test::DenseEquations dense = test::dense_equations(
+      problem, problem.G, DelayModel::per_channel, [&](std::size_t k) -> Eigen::MatrixXcd {
+        return problem.W.col(static_cast<Eigen::Index>(k)).asDiagonal().toDenseMatrix();
+      });
+  const Eigen::VectorXd expected = test::scaled_inverse(dense.M) * dense.e;
+  // The error of the finite differences is 1e-9 of a column.
+  for (Eigen::Index i = 0; i < fit.globals(); ++i)
+    EXPECT_NEAR(step[i], expected[i], 1e-6 * std::abs(expected[i])) << i;
 }
 
 }  // namespace test_arrow_system

@@ -44,19 +44,12 @@ test::DenseProblem mixed_problem(HoldModel hold) {
 }
 
 struct Case {
-  test::DenseProblem problem;
-  FitProblem fit;
-  FitParameters beta;
-  BasisGroup group;
-  Eigen::MatrixXd Y_re;
-  Eigen::MatrixXd Y_im;
+  test::Evaluated evaluated;
+  FitProblem& fit = evaluated.fit;
+  BasisGroup& group = evaluated.groups.at(0);
+  SplitMatrix Y;
   explicit Case(HoldModel hold)
-      : problem(mixed_problem(hold)),
-        fit(test::fit_problem(problem, DelayModel::fixed)),
-        beta(test::fit_parameters(problem)),
-        group(evaluate_groups(fit, beta, true).at(0)) {
-    equation_error_columns(fit, beta, Y_re, Y_im);
-  }
+      : evaluated(mixed_problem(hold)), Y(EquationMethod(fit, evaluated.beta, FitMethod::riv).Y) {}
 };
 
 /// A column from its coefficients, without `first`.
@@ -73,9 +66,8 @@ Eigen::VectorXcd written_out(const FractionColumns& columns, const FractionColum
 }
 
 void expect_columns(const FractionColumns& columns, const std::vector<FractionColumn>& expanded,
-                    const Eigen::MatrixXd& re, const Eigen::MatrixXd& im, bool with_first,
-                    std::size_t fractions) {
-  ASSERT_EQ(expanded.size(), static_cast<std::size_t>(re.cols()));
+                    const SplitMatrix& functions, bool with_first, std::size_t fractions) {
+  ASSERT_EQ(expanded.size(), static_cast<std::size_t>(functions.cols()));
   std::size_t found = 0;
   for (std::size_t c = 0; c < expanded.size(); ++c) {
     if (expanded[c].pair < 0) continue;
@@ -84,9 +76,9 @@ void expect_columns(const FractionColumns& columns, const std::vector<FractionCo
     Eigen::VectorXcd value = written_out(columns, expanded[c]);
     if (with_first)
       for (Eigen::Index k = 0; k < value.size(); ++k) value[k] *= columns.first(k, 0);
-    Eigen::VectorXcd wanted(re.rows());
-    wanted.real() = re.col(column);
-    wanted.imag() = im.col(column);
+    Eigen::VectorXcd wanted(functions.re.rows());
+    wanted.real() = functions.re.col(column);
+    wanted.imag() = functions.im.col(column);
     // Two fractions of a conjugate pair cancel to the ratio of the mode's frequency and the line's.
     EXPECT_LT((value - wanted).norm(), 1e-11 * wanted.norm()) << c;
   }
@@ -98,15 +90,15 @@ TEST(FractionColumns, AreTheFunctionsOnTheLines) {
     const Case c(hold);
     const FractionColumns& columns = c.group.fractions;
     ASSERT_EQ(columns.pairs(), 4);  // the rigid body and the overdamped mode are none
-    expect_columns(columns, columns.F, c.group.F_re, c.group.F_im, true, 6);
-    expect_columns(columns, columns.D, c.group.D_re, c.group.D_im, true, 12);
-    expect_columns(columns, columns.Y, c.Y_re, c.Y_im, false, 8);
+    expect_columns(columns, columns.F, c.group.F, true, 6);
+    expect_columns(columns, columns.D, c.group.D, true, 12);
+    expect_columns(columns, columns.Y, c.Y, false, 8);
   }
 }
 
 TEST(FractionColumns, OfNumeratorsAloneHaveNoSquares) {
   const Case c(HoldModel::exact);
-  const BasisGroup bare = evaluate_groups(c.fit, c.beta, false).at(0);
+  const BasisGroup bare = evaluate_groups(c.fit, c.evaluated.beta, false).at(0);
   EXPECT_TRUE(bare.fractions.D.empty());
   EXPECT_EQ(bare.fractions.base, c.group.fractions.base.leftCols(17));
 }
@@ -114,8 +106,8 @@ TEST(FractionColumns, OfNumeratorsAloneHaveNoSquares) {
 class ReductionTest : public testing::Test {
  protected:
   void expect_sums(const Case& c, const std::vector<FractionColumn>& left,
-                   const ComplexColumns& left_columns, const std::vector<FractionColumn>& right,
-                   const ComplexColumns& right_columns, std::size_t least_reduced) {
+                   const SplitMatrix& left_columns, const std::vector<FractionColumn>& right,
+                   const SplitMatrix& right_columns, std::size_t least_reduced) {
     const auto pairs =
         all_pairs(static_cast<Eigen::Index>(left.size()), static_cast<Eigen::Index>(right.size()));
     const FractionColumns& fractions = c.group.fractions;
@@ -140,8 +132,8 @@ class ReductionTest : public testing::Test {
   /// To 1e-9 of what two columns' powers allow.
   static void expect_close(const std::vector<ColumnPair>& pairs, const Eigen::MatrixXd& wanted,
                            const Eigen::MatrixXd& sums, const Eigen::MatrixXd& W,
-                           const ComplexColumns& left, const ComplexColumns& right) {
-    const auto power = [&](const ComplexColumns& x) -> Eigen::MatrixXd {
+                           const SplitMatrix& left, const SplitMatrix& right) {
+    const auto power = [&](const SplitMatrix& x) -> Eigen::MatrixXd {
       return W * (x.re.cwiseAbs2() + x.im.cwiseAbs2());
     };
     const Eigen::MatrixXd left_power = power(left);
@@ -161,11 +153,9 @@ TEST_F(ReductionTest, SumsOfProductsFollowFromSumsOfFractions) {
     SCOPED_TRACE(to_string(hold));
     const Case c(hold);
     const BasisGroup& g = c.group;
-    const ComplexColumns F{g.F_re, g.F_im};
-    const ComplexColumns D{g.D_re, g.D_im};
-    expect_sums(c, g.fractions.F, F, g.fractions.F, F, 20);
-    expect_sums(c, g.fractions.F, F, g.fractions.D, D, 40);
-    expect_sums(c, g.fractions.D, D, g.fractions.D, D, 60);
+    expect_sums(c, g.fractions.F, g.F, g.fractions.F, g.F, 20);
+    expect_sums(c, g.fractions.F, g.F, g.fractions.D, g.D, 40);
+    expect_sums(c, g.fractions.D, g.D, g.fractions.D, g.D, 60);
   }
 }
 
@@ -178,14 +168,13 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
                                  static_cast<Eigen::Index>(fractions.Y.size()));
     const PairReduction reduction(fractions, fractions.F, fractions.Y, pairs);
     EXPECT_GE(pairs.size() - reduction.direct().size(), 20U);
-    const ComplexColumns F{c.group.F_re, c.group.F_im};
-    const ComplexColumns Y{c.Y_re, c.Y_im};
+    const SplitMatrix& F = c.group.F;
     const Eigen::MatrixXd V_re = c.fit.G->real();
     const Eigen::MatrixXd V_im = c.fit.G->imag();
     const auto sums_of = [&](const std::vector<ColumnPair>& some) {
       Eigen::MatrixXd sums =
           Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(some.size()), V_re.rows());
-      add_pair_sums(V_re, V_im, F, Y, some, 0, sums);
+      add_pair_sums(V_re, V_im, F, c.Y, some, 0, sums);
       return sums;
     };
     const auto re = fractions.first.re.col(0).asDiagonal();
@@ -196,7 +185,7 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
     const Eigen::MatrixXd size = V_re.cwiseAbs2() + V_im.cwiseAbs2();
     expect_close(pairs, sums_of(pairs),
                  reduction.expand(S_re, S_im, sums_of(reduction.direct()), 2), size.cwiseSqrt(), F,
-                 Y);
+                 c.Y);
   }
 }
 

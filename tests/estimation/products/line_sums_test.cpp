@@ -41,20 +41,14 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
   for (const FitMethod method : {FitMethod::riv, FitMethod::gn, FitMethod::sk})
     for (const DelayModel delay : {DelayModel::fixed, DelayModel::estimate}) {
       const DenseProblem problem = wide_problem(HoldModel::exact);
-      const FitProblem fit = test::fit_problem(problem, delay);
-      const FitParameters beta = test::fit_parameters(problem);
-      const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+      const auto [fit, beta, groups] = test::Evaluated(problem, delay);
       ASSERT_EQ(groups.size(), 1U);
       ASSERT_GE(fit.channels(), kFewChannels);
       const ArrowSystem system(fit, beta, groups, method);
       const ArrowSystem passing(fit, beta, groups, method, ChannelEquationsUse::eliminated);
       EXPECT_EQ(system.schur(), passing.schur());
 
-      const auto columns = derivative_columns(fit);
-      Eigen::MatrixXd Y_re;
-      Eigen::MatrixXd Y_im;
-      equation_error_columns(fit, beta, Y_re, Y_im);
-      const ComplexColumns Y{Y_re, Y_im};
+      const EquationMethod shared(fit, beta, method);
       const Eigen::Index n_f = fit.functions();
       Eigen::MatrixXd M = Eigen::MatrixXd::Zero(fit.globals(), fit.globals());
       Eigen::VectorXd e = Eigen::VectorXd::Zero(fit.globals());
@@ -63,8 +57,7 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
         EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-10 * b.cwiseAbs().maxCoeff());
       };
       for (Eigen::Index c = 0; c < fit.channels(); ++c) {
-        const ChannelEquations own =
-            channel_equations(fit, beta, groups[0], c, columns, &Y, method);
+        const ChannelEquations own = channel_equations(shared, beta, groups[0], c);
         const ArrowSystem::Channel& channel = system.channels()[static_cast<std::size_t>(c)];
         expect_same(channel.bb, own.M.topLeftCorner(n_f, n_f));
         expect_same(channel.ab, own.M.bottomLeftCorner(fit.globals(), n_f));
@@ -84,17 +77,14 @@ TEST(LineSums, ChannelsThatAreOnlyKeptAreAllThere) {
   DenseProblem problem = wide_problem(HoldModel::exact);
   constexpr Eigen::Index kSpoilt = 3;
   problem.W(kSpoilt, 7) = std::numeric_limits<double>::infinity();
-  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
-  const FitParameters beta = test::fit_parameters(problem);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
+  const auto [fit, beta, groups] = test::Evaluated(problem);
   ASSERT_FALSE(ArrowSystem(fit, beta, groups, FitMethod::gn).regular());
   const ArrowSystem kept(fit, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept);
   EXPECT_TRUE(kept.regular());
-  const auto columns = derivative_columns(fit);
+  const EquationMethod shared(fit, beta, FitMethod::gn);
   for (Eigen::Index c = 0; c < fit.channels(); ++c) {
     if (c == kSpoilt) continue;
-    const ChannelEquations own =
-        channel_equations(fit, beta, groups[0], c, columns, nullptr, FitMethod::gn);
+    const ChannelEquations own = channel_equations(shared, beta, groups[0], c);
     const Eigen::MatrixXd bb = own.M.topLeftCorner(fit.functions(), fit.functions());
     const Eigen::MatrixXd ab = own.M.bottomLeftCorner(fit.globals(), fit.functions());
     EXPECT_LT((kept.channel(c).bb - bb).norm(), 1e-10 * bb.norm());
@@ -104,9 +94,7 @@ TEST(LineSums, ChannelsThatAreOnlyKeptAreAllThere) {
 
 TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
   const DenseProblem problem = wide_problem(HoldModel::exact);
-  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
-  const FitParameters beta = test::fit_parameters(problem);
-  std::vector<BasisGroup> groups = evaluate_groups(fit, beta, false);
+  auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd together;
   double cost = 0.0;
   ASSERT_TRUE(solve_numerators(fit, groups, together, cost));
@@ -132,8 +120,7 @@ TEST(Numerators, PolishedHaveAllDigitsOfExactData) {
   problem.model.submodels.push_back(twin);
   problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
   problem.W = problem.G.cwiseAbs2().cwiseInverse();
-  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, test::fit_parameters(problem), false);
+  const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd B;
   double cost = 0.0;
   ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
@@ -146,8 +133,7 @@ TEST(Numerators, PolishedHaveAllDigitsOfExactData) {
 
 TEST(Numerators, PolishingWhatIsBestChangesNothing) {
   const DenseProblem problem = wide_problem(HoldModel::exact);
-  const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
-  const std::vector<BasisGroup> groups = evaluate_groups(fit, test::fit_parameters(problem), false);
+  const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd B;
   double cost = 0.0;
   ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
@@ -161,28 +147,24 @@ TEST(WeightedProducts, AreTheSumsTheySay) {
   const Eigen::Index N = 700;  // more than two tiles
   const Eigen::MatrixXd W = random_matrix(random, 3, N).cwiseAbs();
   const Eigen::MatrixXd V = random_matrix(random, 3, N);
-  const Eigen::MatrixXd X_re = random_matrix(random, N, 4);
-  const Eigen::MatrixXd X_im = random_matrix(random, N, 4);
-  const Eigen::MatrixXd Y_re = random_matrix(random, N, 60);
-  const Eigen::MatrixXd Y_im = random_matrix(random, N, 60);
+  const SplitMatrix X{random_matrix(random, N, 4), random_matrix(random, N, 4)};
+  const SplitMatrix Y{random_matrix(random, N, 60), random_matrix(random, N, 60)};
   const auto pairs = all_pairs(4, 60);  // 240: more than one block
   Eigen::MatrixXd real = Eigen::MatrixXd::Zero(240, 3);
   Eigen::MatrixXd complex = Eigen::MatrixXd::Zero(240, 3);
   for_each_tile({0, 3, 0, N}, [&](Eigen::Index first, Eigen::Index n) {
     const Eigen::MatrixXd W_tile = W.middleCols(first, n);
-    add_pair_sums(W_tile, {X_re, X_im}, {Y_re, Y_im}, pairs, first, real);
-    add_pair_sums(W_tile, V.middleCols(first, n), {X_re, X_im}, {Y_re, Y_im}, pairs, first,
-                  complex);
+    add_pair_sums(W_tile, X, Y, pairs, first, real);
+    add_pair_sums(W_tile, V.middleCols(first, n), X, Y, pairs, first, complex);
   });
   for (std::size_t p = 0; p < pairs.size(); ++p)
     for (Eigen::Index c = 0; c < 3; ++c) {
       std::complex<double> with_weight = 0.0;
       std::complex<double> with_error = 0.0;
       for (Eigen::Index k = 0; k < N; ++k) {
-        const std::complex<double> x(X_re(k, pairs[p].left), X_im(k, pairs[p].left));
-        const std::complex<double> y(Y_re(k, pairs[p].right), Y_im(k, pairs[p].right));
-        with_weight += W(c, k) * std::conj(x) * y;
-        with_error += std::complex<double>(W(c, k), V(c, k)) * std::conj(x) * y;
+        const std::complex<double> product = std::conj(X(k, pairs[p].left)) * Y(k, pairs[p].right);
+        with_weight += W(c, k) * product;
+        with_error += std::complex<double>(W(c, k), V(c, k)) * product;
       }
       // Sums of N numbers of order one.
       EXPECT_NEAR(real(static_cast<Eigen::Index>(p), c), with_weight.real(), 1e-11);

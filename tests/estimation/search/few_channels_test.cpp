@@ -82,7 +82,7 @@ TEST(HeldGlobals, HaveNoEquationsAndLeaveThoseOfTheOthers) {
   for (const bool multiplied_out : {false, true}) {
     fit.multiplied_out = multiplied_out;
     const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
-    EXPECT_EQ(groups.at(0).D_re.cols(), 2 * (fit.globals() - 3));
+    EXPECT_EQ(groups.at(0).D.re.cols(), 2 * (fit.globals() - 3));
     const ArrowSystem held(fit, beta, groups, FitMethod::gn);
     expect_same(held.M_globals()(others, others), free.M_globals()(others, others));
     expect_same(held.e_globals()(others), free.e_globals()(others));

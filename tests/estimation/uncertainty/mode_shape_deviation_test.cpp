@@ -13,7 +13,6 @@
 #include "estimation/modal/modal_form.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
-#include "estimation/uncertainty/response_errors.hpp"
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
@@ -103,44 +102,40 @@ struct Repeated {
 
 Repeated repeat(const test::DenseProblem& problem, const FitOptions& options,
                 const std::function<FrfEstimate(int)>& measured) {
-  std::vector<Eigen::VectorXd> values;
+  Eigen::MatrixXd values;
   Eigen::ArrayXd known;
-  double inside = 0.0;
+  Repeated out;
   for (int run = 0; run < kRuns; ++run) {
     const FrfEstimate frf = measured(run);
     FitResult fit = fit_additive_model(frf, problem.model, options);
     EXPECT_TRUE(fit.trustworthy()) << fit.message;
     fill_shape_deviations(frf, options, fit);
     fill_covariance(frf, options, fit);
-    Eigen::VectorXd value;
-    Eigen::VectorXd deviation;
+    std::vector<double> value;
+    std::vector<double> deviation;
     for (const Submodel& s : fit.model.submodels) {
       if (!s.is_mode()) continue;
-      value =
-          (Eigen::VectorXd(value.size() + modal_quantities(s).size()) << value, modal_quantities(s))
-              .finished();
-      deviation = (Eigen::VectorXd(deviation.size() + reported(s).size()) << deviation, reported(s))
-                      .finished();
+      const Eigen::VectorXd quantities = modal_quantities(s);
+      const Eigen::VectorXd deviations = reported(s);
+      value.insert(value.end(), quantities.begin(), quantities.end());
+      deviation.insert(deviation.end(), deviations.begin(), deviations.end());
     }
-    if (run == 0) known.setZero(deviation.size());
-    known += deviation.array().square() / kRuns;
-    values.push_back(value);
+    const auto count = static_cast<Eigen::Index>(value.size());
+    if (run == 0) known.setZero(count);
+    if (run == 0) values.resize(count, kRuns);
+    values.col(run) = Eigen::Map<const Eigen::VectorXd>(value.data(), count);
+    known += Eigen::Map<const Eigen::ArrayXd>(deviation.data(), count).square() / kRuns;
     const Eigen::MatrixXd error =
         (test::reference_response(fit.model, problem.frequency_hz, problem.hold) - problem.G)
             .cwiseAbs();
-    inside += (error.array() < fit.covariance.response_radius.array()).cast<double>().mean();
+    out.covered +=
+        (error.array() < fit.covariance.response_radius.array()).cast<double>().mean() / kRuns;
   }
-  Repeated out;
-  out.covered = inside / kRuns;
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(known.size());
-  for (const Eigen::VectorXd& v : values) mean += v / kRuns;
-  Eigen::ArrayXd scatter = Eigen::ArrayXd::Zero(known.size());
-  for (const Eigen::VectorXd& v : values) scatter += (v - mean).array().square() / (kRuns - 1);
-  std::vector<double> ratio;
+  const Eigen::ArrayXd scatter = test::scatter_of(values);
+  std::vector<Eigen::Index> free;
   for (Eigen::Index q = 0; q < known.size(); ++q)
-    if (known[q] > 1e-24) ratio.push_back(scatter[q] / known[q]);
-  out.variance_ratio =
-      Eigen::Map<const Eigen::ArrayXd>(ratio.data(), static_cast<Eigen::Index>(ratio.size()));
+    if (known[q] > 1e-24) free.push_back(q);
+  out.variance_ratio = scatter(free) / known(free);
   return out;
 }
 
@@ -161,42 +156,20 @@ TEST(ShapeDeviationMonteCarlo, FreeResidues) {
   options.threads = 1;
   expect_honest(repeat(problem, options, [&](int run) {
     test::RandomNumbers random(static_cast<std::uint64_t>(500 + run));
-    FrfEstimate frf = test::frf_of(problem);
-    frf.response = test::noisy(random, problem, variance);
-    frf.noise_variance = variance;
-    return frf;
+    return test::noisy_frf(random, problem, variance);
   }));
 }
-
-/// The 2 x 3 stage with modes of rank one, noise correlated between outputs and inputs.
-struct CorrelatedStage {
-  DenseProblem problem = test::noisy_stage(HoldModel::exact, 0.0);
-  test::CorrelatedNoise noise;
-  CorrelatedStage() {
-    test::RandomNumbers random(12);
-    for (Submodel& s : problem.model.submodels) {
-      if (!s.is_mode()) continue;
-      const Eigen::VectorXd phi{{random.uniform(0.5, 1.5), random.uniform(0.5, 1.5)}};
-      const Eigen::VectorXd psi{{random.normal(), random.normal(), random.normal()}};
-      s.numerator[0] = s.denominator[2] * phi * psi.transpose();
-    }
-    problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
-    noise = test::correlated_noise(problem, 0.01, 0.9);
-  }
-  FrfEstimate measured(int run) const {
-    test::RandomNumbers random(static_cast<std::uint64_t>(7000 + run));
-    return test::measured(problem, noise, random);
-  }
-};
 
 class CorrelatedShapes : public testing::TestWithParam<std::pair<Weighting, int>> {};
 
 TEST_P(CorrelatedShapes, AreAsSureAsReported) {
-  const CorrelatedStage stage;
+  const test::RankOneStage stage;
   FitOptions options = test::options_with(GetParam().first);
   options.residue_rank = GetParam().second;
   options.threads = 1;
-  expect_honest(repeat(stage.problem, options, [&](int run) { return stage.measured(run); }));
+  expect_honest(repeat(stage.problem, options, [&](int run) {
+    return stage.measured_with(static_cast<std::uint64_t>(7000 + run));
+  }));
 }
 
 INSTANTIATE_TEST_SUITE_P(ShapeDeviationMonteCarlo, CorrelatedShapes,
@@ -207,8 +180,8 @@ INSTANTIATE_TEST_SUITE_P(ShapeDeviationMonteCarlo, CorrelatedShapes,
 // One fit ---------------------------------------------------------------------------------------------
 
 TEST(DenseCovariance, HasTheDeviationsOfTheModelOnItsDiagonal) {
-  const CorrelatedStage stage;
-  const FrfEstimate frf = stage.measured(0);
+  const test::RankOneStage stage;
+  const FrfEstimate frf = stage.measured_with(7000);
   for (const int rank : {0, 1}) {
     FitOptions options = test::options_with(Weighting::noise_variance);
     options.residue_rank = rank;
@@ -234,9 +207,7 @@ TEST(DenseCovariance, HasTheDeviationsOfTheModelOnItsDiagonal) {
 TEST(DenseCovariance, WithoutCorrelationAndWithTheRightWeightsIsTheInverseFisherMatrix) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(3);
-  FrfEstimate frf = test::frf_of(problem);
-  frf.noise_variance = problem.W.cwiseInverse();
-  frf.response = test::noisy(random, problem, frf.noise_variance);
+  const FrfEstimate frf = test::noisy_frf(random, problem, problem.W.cwiseInverse());
   const FitOptions options = test::options_with(Weighting::noise_variance);
   FitResult fit = fit_additive_model(frf, problem.model, options);
   fill_covariance(frf, options, fit);

@@ -85,10 +85,13 @@ bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threa
   if (!solve_numerators(problem, evaluate_groups(problem, beta, false), beta.B, cost)) return false;
   for (int i = 0; i < kIterations; ++i) {
     const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-    const ArrowSystem::Step step = ArrowSystem(problem, beta, groups, FitMethod::riv).solve(0.0);
-    if (!step.ok) return false;
-    beta = stepped(problem, beta, step.globals);
-    beta.B += step.B;
+    const ArrowSystem system(problem, beta, groups, FitMethod::riv);
+    if (!system.regular()) return false;
+    const Eigen::VectorXd step = system.solve_globals(0.0);
+    if (!step.allFinite()) return false;
+    beta = stepped(problem, beta, step);
+    for (Eigen::Index c = 0; c < problem.channels(); ++c)
+      beta.B.row(c) += (system.channel(c).x - system.channel(c).Z * step).transpose();
     const double next = residual(problem, evaluate_groups(problem, beta, false), beta.B).cost;
     if (!std::isfinite(next) || next > 1e12 * wanted) return false;
     if (std::abs(next - cost) < 1e-9 * cost) break;
