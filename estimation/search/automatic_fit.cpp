@@ -59,29 +59,26 @@ class AutomaticFit {
     threads_ = worker_count(options.threads);
   }
 
-  /// The first fit of every search. A search for the number of modes begins on a part of the data.
+  /// The first fit of every search. A search for the number of modes begins on a part of the data; a requested number
+  /// is placed at once.
   void begin() {
-    const AdditiveModel model = start();
     const bool open = selection_.exactly == 0 && !selection_.keep_modes;
+    if (is_placed()) return begin_relocated();
+    const AdditiveModel model = start();
     if (!open)
       adopt(fit_additive_model(frf_, model, quick_));
     else if (!begin_on_part(model))
       begin_relocated_from(model);
   }
 
-  /// The same with the requested number of modes, all placed at once.
-  void begin_relocated() {
-    AdditiveModel model = start_of({});
-    const auto wanted = static_cast<std::size_t>(selection_.exactly);
-    const std::vector<ModeCandidate> modes =
-        relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
-    say("start: {} by pole relocation", counted(modes.size(), "mode"));
-    model = start_of(modes);
-    if (!many()) return adopt(fit_additive_model(frf_, model, quick_));
-    FitOptions still = quick_;
-    still.max_iterations = 0;
-    adopt(fit_additive_model(frf_, model, still));
-    if (!at_rounding()) settle_many();
+  /// Modes to add at the peaks of the residual, of which the least worthy are then dropped, so that misplaced ones are
+  /// exchanged; 0 if that is of no use.
+  int surplus() const {
+    if (selection_.exactly == 0 || selection_.keep_modes || best_.status == FitStatus::singular ||
+        at_rounding() || limit_reached() || (many() && explains_data()))
+      return 0;
+    return std::min(affordable_modes() - selection_.exactly,
+                    1 + selection_.exactly / static_cast<int>(kShareAtOnce));
   }
 
   /// @param surplus modes to grow beyond the requested number
@@ -111,6 +108,11 @@ class AutomaticFit {
   }
 
   double cost() const { return best_.model.fit.cost; }
+  double score() const { return worth_.criterion(best_); }
+  /// Whether the score is lower by what one mode costs.
+  bool is_clearly_below(double score_before) const {
+    return score() < score_before - worth_.cost_of_one();
+  }
   bool at_rounding() const { return worth_.at_rounding(best_); }
   bool limit_reached() const { return options_.limit->reached(); }
 
@@ -163,6 +165,27 @@ class AutomaticFit {
   }
 
   bool many() const { return selection_.exactly > kMostGrown; }
+
+  /// Whether only the number of modes is requested.
+  bool is_placed() const {
+    return selection_.exactly > 0 && selection_.modes.empty() && !selection_.keep_modes;
+  }
+
+  void begin_relocated() {
+    // Pole relocation needs the delay.
+    if (options_.delay != DelayModel::fixed) adopt(fit_additive_model(frf_, start(), quick_));
+    AdditiveModel model = start_of({});
+    const auto wanted = static_cast<std::size_t>(selection_.exactly);
+    const std::vector<ModeCandidate> modes =
+        relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
+    say("start: {} by pole relocation", counted(modes.size(), "mode"));
+    model = start_of(modes);
+    if (!many()) return adopt(fit_additive_model(frf_, model, quick_));
+    FitOptions still = quick_;
+    still.max_iterations = 0;
+    adopt(fit_additive_model(frf_, model, still));
+    if (!at_rounding()) settle_many();
+  }
 
   /// Newton decrement at which every free pole is within kSettled of its standard deviation.
   double settled() const {
@@ -398,7 +421,7 @@ class AutomaticFit {
   /// Adds several at once if each is clearly worth it; pruning corrects surplus ones. If very many are requested,
   /// regardless of their worth.
   bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
-    const bool demanded = many();
+    const bool demanded = selection_.exactly > 0;
     std::vector<ResidualMode> clear;
     for (const ResidualMode& candidate : candidates)
       if (demanded || candidate.gain > 4.0 * worth_.price(best_)) clear.push_back(candidate);
@@ -523,16 +546,6 @@ class AutomaticFit {
   std::size_t exhausted_at_ = 0;  // modes to add
 };
 
-/// With a requested number of modes, the path determines which minimum is reached. A path with surplus modes is tried
-/// too; the least worthy are dropped again.
-std::vector<int> surpluses(const ModeSelection& selection, Eigen::Index most) {
-  std::vector<int> out = {0};
-  if (selection.exactly == 0 || selection.keep_modes) return out;
-  for (const int surplus : {1 + selection.exactly / 4, 2 + selection.exactly / 2})
-    if (selection.exactly + surplus <= most) out.push_back(surplus);
-  return out;
-}
-
 }  // namespace
 
 FitResult automatic_fit(const FrfEstimate& frf, const ModelStructure& structure,
@@ -557,39 +570,16 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
         most));
   FitOptions options = asked;
   options.limit = search_limit(selection, asked);
-  AutomaticFit begun(frf, structure, selection, options);
-  std::optional<AutomaticFit> best;
-  const auto go = [&](AutomaticFit attempt, int surplus) {
-    attempt.search(surplus);
-    if (!best || attempt.cost() < best->cost()) best.emplace(std::move(attempt));
-    return best->at_rounding() || best->limit_reached();
-  };
-  const auto finish = [&] {
-    begun.release_weights();
-    return best->finish(evidence);
-  };
-  const bool placed = selection.exactly > 0 && selection.modes.empty() && !selection.keep_modes;
-  const bool too_many_to_grow = placed && selection.exactly > kMostGrown;
-  if (!too_many_to_grow || options.delay != DelayModel::fixed) begun.begin();
-  if (placed) {
-    AutomaticFit relocated = begun;
-    relocated.begin_relocated();
-    if (go(std::move(relocated), 0)) return finish();
-    if (too_many_to_grow) {
-      // Misplaced modes are exchanged for those at the peaks of the residual, as long as that halves the cost.
-      const int surplus = std::min(static_cast<int>(most) - selection.exactly,
-                                   1 + selection.exactly / static_cast<int>(kShareAtOnce));
-      double before = std::numeric_limits<double>::infinity();
-      while (surplus > 0 && best->cost() < 0.5 * before && !best->explains_data()) {
-        before = best->cost();
-        if (go(*best, surplus)) break;
-      }
-      return finish();
-    }
+  std::optional<AutomaticFit> best(std::in_place, frf, structure, selection, options);
+  best->begin();
+  best->search(0);
+  for (double before = HUGE_VAL; best->is_clearly_below(before) && best->surplus() > 0;) {
+    before = best->score();
+    AutomaticFit other = *best;
+    other.search(best->surplus());
+    if (other.score() < before) best.emplace(std::move(other));
   }
-  for (const int surplus : surpluses(selection, most))
-    if (go(begun, surplus)) break;
-  return finish();
+  return best->finish(evidence);
 }
 
 std::shared_ptr<SearchLimit> search_limit(const ModeSelection& selection,

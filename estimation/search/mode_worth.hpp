@@ -30,6 +30,9 @@ class ModeWorth {
   /// Smaller is better.
   double criterion(const FitResult& fit) const;
 
+  /// Of a mode, in the units of the criterion.
+  double cost_of_one() const;
+
   /// Decrease of sum W |E|^2 of `fit` above which one more mode is worth its parameters.
   double price(const FitResult& fit) const;
 
@@ -42,7 +45,6 @@ class ModeWorth {
 
  private:
   double squares(const FitResult& fit) const;  ///< sum W |E|^2, not below rounding
-  double cost_of_one() const;                  ///< mode, in units of 2 ln(likelihood)
 
   double lines_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers

@@ -105,9 +105,7 @@ int main(int argc, char** argv) {
         arguments.dense ? test::draw_dense_plant(seed) : test::draw_varied_plant(seed);
     FitRequest request;
     request.threads = threads;
-    if (arguments.number)
-      request.modes = {
-          ModesRequest::Kind::count, static_cast<int>(plant.truth.submodels.size()), {}};
+    if (arguments.number) request.modes = {ModesRequest::Kind::count, plant.modes(), {}};
     const double begin = processor_s();
     const FitResult fit = fit_model(plant.frf, request);
     products.push_back((processor_s() - begin) / product);

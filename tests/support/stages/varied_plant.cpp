@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -103,6 +104,14 @@ std::string VariedPlant::description() const {
                           s.numerator.size() > 1 ? ", general" : "");
   }
   return text;
+}
+
+int VariedPlant::modes() const {
+  int modes = 0;
+  for (const Submodel& s : truth.submodels)
+    if (s.is_mode() && s.natural_frequency_hz() > frf.frequency_hz[0])
+      modes += static_cast<int>(s.numerator[0].colPivHouseholderQr().rank());
+  return modes;
 }
 
 VariedPlant draw_varied_plant(std::uint64_t seed) {

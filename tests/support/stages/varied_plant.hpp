@@ -17,6 +17,8 @@ struct VariedPlant {
   double noise_db = 0.0;  ///< standard deviation over the median magnitude, channel by channel
   FrfEstimate frf;        ///< with noise and its estimated variance
   std::string description() const;
+  /// Modes of rank one above the lowest line: a residue of rank two is two of them, a suspension none.
+  int modes() const;
 };
 
 VariedPlant draw_varied_plant(std::uint64_t seed);
