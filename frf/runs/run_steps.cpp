@@ -30,6 +30,7 @@ std::vector<Eigen::Index> excited_axes(const std::vector<RunExcitation>& runs) {
 }
 
 Eigen::VectorXd frequencies_hz(const LogInfo& info, const std::vector<int>& lines) {
+  if (lines.empty()) return {};
   return FrequencyGrid(info.sample_rate_hz, info.period_samples, lines).frequency_hz();
 }
 

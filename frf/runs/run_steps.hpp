@@ -32,7 +32,7 @@ RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft);
 /// The excitation channels that any of the runs excites, ascending.
 std::vector<Eigen::Index> excited_axes(const std::vector<RunExcitation>& runs);
 
-/// Frequencies of lines. @pre excited ones, ascending
+/// Frequencies of lines, which may be none. @pre ascending
 Eigen::VectorXd frequencies_hz(const LogInfo& info, const std::vector<int>& lines);
 
 /// Threads that each have a workspace, at most one per run of a log, because each contains a period of samples.

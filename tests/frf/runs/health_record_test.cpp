@@ -70,6 +70,15 @@ TEST(HealthRecord, HoldsTheSpectraOfEveryChannelAndCleanPeriod) {
   }
 }
 
+// An estimate refuses such a log; the reason is found in the rest of it.
+TEST(HealthRecord, ARealizationWithoutRecordedExcitationHidesNoOther) {
+  MemoryLog log = recorded_log();
+  for (std::size_t run = 2; run < 4; ++run) log.excitation_periods.at(run).setZero();
+  const HealthRecord record = read_health_record({&log}, {});
+  EXPECT_EQ(record.realization, 0);
+  EXPECT_EQ(record.lines.size(), 60U);
+}
+
 TEST(HealthRecord, IsTheSameFromTheReadingOfTheEstimate) {
   const MemoryLog log = recorded_log();
   const HealthRecord alone = read_health_record({&log}, {.threads = 1});
