@@ -65,9 +65,9 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
       const double v = samples[i];
       const std::uint64_t counts = driven == nullptr || driven[i] != 0 ? 1 : 0;
       const bool repeats_last = stretch_ > 0 && v == last_;
+      repeating_ += !repeats_last && stretch_ > 1 ? 1 : 0;
       stretch_ = repeats_last ? stretch_ + 1 : 1;
       stretches_ += repeats_last ? 0 : 1;
-      repeating_ += stretch_ == 2 ? 1 : 0;
       driven_ = repeats_last ? driven_ + counts : 1;
       longest_ = std::max(longest_, stretch_);
       longest_driven_ = std::max(longest_driven_, driven_);
@@ -76,6 +76,7 @@ void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
     return;
   }
   stretches_ += static_cast<std::uint64_t>(samples.size());
+  repeating_ += stretch_ > 1 ? 1 : 0;
   stretch_ = driven_ = 1;
   longest_ = std::max(longest_, stretch_);
   longest_driven_ = std::max(longest_driven_, driven_);

@@ -36,7 +36,7 @@ class ChannelScan {
   /// as behind a coarse converter: ln(number of sequences) / ln(1 / p).
   double expected_constant() const noexcept;
   /// Whether a coarse converter repeats values: n p^2 > 1 sequences of three equal samples are expected, where p is the
-  /// share of the n sequences that are longer than one sample. A channel that is stuck a few times has few of them.
+  /// share of the n sequences that are longer than one sample and end by a change. A stuck channel has few of them.
   bool is_coarse() const noexcept { return repeating_ * repeating_ > stretches_; }
   const Extreme& high() const noexcept { return high_; }
   Extreme low() const noexcept;  ///< of the negated samples, with the original sign
@@ -58,7 +58,7 @@ class ChannelScan {
   Extreme low_;  // of the negated samples
   std::uint64_t samples_ = 0;
   std::uint64_t stretches_ = 0;
-  std::uint64_t repeating_ = 0;  // of them, longer than one sample
+  std::uint64_t repeating_ = 0;  // of them, longer than one sample and ended by a change
   std::uint64_t stretch_ = 0;
   std::uint64_t driven_ = 0;  // within the current sequence
   std::uint64_t longest_ = 0;

@@ -36,6 +36,12 @@ TEST(ChannelScan, ExpectsTheRepetitionsOfACoarseConverter) {
   EXPECT_LT(100.0 * stuck.expected_constant(), static_cast<double>(stuck.longest_constant()));
   EXPECT_TRUE(coarse.is_coarse());
   EXPECT_FALSE(stuck.is_coarse());
+  ChannelScan unplugged;  // in all of its runs
+  for (int run = 0; run < 6; ++run) {
+    unplugged.break_off();
+    unplugged.add(Eigen::VectorXd::Constant(1000, 0.5));
+  }
+  EXPECT_FALSE(unplugged.is_coarse());
 }
 
 /// The definition, sample by sample.
@@ -79,6 +85,9 @@ TEST(ChannelScan, NothingIsMissedWhereverItStands) {
     EXPECT_EQ(first.low().count, scan.low().count) << at;
     EXPECT_EQ(first.samples(), scan.samples()) << at;
     EXPECT_EQ(first.is_coarse(), at % 2 == 0) << at;
+    if (x[1999] != x[2000]) {  // otherwise the parts share a sequence
+      EXPECT_EQ(first.expected_constant(), scan.expected_constant()) << at;
+    }
   }
 }
 
