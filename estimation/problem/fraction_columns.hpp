@@ -30,7 +30,7 @@ struct FractionColumns {
   Eigen::MatrixXd base;
   std::vector<FractionColumn> F;  ///< as the columns of BasisGroup
   std::vector<FractionColumn> D;  ///< empty without squares
-  std::vector<FractionColumn> Y;  ///< of the equation error, see equation_error_columns()
+  std::vector<FractionColumn> Y;  ///< of the equation error, see EquationMethod::Y
 
   Eigen::Index pairs() const noexcept { return static_cast<Eigen::Index>(lambda.size()); }
   Eigen::Index simple_columns() const noexcept { return 1 + 4 * pairs(); }

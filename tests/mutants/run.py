@@ -17,8 +17,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 # name, file, text, its replacement, test programs that should notice
 MUTANTS = [
-    ('transient not dropped', 'frf/runs/run_periods.hpp',
-     'static_cast<std::uint64_t>(used.transient_periods + p) * period', 'static_cast<std::uint64_t>(p) * period', ['frf']),
+    ('transient not dropped', 'frf/runs/run_periods.cpp',
+     'wanted = (used_.transient_periods + p) * N_ - lost;', 'wanted = p * N_ - lost;', ['frf']),
     ('transpose of U', 'frf/plant/plant_average.cpp',
      'Y * U.partialPivLu().inverse()', 'Y * U.transpose().partialPivLu().inverse()', ['frf']),
     ('transpose of U in the covariance', 'frf/response/line_estimate.cpp',
@@ -54,8 +54,8 @@ MUTANTS = [
     ('Hz for rad/s in the natural frequency', 'estimation/model/additive_model.cpp',
      '1.0 / (2.0 * std::numbers::pi * std::sqrt(denominator[2]))', '1.0 / std::sqrt(denominator[2])', ['estimation']),
     ('missing conjugate in the arrow', 'estimation/products/weighted_products.cpp',
-     'products.col(p).tail(n) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);',
-     'products.col(p).tail(n) = x_re.cwiseProduct(y_im) + x_im.cwiseProduct(y_re);', ['estimation']),
+     'product.tail(n) = x_re.cwiseProduct(y_im) - x_im.cwiseProduct(y_re);',
+     'product.tail(n) = x_re.cwiseProduct(y_im) + x_im.cwiseProduct(y_re);', ['estimation']),
     ('equation error added, not subtracted', 'estimation/equations/arrow_system.cpp',
      'channel.ba.leftCols(n_a) -= sums.FY', 'channel.ba.leftCols(n_a) += sums.FY', ['estimation']),
     ('equation error of few channels added', 'estimation/products/channel_equations.cpp',

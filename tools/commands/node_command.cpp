@@ -282,6 +282,8 @@ void serve(NodeFlags& flags, Console& console) {
         "the node closes the loop, but its controller is 'peer'; write the controller");
   const ControlledStop comes_to_rest;
   StageNode node = make_node(flags, config);
+  // Its servers use the node, so they end first, after an error too.
+  const std::shared_ptr<void> servers(nullptr, [&flags](void*) { flags.modbus.stop(); });
   if (flags.modbus.wanted()) flags.modbus.start(node, config.spec.limits);
   for (const std::string& place : flags.modbus.places())
     console.result(

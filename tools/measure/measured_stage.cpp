@@ -89,7 +89,7 @@ class PlayingStage final : public MeasuredStage {
   std::unique_ptr<ResidentStage> stage_;
 };
 
-/// The stage at the SocketCAN interfaces of its file, with a node that answers.
+/// @throws StageError if there is no such interface
 std::unique_ptr<CanTransport> open_buses(const CanSpec& spec, const CanLayout& layout) {
   if (is_zeromq(spec.buses.front().interface))
     return std::make_unique<ZeroMqCan>(spec.buses.front().interface);
@@ -98,6 +98,9 @@ std::unique_ptr<CanTransport> open_buses(const CanSpec& spec, const CanLayout& l
   return std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout));
 }
 
+/// The stage at the SocketCAN interfaces of its file, with a node that answers.
+/// @throws std::invalid_argument if a bus cannot carry it; @throws StageError if there is no interface, no node, or
+/// another node than described in the file.
 std::unique_ptr<CyclicStage> make_can_stage(const StageConfig& config,
                                             const CanHostOptions& options) {
   const CanSpec& spec = config.can.spec;

@@ -135,7 +135,8 @@ bool check_log(const MeasurementRequest& request) {
   return exists;
 }
 
-/// Warns of missing real-time capabilities and of settings that delay the loop, before anything is written. @throws StageError if they are required.
+/// Warns of missing real-time capabilities and of settings that delay the loop, before anything is written.
+/// @throws StageError if they are required.
 void warn_of_real_time(const RealTimeOptions& options, const Console& console) {
   for (const std::string& missing : missing_for_real_time(options))
     console.warning("realtime: " + missing);

@@ -1,4 +1,3 @@
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -80,8 +80,9 @@ struct UffContent {
 };
 
 /// Writes datasets 151, 164, 58 and 55 atomically: for .uff binary (58b: exact; uneven abscissas in double precision, as
-/// common readers expect), otherwise text (13 digits, as prescribed (E20.12); abscissas 6 unless evenly spaced). Equal content gives equal bytes; dates are empty. Abscissas are
-/// stored as even if minimum and step, written with six digits, reproduce them exactly.
+/// common readers expect), otherwise text (13 digits, as prescribed (E20.12); abscissas 6 unless evenly spaced). Equal
+/// content gives equal bytes; dates are empty. Abscissas are stored as even if minimum and step, written with six digits,
+/// reproduce them exactly.
 /// @throws std::invalid_argument if an id line is longer than 80 characters, or a unit than 20.
 /// @throws FileError
 void write_uff(const std::filesystem::path& file, const UffContent& content);
