@@ -92,11 +92,11 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
   residual.imag() = frf.residual_covariance_im;
   write_columns(file, "/residual_covariance", residual, n_y);
   write_columns(file, "/input_factor", frf.input_factor, frf.n_inputs());
-  write_vector(file, "/input_condition", frf.input_condition);
-  write_vector(file, "/interpolation_misfit", frf.interpolation_misfit);
+  write_known(file, "/input_condition", frf.input_condition);
+  write_known(file, "/interpolation_misfit", frf.interpolation_misfit);
   if (!frf.excluded_channels.empty()) {
     file.write_texts("/excluded_channels", frf.excluded_channels);
-    write_vector(file, "/excluded_power", frf.excluded_power);
+    write_known(file, "/excluded_power", frf.excluded_power);
   }
   write_quality(file, frf);
   file.write_texts("/provenance", {frf.provenance_json});
@@ -222,7 +222,7 @@ void write_frf(const std::filesystem::path& path, const FrfEstimate& frf) {
   file.write_attribute("/", "format", std::string(kFormat));
   file.write_attribute("/", "format_version", kFormatVersion);
   for_each_attribute(frf, AttributeWriter{file});
-  write_vector(file, "/frequency_hz", frf.frequency_hz);
+  write_known(file, "/frequency_hz", frf.frequency_hz);
   write_columns(file, "/response", frf.response, frf.n_outputs());
   write_channels(file, "/inputs", frf.inputs);
   write_channels(file, "/outputs", frf.outputs);

@@ -15,10 +15,10 @@ constexpr double kLargestCount = 1e8;
 void write_detection(Hdf5File& file, const DetectionLines& lines, Eigen::Index n_y) {
   if (lines.line.size() == 0) return;
   const std::vector<long long> line(lines.line.begin(), lines.line.end());
-  write_vector(file, "/detection_frequency_hz", lines.frequency_hz);
+  write_known(file, "/detection_frequency_hz", lines.frequency_hz);
   file.write_integers("/detection_line", {line.size()}, line.data());
   file.write_texts("/detection_groups", lines.groups);
-  write_vector(file, "/detection_runs", lines.runs);
+  write_known(file, "/detection_runs", lines.runs);
   write_columns(file, "/detection_power", lines.power, n_y);
   file.write_reals("/detection_noise", {size_of(lines.noise.cols()), size_of(n_y)},
                    lines.noise.data());
@@ -56,7 +56,7 @@ void write_nonlinearity(Hdf5File& file, const NonlinearityTest& test, Eigen::Ind
                    Eigen::MatrixXd(test.band_hz.transpose()).data());
   write_columns(file, "/nonlinearity_p_value", test.p_value, n_y);
   write_columns(file, "/nonlinearity_distortion", test.distortion, n_y);
-  write_vector(file, "/nonlinearity_settled_p_value", test.settled_p_value);
+  write_known(file, "/nonlinearity_settled_p_value", test.settled_p_value);
   write_columns(file, "/nonlinearity_even_p_value", test.even.p_value, n_y);
   write_columns(file, "/nonlinearity_even_level", test.even.level, n_y);
   write_columns(file, "/nonlinearity_odd_p_value", test.odd.p_value, n_y);

@@ -21,7 +21,7 @@ void require_shape(const Hdf5File& file, const std::string& dataset,
   }
 }
 
-void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
+void write_known(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
   if (values.size() > 0) file.write_reals(dataset, {size_of(values.size())}, values.data());
 }
 

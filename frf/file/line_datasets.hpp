@@ -75,8 +75,8 @@ VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset
     return from_c_order(file.read_complex(dataset), rows, columns);
 }
 
-/// Writes a list of numbers; nothing if it is empty.
-void write_vector(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values);
+/// Writes a list of numbers; nothing if it is empty, which means unknown here.
+void write_known(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values);
 
 /// @throws FormatError unless it is a list of numbers
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset);

@@ -257,6 +257,12 @@ class Archives(Case):
         (WORK / "x.npz").write_bytes(data[:start] + many + end)
         self.refused("import", "x.npz")
 
+    def test_a_million_axes(self):
+        header = b"{'descr': '<f8', 'fortran_order': True, 'shape': (%s), }\n" % (b"1, " * 10**6)
+        with zipfile.ZipFile(WORK / "x.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("a.npy", b"\x93NUMPY\x02\x00" + struct.pack("<I", len(header)) + header + bytes(8))
+        self.ends("import", "x.npz")
+
     def test_a_flipped_byte(self):
         self.assertEqual(run("export", "frf.h5", "-o", "good.npz").returncode, 0)
         bad = bytearray((WORK / "good.npz").read_bytes())

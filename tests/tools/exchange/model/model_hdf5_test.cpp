@@ -157,6 +157,7 @@ TEST(ModelHdf5Content, AModelOfADirectTermAloneHasEmptyMatrices) {
   EXPECT_EQ(file.shape("/state_space/continuous/B"), (std::vector<hsize_t>{0, 3}));
   EXPECT_EQ(file.shape("/modes/output_shape"), (std::vector<hsize_t>{0, 2}));
   EXPECT_EQ(file.shape("/rigid_body/input_shape"), (std::vector<hsize_t>{0, 3}));
+  EXPECT_EQ(file.shape("/rigid_body/mass"), (std::vector<hsize_t>{0}));
 }
 
 TEST(ModelHdf5Content, WhatHasNoStateSpaceIsRefusedAndLeavesNothing) {
