@@ -49,11 +49,13 @@ Submodel draw_mode(RandomNumbers& random, const AdditiveModel& model, double fre
   return s;
 }
 
-/// Frequencies at least six half-power widths apart.
+constexpr int kMostTries = 100000;  // some draws leave no place for the last poles
+
+/// Frequencies at least six half-power widths apart; fewer than `count` if no more fit into the band.
 std::vector<std::array<double, 2>> draw_poles(RandomNumbers& random, int count, double low_hz,
                                               double high_hz) {
   std::vector<std::array<double, 2>> poles;
-  while (static_cast<int>(poles.size()) < count) {
+  for (int tries = 0; static_cast<int>(poles.size()) < count && tries < kMostTries; ++tries) {
     const double f = random.uniform(low_hz, high_hz);
     const double zeta = 0.003 * std::pow(10.0, random.uniform());
     if (std::none_of(poles.begin(), poles.end(), [&](const std::array<double, 2>& other) {
