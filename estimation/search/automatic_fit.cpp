@@ -62,10 +62,9 @@ class AutomaticFit {
   /// The first fit of every search. A search for the number of modes begins on a part of the data; a requested number
   /// is placed at once.
   void begin() {
-    const bool open = selection_.exactly == 0 && !selection_.keep_modes;
     if (is_placed()) return begin_relocated();
     const AdditiveModel model = start();
-    if (!open)
+    if (selection_.exactly > 0 || selection_.keep_modes)
       adopt(fit_additive_model(frf_, model, quick_));
     else if (!begin_on_part(model))
       begin_relocated_from(model);
@@ -107,25 +106,14 @@ class AutomaticFit {
         best_.model.fit.cost);
   }
 
-  double cost() const { return best_.model.fit.cost; }
   double score() const { return worth_.criterion(best_); }
   /// Whether the score is lower by what one mode costs.
   bool is_clearly_below(double score_before) const {
     return score() < score_before - worth_.cost_of_one();
   }
-  bool at_rounding() const { return worth_.at_rounding(best_); }
-  bool limit_reached() const { return options_.limit->reached(); }
-
-  bool explains_data() const {
-    return judge_residual(frf_, lines_of(best_.model, frf_), quick_.user_weights, threads_)
-        .explained;
-  }
-
-  /// Releases the weights of the search; the last fit computes its own.
-  void release_weights() { quick_.user_weights = {}; }
 
   FitResult finish(FitEvidence& evidence) {
-    release_weights();
+    quick_.user_weights = {};  // the last fit computes its own
     sort_modes(best_.model);
     const bool cut_short = limit_reached();
     options_.limit->begin_completion();
@@ -159,6 +147,15 @@ class AutomaticFit {
   }
 
  private:
+  double cost() const { return best_.model.fit.cost; }
+  bool at_rounding() const { return worth_.at_rounding(best_); }
+  bool limit_reached() const { return options_.limit->reached(); }
+
+  bool explains_data() const {
+    return judge_residual(frf_, lines_of(best_.model, frf_), quick_.user_weights, threads_)
+        .explained;
+  }
+
   ModeNumber mode_number() const {
     if (selection_.keep_modes) return ModeNumber::given;
     return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;

@@ -15,8 +15,8 @@ namespace stageid {
 ///
 /// If a mode's frequency changes by the share d, G changes by X d, X = -f dG/df. A resonance narrower than a few lines
 /// has no such differences; over the realizations, X may also follow from a pole that the channels have in common. In
-/// windows of nine lines, d is fitted by weighted least squares to the slope within the runs, and to that over the realizations, with the X that
-/// explains more. Noise of S kron C_E gives its standard deviation, enlarged by what X d leaves unexplained. A drift is
+/// windows of nine lines, d is fitted by weighted least squares to the slope within the runs, and to that over the
+/// realizations, with the X that explains more. Noise of S kron C_E gives its standard deviation, enlarged by what X d leaves unexplained. A drift is
 /// reported on three conditions:
 ///   - d is 8 standard deviations from zero (Student's t with at least 36 degrees of freedom: 2e-9).
 ///   - X d is more than half (over realizations 0.8) of the slope beyond noise. A transient or distortions have other

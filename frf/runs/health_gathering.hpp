@@ -62,7 +62,8 @@ class HealthPart {
   RunStart start_;
 };
 
-/// for_each_period(), whose periods `health` receives as well, if not null. take() returns the period's spectra, or null.
+/// The same as for_each_period(); `health`, if not null, receives the periods as well. take() returns the spectra of the
+/// period, or null.
 /// @param excitation samples x channels, one period
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& workspace,
                   HealthPart* health, const std::function<void(double bytes)>& read_done,

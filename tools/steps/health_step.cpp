@@ -66,7 +66,7 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
   const std::vector<NoisyRun> noisy = record.noisy_runs;
   const bool steps_known = record.steps.size() >= frf.inputs.size();
   std::vector<Finding> findings = check_health(std::move(record), nominal);
-  // A drift looks like noise. Without the excitation of an axis, the response to it is not determined, nor what it leaves.
+  // A drift looks like noise. So does everything if the response to an axis is not determined for want of excitation.
   if (!has(findings, Cause::drift) && !has(findings, Cause::excitation))
     for (Finding& finding : check_experiment_noise(frf, noisy))
       findings.push_back(std::move(finding));

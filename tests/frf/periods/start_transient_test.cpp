@@ -137,8 +137,8 @@ TEST(StartTransient, TheEstimateGathersTheSame) {
       estimate_plant_frf_and_health({&log}, {.method = FrfMethod::lpm}).health.start.runs.empty());
 }
 
-/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on `lines` of 60 lines, in
-/// the middle or from the `first` on. The phase is the same in all periods of a run or `new_phases` in each.
+/// 30 runs of five periods and the one before them: noise, and change(p) times a random phase on `lines` of 60 lines,
+/// in the middle or from the `first` on. The phase is the same in all periods of a run or `new_phases` in each.
 template <typename Change>
 std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool new_phases = false,
                                Eigen::Index lines = 5, std::optional<Eigen::Index> first = {}) {

@@ -25,7 +25,7 @@ using testing::HasSubstr;
 
 class Workflow : public ProgramTest {
  protected:
-  /// Runs a stage of that name that has a fault, into a log of that name. @returns what is told of the log
+  /// Writes FILE.yaml, a stage with this fault, and runs it into FILE.slog. @returns the information about that log
   json run_with_fault(const std::string& file, const std::string& fault, int exit_code,
                       const std::string& cause, const std::string& more = "",
                       const std::string& keys = "") const {

@@ -1,5 +1,6 @@
 #include "frf/health/data_health.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/logs/faulty_log.hpp"
 #include "tests/support/logs/planted_faults.hpp"
+#include "tests/support/stages/closed_loop.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
@@ -18,6 +20,9 @@ namespace stageid {
 namespace test_health_step {
 
 using test::MemoryLog;
+using testing::AllOf;
+using testing::Contains;
+using testing::Not;
 
 test::FaultyLogRequest request_of(std::uint64_t seed) {
   test::FaultyLogRequest request;
@@ -189,6 +194,26 @@ TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
   EXPECT_EQ(findings.front().cause, Cause::excluded) << told(findings);
   EXPECT_EQ(findings.back().cause, Cause::rigid_body);
   EXPECT_EQ(findings.back().severity, Severity::unchecked);
+}
+
+// Where the excitation of an axis does not arrive, the response is not determined, and what it leaves is not noise.
+TEST(DataHealth, AMissingExcitationIsNoLimitCycle) {
+  test::LoopExperiment x{.axes = 2, .realizations = 2, .periods = 3};
+  x.noise_factor = 0.1 * Eigen::MatrixXcd::Identity(2, 2);
+  MemoryLog log = test::simulate_log(test::small_stage(), x);
+  const auto causes = [&log] {
+    FrfEstimate frf;
+    frf.experiment_noise_ratio = 200.0;
+    std::vector<Cause> found;
+    for (const Finding& f : examine(frf, read_health_record({&log}, {}), std::nullopt))
+      found.push_back(f.cause);
+    return found;
+  };
+  EXPECT_THAT(causes(), Contains(Cause::uneven_noise));
+  for (Eigen::MatrixXd& period : log.excitation_periods)  // a third axis, recorded only
+    period.col(2) = period.leftCols(2).rowwise().sum();
+  EXPECT_THAT(causes(), AllOf(Contains(Cause::excitation), Not(Contains(Cause::uneven_noise)),
+                              Not(Contains(Cause::limit_cycle))));
 }
 
 TEST(DataHealth, FindingsSurviveTheProvenance) {
