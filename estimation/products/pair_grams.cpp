@@ -9,10 +9,11 @@ namespace {
 
 /// Adds the products of channel c and the following ones on a tile of lines.
 void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
-                 LineRange lines, const std::vector<FunctionSet>& sets,
+                 LineRange lines, const std::vector<FunctionRange>& ranges,
                  std::vector<Eigen::MatrixXd>& out) {
   const SplitMatrix& left = X[static_cast<std::size_t>(c)];
   SplitMatrix right;
+  Eigen::MatrixXd gram;
   for (Eigen::Index d = c; d < pairs.channels; ++d) {
     const SplitMatrix weight = pairs.between(c, d, lines);
     if (weight.cols() == 0) continue;
@@ -21,15 +22,14 @@ void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, E
     const SplitMatrix& other = X[static_cast<std::size_t>(d)];
     right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
     right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
-    for (std::size_t s = 0; s < sets.size(); ++s) {
-      const FunctionSet& set = sets[s];
-      const auto n = static_cast<Eigen::Index>(set.size());
-      Eigen::MatrixXd gram = left.re(Eigen::all, set).transpose() * right.re(Eigen::all, set);
-      gram.noalias() += left.im(Eigen::all, set).transpose() * right.im(Eigen::all, set);
+    for (std::size_t r = 0; r < ranges.size(); ++r) {
+      const auto [first, n] = ranges[r];
+      gram.noalias() = left.re.middleCols(first, n).transpose() * right.re.middleCols(first, n);
+      gram.noalias() += left.im.middleCols(first, n).transpose() * right.im.middleCols(first, n);
       const auto rows = Eigen::seqN(c, n, pairs.channels);
       const auto cols = Eigen::seqN(d, n, pairs.channels);
-      out[s](rows, cols) += gram;
-      if (d != c) out[s](cols, rows) += gram.transpose();
+      out[r](rows, cols) += gram;
+      if (d != c) out[r](cols, rows) += gram.transpose();
     }
   }
 }
@@ -37,10 +37,10 @@ void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, E
 }  // namespace
 
 std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
-                                        const std::vector<FunctionSet>& sets) {
+                                        const std::vector<FunctionRange>& ranges) {
   std::vector<Eigen::MatrixXd> out;
-  for (const FunctionSet& set : sets) {
-    const Eigen::Index n = pairs.channels * static_cast<Eigen::Index>(set.size());
+  for (const FunctionRange& range : ranges) {
+    const Eigen::Index n = pairs.channels * range.count;
     out.emplace_back(Eigen::MatrixXd::Zero(n, n));
   }
   std::vector<SplitMatrix> X(static_cast<std::size_t>(pairs.channels));
@@ -50,7 +50,7 @@ std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
     for_each_task(pairs.threads, channels,
                   [&](int c) { X[static_cast<std::size_t>(c)] = pairs.columns(c, lines); });
     for_each_task(pairs.threads, channels,
-                  [&](int c) { add_channel(pairs, X, c, lines, sets, out); });
+                  [&](int c) { add_channel(pairs, X, c, lines, ranges, out); });
   }
   return out;
 }

@@ -8,8 +8,11 @@
 
 namespace stageid {
 
-/// Functions whose parameters are treated together: their indices among those of a channel.
-using FunctionSet = std::vector<Eigen::Index>;
+/// Functions of a channel whose parameters are treated together.
+struct FunctionRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
 
 /// Columns X_c of every channel, all of one width, and the weights between two channels.
 struct ChannelPairs {
@@ -21,9 +24,9 @@ struct ChannelPairs {
   std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, LineRange lines)> between;
 };
 
-/// sum_k Re{X_c^H W(c, d) X_d} of the columns in a set, for every set: element (c + n_c p, d + n_c q) belongs to
-/// columns set[p] and set[q], in the order of vec of channels x columns. W must be Hermitian.
+/// sum_k Re{X_c^H W(c, d) X_d} of the columns in a range, for every range: element (c + n_c p, d + n_c q) belongs to
+/// its columns p and q, in the order of vec of channels x columns. W must be Hermitian.
 std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
-                                        const std::vector<FunctionSet>& sets);
+                                        const std::vector<FunctionRange>& ranges);
 
 }  // namespace stageid

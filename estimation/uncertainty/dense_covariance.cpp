@@ -40,13 +40,12 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
   return out;
 }
 
-/// Z of the functions of the channels in a set, in the order of dense_covariances().
+/// Z of the functions of the channels in a range, in the order of dense_covariances().
 template <typename Row>
-Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionSet& set, const Row& row) {
-  Eigen::MatrixXd out(problem.channels() * static_cast<Eigen::Index>(set.size()),
-                      problem.globals());
+Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionRange& range, const Row& row) {
+  Eigen::MatrixXd out(problem.channels() * range.count, problem.globals());
   Eigen::Index at = 0;
-  for (const Eigen::Index f : set)
+  for (Eigen::Index f = range.first; f < range.first + range.count; ++f)
     for (Eigen::Index c = 0; c < problem.channels(); ++c) out.row(at++) = row(c, f);
   return out;
 }
@@ -69,7 +68,7 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
 /// diagonal blocks are those of the channels, which are known.
 std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
                                               const ParameterCovariance& covariance,
-                                              const std::vector<FunctionSet>& sets) {
+                                              const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   ChannelPairs pairs;
@@ -87,60 +86,60 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines) {
     return c == d ? SplitMatrix{} : noise.correlation.of_channels(c, d, lines);
   };
-  std::vector<Eigen::MatrixXd> out = pair_grams(pairs, sets);
+  std::vector<Eigen::MatrixXd> out = pair_grams(pairs, ranges);
   for (Eigen::MatrixXd& matrix : out) matrix *= half;
   return out;
 }
 
 std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
                                               const FitResult& result, const FitOptions& options,
-                                              const std::vector<FunctionSet>& sets) {
+                                              const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
   const ParameterCovariance known = parameter_covariance(
       problem, fit.beta, fit.groups, result.model.fit.cost, noise, result.frozen, {false, true});
   if (known.channels.empty()) return {};
   const double half = 0.5 * known.residual_scale;
-  std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, sets);
+  std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, ranges);
   std::vector<FitCovariance> out;
-  for (std::size_t s = 0; s < sets.size(); ++s) {
-    const FunctionSet& set = sets[s];
+  for (std::size_t r = 0; r < ranges.size(); ++r) {
+    const auto [first, n] = ranges[r];
     const auto channel = [&](Eigen::Index c) -> const ChannelCovariance& {
       return known.channels[static_cast<std::size_t>(c)];
     };
-    const Eigen::MatrixXd Z = stacked(
-        problem, set, [&](Eigen::Index c, Eigen::Index f) { return channel(c).Z.row(f).eval(); });
-    const Eigen::MatrixXd cross = stacked(problem, set, [&](Eigen::Index c, Eigen::Index f) {
+    const Eigen::MatrixXd Z = stacked(problem, ranges[r], [&](Eigen::Index c, Eigen::Index f) {
+      return channel(c).Z.row(f).eval();
+    });
+    const Eigen::MatrixXd cross = stacked(problem, ranges[r], [&](Eigen::Index c, Eigen::Index f) {
       return channel(c).cross.col(f).transpose().eval();
     });
-    Eigen::MatrixXd likelihood = Eigen::MatrixXd::Zero(nu[s].rows(), nu[s].cols());
+    Eigen::MatrixXd likelihood = Eigen::MatrixXd::Zero(nu[r].rows(), nu[r].cols());
     for (Eigen::Index c = 0; c < problem.channels(); ++c) {
-      const auto own = Eigen::seqN(c, static_cast<Eigen::Index>(set.size()), problem.channels());
-      nu[s](own, own) = channel(c).own(set, set);
-      likelihood(own, own) = half * channel(c).equations_inverse(set, set);
+      const auto own = Eigen::seqN(c, n, problem.channels());
+      nu[r](own, own) = channel(c).own.block(first, first, n, n);
+      likelihood(own, own) = half * channel(c).equations_inverse.block(first, first, n, n);
     }
-    out.push_back({joined(known.globals, nu[s], cross.transpose(), Z),
+    out.push_back({joined(known.globals, nu[r], cross.transpose(), Z),
                    joined(half * known.globals_inverse, likelihood,
-                          Eigen::MatrixXd::Zero(problem.globals(), nu[s].rows()), Z)});
+                          Eigen::MatrixXd::Zero(problem.globals(), nu[r].rows()), Z)});
   }
   return out;
 }
 
-/// The rows of T, d (globals, numerators of the set) / d free parameters, times C times T^T.
+/// The rows of T, d (globals, numerators of the range) / d free parameters, times C times T^T.
 Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
-                           const ResidueFactors& factors, const FunctionSet& set,
+                           const ResidueFactors& factors, const FunctionRange& range,
                            const Eigen::MatrixXd& C) {
   const Eigen::Index globals = problem.globals();
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(
-      globals + problem.channels() * static_cast<Eigen::Index>(set.size()), C.cols());
+  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(globals + problem.channels() * range.count, C.cols());
   T.topLeftCorner(globals, globals).setIdentity();
   std::vector<ResidueFactors::Entry> entries;
   for (Eigen::Index c = 0; c < problem.channels(); ++c) {
     factors.channel_entries(beta, c, entries);
     for (const auto& [function, parameter, value] : entries) {
-      const auto place = std::find(set.begin(), set.end(), function);
-      if (place == set.end()) continue;
-      T(globals + c + problem.channels() * (place - set.begin()), parameter) += value;
+      const Eigen::Index place = function - range.first;
+      if (place < 0 || place >= range.count) continue;
+      T(globals + c + problem.channels() * place, parameter) += value;
     }
   }
   return T * C * T.transpose();
@@ -148,7 +147,7 @@ Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
 
 std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<FunctionSet>& sets) {
+                                          const std::vector<FunctionRange>& ranges) {
   ResidueFactors factors(fit.problem, fit.beta, options);
   factors.project(fit.beta, Eigen::MatrixXd::Ones(fit.problem.channels(), fit.problem.functions()));
   const FitCovariance free =
@@ -156,9 +155,9 @@ std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& f
                           data_noise(frf, options.weighting), result.frozen);
   std::vector<FitCovariance> out;
   if (free.sandwich.size() == 0) return out;
-  for (const FunctionSet& set : sets)
-    out.push_back({of_factors(fit.problem, fit.beta, factors, set, free.sandwich),
-                   of_factors(fit.problem, fit.beta, factors, set, free.likelihood)});
+  for (const FunctionRange& range : ranges)
+    out.push_back({of_factors(fit.problem, fit.beta, factors, range, free.sandwich),
+                   of_factors(fit.problem, fit.beta, factors, range, free.likelihood)});
   return out;
 }
 
@@ -191,7 +190,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
 
 std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
                                               const FitOptions& options,
-                                              const std::vector<FunctionSet>& sets) {
+                                              const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const double per_degree =
       residual_per_degree(problem, result.model.fit.cost, problem.parameters());
@@ -199,11 +198,10 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
   const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
   if (!inverse.allFinite()) return {};
   std::vector<FitCovariance> out;
-  for (const FunctionSet& set : sets) {
+  for (const FunctionRange& range : ranges) {
     std::vector<Eigen::Index> places = indices(0, problem.globals());
-    for (const Eigen::Index f : set)
-      for (Eigen::Index c = 0; c < problem.channels(); ++c)
-        places.push_back(problem.globals() + c + problem.channels() * f);
+    for (Eigen::Index i = 0; i < problem.channels() * range.count; ++i)
+      places.push_back(problem.globals() + problem.channels() * range.first + i);
     const Eigen::MatrixXd part = half * inverse(places, places);
     out.push_back({fit.matrices->scatter_factor() * part, part});
   }
@@ -211,12 +209,11 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
 }
 
 /// Limits the numbers to those of one covariance of kMostParameters; with weight matrices, all parameters are in one.
-bool are_affordable(const Ended& fit, const std::vector<FunctionSet>& sets) {
+bool are_affordable(const Ended& fit, const std::vector<FunctionRange>& ranges) {
   const auto most = static_cast<double>(kMostParameters);
   double numbers = 0.0;
-  for (const FunctionSet& set : sets)
-    numbers += std::pow(
-        fit.problem.globals() + fit.problem.channels() * static_cast<Eigen::Index>(set.size()), 2);
+  for (const FunctionRange& range : ranges)
+    numbers += std::pow(fit.problem.globals() + fit.problem.channels() * range.count, 2);
   return numbers <= most * most && !(fit.matrices && fit.problem.parameters() > kMostParameters);
 }
 
@@ -228,12 +225,13 @@ bool has_deviations(const FitResult& result) {
 
 std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<FunctionSet>& sets) {
+                                          const std::vector<FunctionRange>& ranges) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
-  if (!are_affordable(fit, sets)) return {};
-  std::vector<FitCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, sets)
-                                   : low_rank   ? of_given_ranks(frf, fit, result, options, sets)
-                                              : of_free_numerators(frf, fit, result, options, sets);
+  if (!are_affordable(fit, ranges)) return {};
+  std::vector<FitCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, ranges)
+                                   : low_rank
+                                       ? of_given_ranks(frf, fit, result, options, ranges)
+                                       : of_free_numerators(frf, fit, result, options, ranges);
   for (FitCovariance& one : out)
     for (Eigen::MatrixXd* matrix : {&one.sandwich, &one.likelihood})  // symmetric to the last bit
       *matrix = (0.5 * frf.correlated_lines * (*matrix + matrix->transpose())).eval();
@@ -317,9 +315,9 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
 
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<FunctionSet>& sets) {
+                                             const std::vector<FunctionRange>& ranges) {
   if (!has_deviations(result)) return {};
-  return covariances_of(frf, ended_fit(frf, result, options), result, options, sets);
+  return covariances_of(frf, ended_fit(frf, result, options), result, options, ranges);
 }
 
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
@@ -351,17 +349,19 @@ double error_quantile_95(double relation) {
   return 0.5 * (low + high);
 }
 
-FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel) {
-  Eigen::Index first = 0;
+FunctionRange functions_of(const AdditiveModel& model, std::size_t submodel) {
+  FunctionRange out;
   for (std::size_t i = 0; i < submodel; ++i)
-    first += static_cast<Eigen::Index>(model.submodels[i].numerator.size());
-  return indices(first, static_cast<Eigen::Index>(model.submodels[submodel].numerator.size()));
+    out.first += static_cast<Eigen::Index>(model.submodels[i].numerator.size());
+  out.count = static_cast<Eigen::Index>(model.submodels[submodel].numerator.size());
+  return out;
 }
 
-FunctionSet all_functions(const AdditiveModel& model) {
-  std::size_t count = 0;
-  for (const Submodel& s : model.submodels) count += s.numerator.size();
-  return indices(0, static_cast<Eigen::Index>(count));
+FunctionRange all_functions(const AdditiveModel& model) {
+  FunctionRange out;
+  for (const Submodel& s : model.submodels)
+    out.count += static_cast<Eigen::Index>(s.numerator.size());
+  return out;
 }
 
 }  // namespace stageid

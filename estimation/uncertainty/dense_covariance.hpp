@@ -9,19 +9,19 @@
 
 namespace stageid {
 
-/// All sets together may have as many numbers as one set with this many rows.
+/// All ranges together may have as many numbers as one with this many rows.
 constexpr Eigen::Index kMostParameters = 4000;
 
 /// The covariances whose diagonals parameter_covariance() and related functions compute, including those between
-/// channels; one per set. Each is of all globals (denominator coefficients in the order of the submodels, then free
-/// delays), followed by the numerators of the functions in the set, vec of channels x functions, without response
+/// channels; one per range. Each is of all globals (denominator coefficients in the order of the submodels, then free
+/// delays), followed by the numerators of the functions in the range, vec of channels x functions, without response
 /// parts. The sandwich is 1/2 M^-1 K M^-1, the likelihood 1/2 M^-1 = [2 sum Re{J^H W J}]^-1. With weight matrices they
 /// are exact: M is formed and inverted.
 /// @param result of fit_additive_model() with these data and options
-/// @returns empty if the fit has no standard deviations, or the sets exceed kMostParameters
+/// @returns empty if the fit has no standard deviations, or the ranges exceed kMostParameters
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<FunctionSet>& sets);
+                                             const std::vector<FunctionRange>& ranges);
 
 /// Fills FitResult::covariance, or adds a decision with the reason why there is none.
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
@@ -31,8 +31,8 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
 ///   P(|z| > r) = 2/pi int_0^{pi/2} exp(-r^2 / ((1 + rho) cos^2 t + (1 - rho) sin^2 t)) dt,  E|z|^2 = 1
 double error_quantile_95(double relation);
 
-/// The functions of submodel i: their indices among those of a channel.
-FunctionSet functions_of(const AdditiveModel& model, std::size_t submodel);
-FunctionSet all_functions(const AdditiveModel& model);
+/// The functions of submodel i among those of a channel.
+FunctionRange functions_of(const AdditiveModel& model, std::size_t submodel);
+FunctionRange all_functions(const AdditiveModel& model);
 
 }  // namespace stageid

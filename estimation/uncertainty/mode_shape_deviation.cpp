@@ -133,15 +133,15 @@ std::optional<ModeShapeDeviation> mode_shape_deviation(const Submodel& mode,
 }
 
 void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
-  std::vector<FunctionSet> sets;
+  std::vector<FunctionRange> ranges;
   std::vector<std::size_t> modes;
   for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
     if (result.model.submodels[i].is_mode()) {
       modes.push_back(i);
-      sets.push_back(functions_of(result.model, i));
+      ranges.push_back(functions_of(result.model, i));
     }
   if (modes.empty()) return;
-  const std::vector<FitCovariance> covariances = dense_covariances(frf, result, options, sets);
+  const std::vector<FitCovariance> covariances = dense_covariances(frf, result, options, ranges);
   for (std::size_t m = 0; m < covariances.size(); ++m) {
     Submodel& mode = result.model.submodels[modes[m]];
     Eigen::Index first = 0;
