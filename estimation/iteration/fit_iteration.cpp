@@ -21,6 +21,9 @@ constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
 constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step
 constexpr int kTries = 40;
+// A trial whose iteration predicts less than this part of what it must gain is given up. Of the successful trials on 25
+// plants of unknown structure, nine of ten stay above it; without it, the same models result.
+constexpr double kWorthwhilePart = 1.0 / 3.0;
 // Numerators are re-solved after every step.
 constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 
@@ -152,8 +155,9 @@ class Iteration {
     // residual.
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
-    deviations_ = std::sqrt(
-        std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient())) * data / squares);
+    const double decrement =
+        std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient()));
+    deviations_ = std::sqrt(decrement * data / squares);
     if (deviations_ < options_.deviation_tolerance) {
       end(FitStatus::gradient_small,
           fmt::format("converged: within {:.1g} standard deviations of the first-order condition, "
@@ -163,6 +167,11 @@ class Iteration {
     }
     if (cost_ < 1e-28 * signal_cost_) {
       end(FitStatus::gradient_small, "converged: the residual is at rounding level");
+      return true;
+    }
+    // A quadratic cost falls by the decrement.
+    if (cost_ * decrement / squares < kWorthwhilePart * (cost_ - options_.worthwhile_cost)) {
+      end(FitStatus::iteration_limit, "given up: the cost does not fall far enough");
       return true;
     }
     return false;

@@ -65,6 +65,8 @@ struct FitOptions {
   double step_tolerance = 1e-10;     ///< largest relative change of a pole, and of the cost
   /// Largest distance of a parameter from the stationary point, in standard deviations (Newton decrement).
   double deviation_tolerance = 1e-4;
+  /// A trial: the fit ends when it can no longer be expected to reach this cost.
+  double worthwhile_cost = HUGE_VAL;
   bool shrink_hidden = false;  ///< searched modes with held poles: shrink_hidden_modes()
   bool judge_modes = false;    ///< modes were requested one by one: undetermined if one of them is
   bool uncertainty = true;     ///< also standard deviations and the variance of the response

@@ -13,6 +13,7 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/fit_problem.hpp"
+#include "estimation/problem/fit_start.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/growth_watch.hpp"
 #include "estimation/search/hidden_modes.hpp"
@@ -298,7 +299,13 @@ class AutomaticFit {
       return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
-    if (!take_best(sample, std::move(moves))) return false;
+    // A trial of delays per channel takes longer than all others.
+    const auto costly =
+        std::stable_partition(moves.begin(), moves.end(), [](const StructureMove& move) {
+          return move.options.delay != DelayModel::per_channel;
+        });
+    if (!take_best(sample, {moves.begin(), costly}) && !take_best(sample, {costly, moves.end()}))
+      return false;
     take_structure_of(best_.model);
     watch_ = {};  // it compares models of one structure
     return true;
@@ -334,12 +341,10 @@ class AutomaticFit {
           worth(data.frf, search.structure_, data.options.user_weights) {
       const FitResult fit = fit_additive_model(data.frf, data.model, data.options);
       now = worth.criterion(fit);
-      cost = fit.model.fit.cost;
     }
     PartOfData data;
     ModeWorth worth;
     double now = 0.0;  ///< criterion
-    double cost = 0.0;
   };
 
   /// Ranks the moves by trial on the sample and takes the first that all data confirm.
@@ -363,15 +368,12 @@ class AutomaticFit {
     });
   }
 
-  /// A hopeless move ends after a third of its iterations.
   static FitResult tried(const Sample& sample, const StructureMove& move) {
     FitOptions options = move.options;
-    options.max_iterations /= 3;
-    FitResult fit = fit_additive_model(sample.data.frf, move.model, options);
-    if (fit.status != FitStatus::iteration_limit || !(fit.model.fit.cost < kHopeless * sample.cost))
-      return fit;
-    options.max_iterations = move.options.max_iterations - options.max_iterations;
-    return fit_additive_model(sample.data.frf, fit.model, options);
+    const FitProblem problem =
+        make_problem(sample.data.frf, move.model, options, options.user_weights);
+    options.worthwhile_cost = sample.worth.cost_at(sample.now, move.model, problem.parameters());
+    return fit_additive_model(sample.data.frf, move.model, options);
   }
 
   /// @returns false if all data do not confirm the move

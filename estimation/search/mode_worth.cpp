@@ -49,8 +49,17 @@ double ModeWorth::squares(const FitResult& fit) const {
 double ModeWorth::cost_of_one() const { return cost_of_mode(parameters_of_mode_, data_, lines_); }
 
 double ModeWorth::criterion(const FitResult& fit) const {
-  return data_ * std::log(squares(fit)) + static_cast<double>(fit.parameters) * std::log(data_) +
-         2.0 * count_modes(fit.model) * std::log(lines_);
+  return data_ * std::log(squares(fit)) + penalty(fit.model, fit.parameters);
+}
+
+double ModeWorth::penalty(const AdditiveModel& model, Eigen::Index parameters) const {
+  return static_cast<double>(parameters) * std::log(data_) +
+         2.0 * count_modes(model) * std::log(lines_);
+}
+
+double ModeWorth::cost_at(double criterion, const AdditiveModel& model,
+                          Eigen::Index parameters) const {
+  return std::exp((criterion - penalty(model, parameters)) / data_) / (2.0 * lines_);
 }
 
 double ModeWorth::price(const FitResult& fit) const {

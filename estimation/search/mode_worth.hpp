@@ -30,6 +30,9 @@ class ModeWorth {
   /// Smaller is better.
   double criterion(const FitResult& fit) const;
 
+  /// The cost at which a fit of this model has that criterion.
+  double cost_at(double criterion, const AdditiveModel& model, Eigen::Index parameters) const;
+
   /// Of a mode, in the units of the criterion.
   double cost_of_one() const;
 
@@ -45,6 +48,7 @@ class ModeWorth {
 
  private:
   double squares(const FitResult& fit) const;  ///< sum W |E|^2, not below rounding
+  double penalty(const AdditiveModel& model, Eigen::Index parameters) const;
 
   double lines_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers

@@ -14,8 +14,6 @@ namespace stageid {
 inline constexpr int kGrowthIterations = 12;
 /// Times as many for springs, whose start is farther away.
 inline constexpr int kFartherAway = 3;
-/// A move is given up if, after a third of its iterations, its cost is this many times that of the model.
-inline constexpr double kHopeless = 10.0;
 /// Alternatives tried before the search concludes that none is better: missing modes, merges, pairs.
 inline constexpr std::size_t kTried = 4;
 /// Models of many modes grow by a fifth at a time.

@@ -129,9 +129,12 @@ std::vector<StructureMove> simpler_structures(const FitOptions& options, const A
     out.push_back({"--direct-term none", model, options});
     std::erase_if(out.back().model.submodels, is_direct_term);
   }
-  if (open.rigid_body && has(model, is_rigid_body)) {
+  const auto is_whole_body = [](const Submodel& s) {
+    return is_rigid_body(s) || s.role == SubmodelRole::suspension;
+  };
+  if (open.rigid_body && has(model, is_whole_body)) {
     out.push_back({"--rigid-body none", model, options});
-    std::erase_if(out.back().model.submodels, is_rigid_body);
+    std::erase_if(out.back().model.submodels, is_whole_body);
   }
   return out;
 }

@@ -217,7 +217,10 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   check_requests(frf, structure);
   std::vector<std::string> decisions;
   ModelStructure complete = structure.common;
-  if (structure.suspension) complete.given = suspension_modes(frf, structure.suspension_hz);
+  if (structure.suspension) {
+    complete.given = suspension_modes(frf, structure.suspension_hz);
+    complete.open.rigid_body = false;
+  }
   std::vector<SubmodelRequest> requests = structure.submodels;
   FitOptions options = asked;
   const bool order_is_searched = !requests.empty() && requests.front().order_by_search;

@@ -66,6 +66,28 @@ TEST(FitConvergence, ThePapersFirstOrderConditionHolds) {
     }
 }
 
+// Trials ------------------------------------------------------------------------------------------
+
+TEST(FitConvergence, ATrialThatCannotReachItsCostIsGivenUp) {
+  const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
+  const FrfEstimate frf = test::frf_of(problem);
+  const AdditiveModel start = moved(problem.model, 1.002, 1.5);
+  FitOptions options;
+  options.uncertainty = false;
+  const FitResult whole = fit_additive_model(frf, start, options);
+  ASSERT_GT(whole.cost.size(), 3U);
+
+  options.worthwhile_cost = 1.01 * whole.model.fit.cost;
+  const FitResult same = fit_additive_model(frf, start, options);
+  EXPECT_EQ(same.status, whole.status);
+  EXPECT_EQ(same.cost, whole.cost);
+
+  options.worthwhile_cost = 0.9 * whole.model.fit.cost;
+  const FitResult given_up = fit_additive_model(frf, start, options);
+  EXPECT_EQ(given_up.status, FitStatus::iteration_limit);
+  EXPECT_LT(given_up.cost.size(), whole.cost.size());
+}
+
 // Convex start --------------------------------------------------------------------------------------
 
 TEST(FitConvergence, TheConvexStartIsTheWeightedLeastSquaresSolution) {
