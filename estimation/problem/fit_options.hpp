@@ -40,6 +40,7 @@ template <>
 inline constexpr std::array kWords<FitMethod> = {"riv", "gn", "sk"};
 
 class SearchLimit;
+struct CovarianceParts;
 
 enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
 template <>
@@ -144,6 +145,8 @@ struct FitResult {
   Eigen::MatrixXd response_variance;
   FitCovariance
       covariance;  ///< empty unless requested; if it cannot be computed, a decision contains the reason
+  /// What dense_covariances() computes those of free numerators from; empty if they would be too large.
+  std::shared_ptr<const CovarianceParts> covariance_parts;
   bool trustworthy() const noexcept { return is_trustworthy(status); }
   bool is_held(std::size_t submodel) const noexcept {
     return std::find(held.begin(), held.end(), submodel) != held.end();

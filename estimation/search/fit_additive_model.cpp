@@ -22,6 +22,7 @@
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/start/delay_search.hpp"
+#include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
@@ -63,16 +64,17 @@ void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, 
                   covariance.residual_scale, std::sqrt(covariance.residual_scale)));
 }
 
-/// The covariance with free numerators.
+/// The covariance with free numerators. @param between_channels also its parts
 ParameterCovariance free_covariance(const FrfEstimate& frf, const FitOptions& options,
                                     const FitProblem& problem,
                                     const std::optional<WeightMatrices>& matrices,
-                                    const FitParameters& beta, const IterationResult& iteration) {
+                                    const FitParameters& beta, const IterationResult& iteration,
+                                    bool between_channels) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   if (!matrices)
     return parameter_covariance(problem, beta, groups, iteration.end_cost,
                                 data_noise(frf, options.weighting), iteration.frozen,
-                                {options.response_variance, false});
+                                {options.response_variance, between_channels});
   return joint_covariance(
       problem, beta, groups, iteration.end_cost,
       JointEquations(problem, *matrices, beta, groups, residual(problem, groups, beta.B)),
@@ -275,7 +277,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   fill_model(frf, options, problem, beta, result);
   if (options.uncertainty) {
     if (!low_rank && result.status != FitStatus::singular)
-      covariance = free_covariance(frf, options, problem, matrices, beta, iteration);
+      covariance = free_covariance(frf, options, problem, matrices, beta, iteration,
+                                   have_affordable_covariances(problem, result.model));
+    result.covariance_parts = std::move(covariance.parts);
     raise(covariance, frf.correlated_lines);
     use_covariance(problem, covariance, weighs_by_variance(options.weighting), result);
     if (!low_rank)
@@ -288,6 +292,9 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
 }
 
 void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
+  const std::vector<FunctionRange> of_submodels = functions_of_submodels(fit.model);
+  std::vector<Eigen::Index> globals;
+  std::vector<Eigen::Index> functions;
   std::vector<Eigen::Index> first = {0};  // first coefficient of every submodel
   for (const Submodel& s : fit.model.submodels)
     first.push_back(first.back() + static_cast<Eigen::Index>(s.denominator.size()) - 1);
@@ -301,9 +308,18 @@ void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
     if (fit.is_held(i)) held.push_back(model.submodels.size());
     for (const Eigen::Index p : fit.frozen)
       if (p >= first[i] && p < first[i + 1]) frozen.push_back(next + p - first[i]);
+    for (Eigen::Index p = first[i]; p < first[i + 1]; ++p) globals.push_back(p);
+    for (Eigen::Index f = 0; f < of_submodels[i].count; ++f)
+      functions.push_back(of_submodels[i].first + f);
     next += first[i + 1] - first[i];
     model.submodels.push_back(fit.model.submodels[i]);
     removal.push_back(fit.removal_cost[i]);
+  }
+  if (fit.covariance_parts) {
+    for (Eigen::Index p = first.back(); p < fit.covariance_parts->globals.rows(); ++p)
+      globals.push_back(p);  // delays
+    fit.covariance_parts = std::make_shared<const CovarianceParts>(
+        rearranged(*fit.covariance_parts, globals, functions));
   }
   fit.model = std::move(model);
   fit.removal_cost = std::move(removal);

@@ -67,7 +67,7 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
 /// Cov(nu) between channels, 1/2 sum Re{g_c^H C(c, d) g_d} with g = W F M_bb^-1, zero unless they are correlated. The
 /// diagonal blocks are those of the channels, which are known.
 std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
-                                              const ParameterCovariance& covariance,
+                                              const CovarianceParts& known,
                                               const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
@@ -77,7 +77,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   pairs.threads = problem.threads;
   pairs.columns = [&](Eigen::Index c, LineRange lines) {
     const auto at = static_cast<std::size_t>(c);
-    const Eigen::MatrixXd& inverse = covariance.channels[at].equations_inverse;
+    const Eigen::MatrixXd& inverse = known.channels[at].equations_inverse;
     const auto& [F_re, F_im] = group_of[at]->F;
     return noise_scaled(problem, noise, c, lines,
                         {F_re.middleRows(lines.first, lines.count) * inverse,
@@ -96,9 +96,8 @@ std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ende
                                               const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
-  const ParameterCovariance known = parameter_covariance(
-      problem, fit.beta, fit.groups, result.model.fit.cost, noise, result.frozen, {false, true});
-  if (known.channels.empty()) return {};
+  if (!result.covariance_parts) return {};
+  const CovarianceParts& known = *result.covariance_parts;
   const double half = 0.5 * known.residual_scale;
   std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, ranges);
   std::vector<FitCovariance> out;
@@ -208,13 +207,13 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
   return out;
 }
 
-/// Limits the numbers to those of one covariance of kMostParameters; with weight matrices, all parameters are in one.
-bool are_affordable(const Ended& fit, const std::vector<FunctionRange>& ranges) {
+/// Whether the ranges together have no more numbers than one covariance of kMostParameters.
+bool are_affordable(const FitProblem& problem, const std::vector<FunctionRange>& ranges) {
   const auto most = static_cast<double>(kMostParameters);
   double numbers = 0.0;
   for (const FunctionRange& range : ranges)
-    numbers += std::pow(fit.problem.globals() + fit.problem.channels() * range.count, 2);
-  return numbers <= most * most && !(fit.matrices && fit.problem.parameters() > kMostParameters);
+    numbers += std::pow(problem.globals() + problem.channels() * range.count, 2);
+  return numbers <= most * most;
 }
 
 bool has_deviations(const FitResult& result) {
@@ -227,7 +226,9 @@ std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& f
                                           const FitResult& result, const FitOptions& options,
                                           const std::vector<FunctionRange>& ranges) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
-  if (!are_affordable(fit, ranges)) return {};
+  if (!are_affordable(fit.problem, ranges) ||
+      (fit.matrices && fit.problem.parameters() > kMostParameters))
+    return {};
   std::vector<FitCovariance> out = fit.matrices ? of_weight_matrices(fit, result, options, ranges)
                                    : low_rank
                                        ? of_given_ranks(frf, fit, result, options, ranges)
@@ -313,6 +314,11 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
 
 }  // namespace
 
+bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel& model) {
+  return are_affordable(problem, functions_of_submodels(model)) ||
+         are_affordable(problem, {all_functions(model)});
+}
+
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
                                              const std::vector<FunctionRange>& ranges) {
@@ -349,18 +355,19 @@ double error_quantile_95(double relation) {
   return 0.5 * (low + high);
 }
 
-FunctionRange functions_of(const AdditiveModel& model, std::size_t submodel) {
-  FunctionRange out;
-  for (std::size_t i = 0; i < submodel; ++i)
-    out.first += static_cast<Eigen::Index>(model.submodels[i].numerator.size());
-  out.count = static_cast<Eigen::Index>(model.submodels[submodel].numerator.size());
+std::vector<FunctionRange> functions_of_submodels(const AdditiveModel& model) {
+  std::vector<FunctionRange> out;
+  Eigen::Index next = 0;
+  for (const Submodel& s : model.submodels) {
+    out.push_back({next, static_cast<Eigen::Index>(s.numerator.size())});
+    next += out.back().count;
+  }
   return out;
 }
 
 FunctionRange all_functions(const AdditiveModel& model) {
   FunctionRange out;
-  for (const Submodel& s : model.submodels)
-    out.count += static_cast<Eigen::Index>(s.numerator.size());
+  for (const FunctionRange& range : functions_of_submodels(model)) out.count += range.count;
   return out;
 }
 

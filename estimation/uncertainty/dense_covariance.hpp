@@ -12,6 +12,9 @@ namespace stageid {
 /// All ranges together may have as many numbers as one with this many rows.
 constexpr Eigen::Index kMostParameters = 4000;
 
+/// Whether the ranges of every submodel, or of all functions together, have no more.
+bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel& model);
+
 /// The covariances whose diagonals parameter_covariance() and related functions compute, including those between
 /// channels; one per range. Each is of all globals (denominator coefficients in the order of the submodels, then free
 /// delays), followed by the numerators of the functions in the range, vec of channels x functions, without response
@@ -31,8 +34,8 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
 ///   P(|z| > r) = 2/pi int_0^{pi/2} exp(-r^2 / ((1 + rho) cos^2 t + (1 - rho) sin^2 t)) dt,  E|z|^2 = 1
 double error_quantile_95(double relation);
 
-/// The functions of submodel i among those of a channel.
-FunctionRange functions_of(const AdditiveModel& model, std::size_t submodel);
+/// The functions of every submodel among those of a channel.
+std::vector<FunctionRange> functions_of_submodels(const AdditiveModel& model);
 FunctionRange all_functions(const AdditiveModel& model);
 
 }  // namespace stageid

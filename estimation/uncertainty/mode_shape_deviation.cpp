@@ -133,12 +133,13 @@ std::optional<ModeShapeDeviation> mode_shape_deviation(const Submodel& mode,
 }
 
 void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
+  const std::vector<FunctionRange> all = functions_of_submodels(result.model);
   std::vector<FunctionRange> ranges;
   std::vector<std::size_t> modes;
   for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
     if (result.model.submodels[i].is_mode()) {
       modes.push_back(i);
-      ranges.push_back(functions_of(result.model, i));
+      ranges.push_back(all[i]);
     }
   if (modes.empty()) return;
   const std::vector<FitCovariance> covariances = dense_covariances(frf, result, options, ranges);

@@ -175,10 +175,10 @@ void leave_unknown(const FitProblem& problem, Eigen::Index c, ParameterCovarianc
   const double unknown = std::numeric_limits<double>::quiet_NaN();
   out.numerator_variance.row(c).setConstant(unknown);
   if (out.response_variance.size() > 0) out.response_variance.row(c).setConstant(unknown);
-  if (out.channels.empty()) return;
+  if (!out.parts) return;
   const Eigen::Index n_f = problem.functions();
   const Eigen::Index globals = problem.globals();
-  out.channels[static_cast<std::size_t>(c)] = {
+  out.parts->channels[static_cast<std::size_t>(c)] = {
       Eigen::MatrixXd::Constant(n_f, n_f, unknown), Eigen::MatrixXd::Zero(globals, n_f),
       Eigen::MatrixXd::Zero(n_f, globals), Eigen::MatrixXd::Constant(n_f, n_f, unknown)};
 }
@@ -243,6 +243,19 @@ std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
   return out;
 }
 
+CovarianceParts rearranged(const CovarianceParts& parts, const std::vector<Eigen::Index>& globals,
+                           const std::vector<Eigen::Index>& functions) {
+  CovarianceParts out{parts.globals(globals, globals),
+                      parts.globals_inverse(globals, globals),
+                      parts.residual_scale,
+                      {}};
+  for (const ChannelCovariance& channel : parts.channels)
+    out.channels.push_back({channel.own(functions, functions), channel.cross(globals, functions),
+                            channel.Z(functions, globals),
+                            channel.equations_inverse(functions, functions)});
+  return out;
+}
+
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, double cost,
                                          const DataNoise& noise,
@@ -282,10 +295,10 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
 
   // The equations of a part are computed again: storing all of them would need more memory than the data.
   resize(problem, wanted.response, out);
-  if (wanted.channels) {
-    out.globals_inverse = inverse;
-    out.channels.resize(static_cast<std::size_t>(problem.channels()));
-  }
+  if (wanted.parts)
+    out.parts = std::make_shared<CovarianceParts>(CovarianceParts{
+        out.globals, inverse, out.residual_scale,
+        std::vector<ChannelCovariance>(static_cast<std::size_t>(problem.channels()))});
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   for (const ChannelRange part : parts) {
     if (parts.size() > 1) make_equations(part);
@@ -304,7 +317,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
       ChannelCovariance channel = {half * bb_inverse * k.bb * bb_inverse,
                                    half * inverse * k_ab * bb_inverse, gn.Z, bb_inverse};
       fill_channel(problem, beta, *group_of[at], c, channel, out);
-      if (wanted.channels) out.channels[at] = std::move(channel);
+      if (out.parts) out.parts->channels[at] = std::move(channel);
       return true;
     });
     if (!determined) return {};

@@ -1,7 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <memory>
+#include <vector>
 
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/equations/joint_equations.hpp"
@@ -19,19 +20,30 @@ struct ChannelCovariance {
   Eigen::MatrixXd equations_inverse;  ///< the channel's block of M_bb^-1
 };
 
+/// What the covariances between channels follow from, see dense_covariances().
+struct CovarianceParts {
+  Eigen::MatrixXd globals;          ///< as in ParameterCovariance
+  Eigen::MatrixXd globals_inverse;  ///< (M^-1)_aa
+  double residual_scale = 1.0;      ///< as in ParameterCovariance
+  std::vector<ChannelCovariance> channels;
+};
+
+/// With the globals and the functions in another order. @param globals, functions their former indices
+CovarianceParts rearranged(const CovarianceParts& parts, const std::vector<Eigen::Index>& globals,
+                           const std::vector<Eigen::Index>& functions);
+
 struct ParameterCovariance {
   Eigen::MatrixXd globals;             ///< of denominator coefficients and delays
   Eigen::MatrixXd numerator_variance;  ///< of B, n_c x n_f
   Eigen::MatrixXd response_variance;   ///< E|dP|^2, n_c x N; empty if not requested
   double residual_scale = 1.0;  ///< factor included in the variances (unknown or too small noise)
-  Eigen::MatrixXd globals_inverse;          ///< (M^-1)_aa
-  std::vector<ChannelCovariance> channels;  ///< if requested
+  std::shared_ptr<CovarianceParts> parts;  ///< if requested
 };
 
 /// Parts of a ParameterCovariance to compute besides the deviations.
 struct WantedCovariance {
   bool response = false;  ///< needs as much memory as the data
-  bool channels = false;  ///< for covariances between numerators of different channels
+  bool parts = false;     ///< for covariances between numerators of different channels
 };
 
 /// First-order covariance of the estimate. With M = sum Re{J^H W J} and K = sum Re{J^H W C W J},

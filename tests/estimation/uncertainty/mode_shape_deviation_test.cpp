@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <vector>
 
 #include "estimation/modal/modal_form.hpp"
 #include "estimation/search/fit_additive_model.hpp"
@@ -214,6 +216,31 @@ TEST(DenseCovariance, WithoutCorrelationAndWithTheRightWeightsIsTheInverseFisher
   const FitCovariance& C = fit.covariance;
   const Eigen::VectorXd scale = C.sandwich.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_LT((scale.asDiagonal() * (C.sandwich - C.likelihood) * scale.asDiagonal()).norm(), 1e-6);
+}
+
+TEST(DenseCovariance, FollowsTheOrderOfTheSubmodels) {
+  const DenseProblem problem = covariance_stage();
+  test::RandomNumbers random(5);
+  const FrfEstimate frf = test::noisy_frf(random, problem, problem.W.cwiseInverse());
+  const FitOptions options = test::options_with(Weighting::noise_variance);
+  FitResult fit = fit_additive_model(frf, problem.model, options);
+  AdditiveModel reversed = problem.model;
+  std::reverse(reversed.submodels.begin(), reversed.submodels.end());
+  FitResult other = fit_additive_model(frf, reversed, options);
+  std::vector<std::size_t> back(reversed.submodels.size());
+  for (std::size_t i = 0; i < back.size(); ++i) back[i] = back.size() - 1 - i;
+  rearrange(back, other);
+
+  fill_covariance(frf, options, fit);
+  fill_covariance(frf, options, other);
+  const Eigen::MatrixXd& C = fit.covariance.sandwich;
+  ASSERT_EQ(C.rows(), other.covariance.sandwich.rows());
+  ASSERT_GT(C.rows(), 0);
+  const Eigen::VectorXd scale = C.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((scale.asDiagonal() * (C - other.covariance.sandwich) * scale.asDiagonal())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-3);  // both fits end within 1e-4 standard deviations
 }
 
 TEST(DenseCovariance, SaysWhyThereIsNone) {
