@@ -300,10 +300,9 @@ class AutomaticFit {
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
     // A trial of delays per channel takes longer than all others.
-    const auto costly =
-        std::stable_partition(moves.begin(), moves.end(), [](const StructureMove& move) {
-          return move.options.delay != DelayModel::per_channel;
-        });
+    const auto costly = std::stable_partition(
+        moves.begin(), moves.end(),
+        [](const StructureMove& move) { return move.options.delay != DelayModel::per_channel; });
     if (!take_best(sample, {moves.begin(), costly}) && !take_best(sample, {costly, moves.end()}))
       return false;
     take_structure_of(best_.model);

@@ -104,7 +104,7 @@ void fit(const FitCommandFlags& flags, Console& console) {
 
 void fit_command(CLI::App& app, Console& console) {
   const auto flags = std::make_shared<FitCommandFlags>();
-  CLI::App* command = add_command(app, "fit", "Fit the additive model to an FRF");
+  CLI::App* command = add_command(app, "fit", "Fit a modal model to an FRF");
   command->add_option("frf", flags->frf, "frf.h5")->required();
   command->add_option("-o,--output", flags->output, "model.json to write")->required();
   command->add_option("--covariance", flags->covariance,
@@ -123,8 +123,8 @@ void fit_command(CLI::App& app, Console& console) {
                       "hold, delay and sampler, including aliasing. Default: from the FRF");
   command->add_option(
       "--delay", flags->words.delay,
-      "SECONDS | estimate | per_channel. Default: estimate (per_channel if the data "
-      "require it); the known delay of a compensated FRF; none without a hold");
+      "SECONDS | estimate | per_channel. Default for an FRF without a hold: none; for a "
+      "compensated one: its known delay; else estimate (per_channel if the data require it)");
   command->add_option("--rigid-body", flags->words.rigid_body,
                       "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
                       "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
@@ -134,15 +134,17 @@ void fit_command(CLI::App& app, Console& console) {
                       "none | full: a constant, the compliance of modes above the band. Default: "
                       "chosen from the data; full if the outputs are accelerations");
   command
-      ->add_option("--residue-rank", flags->words.residue_rank,
-                   "full | 1: residues phi psi^T of mechanical modes")
+      ->add_option(
+          "--residue-rank", flags->words.residue_rank,
+          "full | 1: residues phi psi^T, one pair of mode shapes each, of mechanical modes")
       ->capture_default_str();
   command
       ->add_option("--submodel", flags->words.submodels,
-                   "adds the term (B_0 + ... + B_m s^m) / (s^l A) with A of order n, such as "
-                   "n=4,m=3,f=120:180,zeta=0.01; repeatable. m: n + l - 1 if omitted. f: starting "
-                   "frequencies in Hz, one per pole pair, then the real pole of an odd n; found by "
-                   "a search if omitted. n=auto: one denominator for all modes that a search finds")
+                   "adds the term (B_0 + ... + B_m s^m) / (s^l A), A a polynomial of order n, such "
+                   "as n=4,m=3,f=120:180,zeta=0.01; repeatable. l: integrators, default 0. m: "
+                   "default n + l - 1. f: starting frequencies in Hz, one per pole pair, then the "
+                   "real pole of an odd n; default: by a search. zeta: starting damping ratio. "
+                   "n=auto: one denominator for all modes that a search finds")
       ->allow_extra_args(false);
   command->add_option("--damping", flags->words.damping,
                       "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
@@ -156,9 +158,9 @@ void fit_command(CLI::App& app, Console& console) {
       ->capture_default_str();
   command
       ->add_option("--search-seconds", flags->request.search_seconds,
-                   "budget of the mode search in seconds of a typical core, counted as work so "
-                   "that the result does not depend on the machine. If it is used up, the best "
-                   "model so far is written and the exit code is 3. 0: unlimited")
+                   "limit of the search: work, in seconds of a typical core, so that the result "
+                   "does not depend on the machine. At the limit, the best model so far is written "
+                   "and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)
       ->capture_default_str();
   add_threads(*command, flags->request.threads);

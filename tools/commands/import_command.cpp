@@ -144,7 +144,8 @@ void import_command(CLI::App& app, Console& console) {
       "universal file. Default: list the arrays of the file, to help you write a map");
   command->add_option(
       "--map", flags->map,
-      "YAML file with the meaning of the arrays; needed if the format does not define it");
+      "YAML file that assigns the arrays (docs/exchange.md); needed for a foreign .mat, .npz, .csv "
+      "or .h5");
   command->final_callback([flags, &console] { import_file(*flags, console); });
 }
 

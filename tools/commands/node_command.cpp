@@ -326,15 +326,17 @@ void node_command(CLI::App& app, Console& console) {
   command
       ->add_option(
           "--hold", flags->hold_s,
-          "seconds for which the node holds the stage in its own loop before it cuts the power")
+          "after a quick stop or a fault: seconds in the node's own loop before it cuts the forces")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
   flags->modbus.add_options(*command);
   command
       ->add_option(
           "--watchdog", flags->watchdog_s,
-          "stop the stage if the host is silent for this many seconds. 0: over CAN, 'watchdog_s' "
-          "of the group 'can'; over Modbus, the time of a repeated request plus one sample")
+          "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
+          "'watchdog_s' of the group 'can'; over Modbus, the longest time in which the host "
+          "repeats "
+          "a lost request, plus one sample")
       ->check(CLI::Range(0.0, 3600.0));
   command->final_callback([flags, &console] { serve(*flags, console); });
 }

@@ -42,7 +42,7 @@ constexpr const char* kWelcome =
 
 constexpr const char* kFooter =
     R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done but
-not to be trusted, the result contains the reason; 4 stopped for safety; 130 interrupted, recorded data are kept.)";
+not to be relied on, see the printed reason; 4 stopped for safety; 130 interrupted, recorded data are kept.)";
 
 /// The text before and after `middle`.
 std::optional<std::pair<std::string, std::string>> split_at(const std::string& text,

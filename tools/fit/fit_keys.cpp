@@ -162,8 +162,8 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
          "riv: refined instrumental variables; gn: Gauss-Newton; sk: Sanathanan-Koerner");
   count(v, "max_iterations", f.max_iterations, 1, 1000000, kOptional, "iterations per fit");
   v.number("search_seconds", f.search_seconds, not_negative("s"), kOptional,
-           "budget of the mode search in seconds of a typical core, counted as work so that the "
-           "result does not depend on the machine; 0: unlimited");
+           "limit of the search: work, in seconds of a typical core, so that the result does not "
+           "depend on the machine; 0: unlimited");
 }
 
 }  // namespace stageid
