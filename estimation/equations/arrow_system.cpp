@@ -78,7 +78,7 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
 void ArrowSystem::add_block(const GroupProducts& products, const TileRange& block) {
   const auto first_member = products.group.channels.begin() + block.first_member;
   const std::vector<Eigen::Index> members(first_member, first_member + block.members);
-  const Eigen::MatrixXd B = rows_of(beta_.B, members);
+  const Eigen::MatrixXd B = beta_.B(members, Eigen::all);
   const LineSums sums = line_sums(products, block, B);
   add_denominators(sums);
   std::vector<Channel> passing;

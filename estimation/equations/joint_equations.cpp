@@ -45,7 +45,7 @@ JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& 
   if (problem.delays() > 0) {
     T_.resize(problem.channels(), problem.size());
     for (const BasisGroup& group : groups) {
-      const Eigen::MatrixXd B = rows_of(beta.B, group.channels);
+      const Eigen::MatrixXd B = beta.B(group.channels, Eigen::all);
       T_.re(group.channels, Eigen::all) = B * group.T.re.transpose();
       T_.im(group.channels, Eigen::all) = B * group.T.im.transpose();
     }
@@ -83,7 +83,7 @@ Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Eigen
   Eigen::MatrixXcd change(problem_.channels(), lines);
   for (const BasisGroup& group : groups_) {
     Eigen::MatrixXd coefficients(static_cast<Eigen::Index>(group.channels.size()), 2 * n_f);
-    coefficients << rows_of(dB, group.channels), rows_of(beta_.B, group.channels);
+    coefficients << dB(group.channels, Eigen::all), beta_.B(group.channels, Eigen::all);
     Eigen::MatrixXd re = Eigen::MatrixXd::Zero(lines, 2 * n_f);
     Eigen::MatrixXd im = Eigen::MatrixXd::Zero(lines, 2 * n_f);
     re.leftCols(n_f) = group.F.re.middleRows(first, lines);
@@ -118,13 +118,13 @@ void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
   const Eigen::MatrixXd X_im = X.imag();
   auto e_b = sum.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
   for (const BasisGroup& group : groups_) {
-    const Eigen::MatrixXd re = rows_of(X_re, group.channels);
-    const Eigen::MatrixXd im = rows_of(X_im, group.channels);
+    const Eigen::MatrixXd re = X_re(group.channels, Eigen::all);
+    const Eigen::MatrixXd im = X_im(group.channels, Eigen::all);
     const Eigen::MatrixXd of_group =
         re * group.F.re.middleRows(first, lines) + im * group.F.im.middleRows(first, lines);
     for (std::size_t r = 0; r < group.channels.size(); ++r)
       e_b.row(group.channels[r]) += of_group.row(static_cast<Eigen::Index>(r));
-    const Eigen::MatrixXd B = rows_of(beta_.B, group.channels);
+    const Eigen::MatrixXd B = beta_.B(group.channels, Eigen::all);
     const Eigen::MatrixXd BX_re = re.transpose() * B;
     const Eigen::MatrixXd BX_im = im.transpose() * B;
     for (std::size_t d = 0; d < columns_.size(); ++d) {

@@ -54,9 +54,9 @@ void ResidueFactors::step(const Eigen::VectorXd& step) {
   for (Part& part : parts_) part.form.step(step.segment(part.first_parameter, part.form.size()));
 }
 
-void ResidueFactors::channel_entries(const FitParameters& beta, Eigen::Index channel,
-                                     std::vector<Entry>& out) const {
-  out.clear();
+std::vector<ResidueFactors::Entry> ResidueFactors::channel_entries(const FitParameters& beta,
+                                                                   Eigen::Index channel) const {
+  std::vector<Entry> out;
   std::vector<ResidueForm::Derivative> own;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Part& part = parts_[i];
@@ -67,16 +67,16 @@ void ResidueFactors::channel_entries(const FitParameters& beta, Eigen::Index cha
                                     : part.first_denominator - 1 - parameter,
                      value});
   }
+  return out;
 }
 
 Eigen::MatrixXd ResidueFactors::reduced_matrix(const FitParameters& beta,
                                                const ArrowSystem& system) const {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(size_, size_);
   N.topLeftCorner(globals_, globals_) = system.M_globals();
-  std::vector<Entry> entries;
   for (Eigen::Index c = 0; c < n_outputs_ * n_inputs_; ++c) {
-    const ArrowSystem::Channel& channel = system.channels()[static_cast<std::size_t>(c)];
-    channel_entries(beta, c, entries);
+    const ArrowSystem::Channel& channel = system.channel(c);
+    const std::vector<Entry> entries = channel_entries(beta, c);
     for (const Entry& t : entries) {
       N.col(t.parameter).head(globals_) += t.value * channel.ab.col(t.function);
       N.row(t.parameter).head(globals_) += t.value * channel.ba.row(t.function);
@@ -91,12 +91,9 @@ Eigen::VectorXd ResidueFactors::reduced_gradient(const FitParameters& beta,
                                                  const ArrowSystem& system) const {
   Eigen::VectorXd g = Eigen::VectorXd::Zero(size_);
   g.head(globals_) = system.e_globals();
-  std::vector<Entry> entries;
-  for (Eigen::Index c = 0; c < n_outputs_ * n_inputs_; ++c) {
-    channel_entries(beta, c, entries);
-    for (const Entry& t : entries)
-      g[t.parameter] += t.value * system.channels()[static_cast<std::size_t>(c)].e[t.function];
-  }
+  for (Eigen::Index c = 0; c < n_outputs_ * n_inputs_; ++c)
+    for (const Entry& t : channel_entries(beta, c))
+      g[t.parameter] += t.value * system.channel(c).e[t.function];
   return g;
 }
 

@@ -33,8 +33,7 @@ class ResidueFactors {
     Eigen::Index parameter;
     double value;
   };
-  void channel_entries(const FitParameters& beta, Eigen::Index channel,
-                       std::vector<Entry>& out) const;
+  std::vector<Entry> channel_entries(const FitParameters& beta, Eigen::Index channel) const;
 
   Eigen::MatrixXd reduced_matrix(const FitParameters& beta, const ArrowSystem& system) const;
   Eigen::VectorXd reduced_gradient(const FitParameters& beta, const ArrowSystem& system) const;

@@ -35,6 +35,7 @@ class JointIteration {
     }
     result_.end_cost = E_.cost;
     result_.frozen = frozen_;
+    result_.deviations = deviations_;
     return std::move(result_);
   }
 
@@ -146,7 +147,7 @@ class JointIteration {
   Residual E_;  // at beta_
   IterationResult result_;
   double signal_cost_ = 0.0;
-  double deviations_ = 0.0;
+  double deviations_ = HUGE_VAL;
   double levenberg_ = 0.0;
 };
 

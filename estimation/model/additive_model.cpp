@@ -1,7 +1,6 @@
 #include "estimation/model/additive_model.hpp"
 
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <stdexcept>
 
@@ -32,21 +31,6 @@ double AdditiveModel::mean_delay_s() const {
   return delay_s;
 }
 
-namespace {
-
-/// Channels c = output + n_y input that share one delay.
-std::map<double, std::vector<Eigen::Index>> channels_by_delay(const AdditiveModel& model) {
-  const Eigen::VectorXd input_s = model.input_delays_s();
-  const Eigen::VectorXd output_s = model.output_delays_s();
-  std::map<double, std::vector<Eigen::Index>> groups;
-  for (Eigen::Index u = 0; u < model.n_inputs(); ++u)
-    for (Eigen::Index y = 0; y < model.n_outputs(); ++y)
-      groups[input_s[u] + output_s[y]].push_back(y + model.n_outputs() * u);
-  return groups;
-}
-
-}  // namespace
-
 Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold) {
   if (hold != HoldModel::none && !(model.sample_rate_hz > 0.0))
@@ -61,7 +45,8 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(channels, frequency_hz.size());
   SubmodelBasis basis;
-  for (const auto& [delay, members] : channels_by_delay(model)) {
+  for (const auto& [delay, members] :
+       channels_by_delay(model.input_delays_s(), model.output_delays_s())) {
     const HoldEquivalent through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
       const SubmodelShape shape = shape_of(submodel);

@@ -99,4 +99,13 @@ void evaluate_basis(const HoldEquivalent& through, const SubmodelShape& shape,
   }
 }
 
+std::map<double, std::vector<Eigen::Index>> channels_by_delay(const Eigen::VectorXd& input_s,
+                                                              const Eigen::VectorXd& output_s) {
+  std::map<double, std::vector<Eigen::Index>> groups;
+  for (Eigen::Index u = 0; u < input_s.size(); ++u)
+    for (Eigen::Index y = 0; y < output_s.size(); ++y)
+      groups[input_s[u] + output_s[y]].push_back(y + output_s.size() * u);
+  return groups;
+}
+
 }  // namespace stageid

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <complex>
+#include <map>
 #include <vector>
 
 #include "estimation/model/hold_equivalent.hpp"
@@ -29,6 +30,10 @@ struct WantedBasis {
   bool gradient = false;
   bool delay = false;
 };
+
+/// Channels c = output + n_y input that share one delay.
+std::map<double, std::vector<Eigen::Index>> channels_by_delay(const Eigen::VectorXd& input_s,
+                                                              const Eigen::VectorXd& output_s);
 
 /// The poles of A(s) = 1 + a_1 s + ... + a_n s^n.
 std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>& a);

@@ -87,12 +87,6 @@ std::vector<std::size_t> mode_order(const AdditiveModel& model) {
   return order;
 }
 
-void sort_modes(AdditiveModel& model) {
-  std::vector<Submodel> sorted;
-  for (const std::size_t i : mode_order(model)) sorted.push_back(std::move(model.submodels[i]));
-  model.submodels = std::move(sorted);
-}
-
 Eigen::Index most_modes(const FrfEstimate& frf, const ModelStructure& structure) {
   const Eigen::Index per_mode = structure.general_damping ? 2 : 1;
   Eigen::Index fixed = (structure.rigid_body ? 1 : 0) + (structure.direct_term ? 1 : 0);

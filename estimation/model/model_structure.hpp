@@ -51,11 +51,8 @@ bool is_searched_mode(const Submodel& submodel) noexcept;
 /// Number of searched modes.
 int count_modes(const AdditiveModel& model);
 
-/// Indices of the submodels in the order of sort_modes().
+/// Indices of the submodels if searched modes are sorted by frequency, after the others.
 std::vector<std::size_t> mode_order(const AdditiveModel& model);
-
-/// Sorts searched modes by frequency, after the other submodels.
-void sort_modes(AdditiveModel& model);
 
 /// Largest number of modes that the lines support. The functions of a channel are real combinations on 2 N real
 /// values; a third of these is reserved to distinguish modes from noise.

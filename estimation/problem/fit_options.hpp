@@ -145,7 +145,7 @@ struct FitResult {
   Eigen::MatrixXd response_variance;
   FitCovariance
       covariance;  ///< empty unless requested; if it cannot be computed, a decision contains the reason
-  /// What dense_covariances() computes those of free numerators from; empty if they would be too large.
+  /// What dense_covariances() computes those of free numerators from; empty if not kept.
   std::shared_ptr<const CovarianceParts> covariance_parts;
   bool trustworthy() const noexcept { return is_trustworthy(status); }
   bool is_held(std::size_t submodel) const noexcept {

@@ -1,7 +1,6 @@
 #include "estimation/problem/fit_problem.hpp"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 #include "estimation/problem/search_limit.hpp"
@@ -178,18 +177,10 @@ void add_work(const FitProblem& problem, const WantedBasis& wanted) {
 
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives) {
-  std::map<double, std::vector<Eigen::Index>> members;
-  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
-    const double delay =
-        beta.input_delay_s[c / problem.n_outputs] + beta.output_delay_s[c % problem.n_outputs];
-    members[delay].push_back(c);
-  }
   std::vector<BasisGroup> groups;
-  for (auto& [delay, channels] : members) {
-    BasisGroup group;
-    group.delay_s = delay;
-    group.channels = std::move(channels);
-    groups.push_back(std::move(group));
+  for (auto& [delay, channels] : channels_by_delay(beta.input_delay_s, beta.output_delay_s)) {
+    groups.emplace_back().delay_s = delay;
+    groups.back().channels = std::move(channels);
   }
 
   const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};

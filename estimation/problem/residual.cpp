@@ -46,19 +46,13 @@ std::vector<LineTile> line_tiles(const FitProblem& problem) {
   return tiles;
 }
 
-/// Memory reused for the data, residual or model of one tile after another.
+/// Memory reused for the data or residual of one tile after another.
 class TileMemory {
  public:
   void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B, LineTile tile) {
     re = problem.G->middleCols(tile.first, tile.lines).real();
     im = problem.G->middleCols(tile.first, tile.lines).imag();
-    subtract_model(problem, groups, B, tile.first, re, im);
-  }
-  void load_model(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                  const Eigen::MatrixXd& B, LineTile tile) {
-    re.setZero(problem.channels(), tile.lines);
-    im.setZero(problem.channels(), tile.lines);
     subtract_model(problem, groups, B, tile.first, re, im);
   }
   /// sum W (re^2 + im^2)
@@ -116,19 +110,6 @@ ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGro
   }
   out.relative_rms = count > 0 ? std::sqrt(sum / static_cast<double>(count))
                                : std::numeric_limits<double>::quiet_NaN();
-  return out;
-}
-
-WeightedPower weighted_power(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                             const Eigen::MatrixXd& B) {
-  WeightedPower out;
-  TileMemory tile_memory;
-  for (const LineTile tile : line_tiles(problem)) {
-    tile_memory.load_model(problem, groups, B, tile);
-    out.model += tile_memory.squares(problem, tile);
-    tile_memory.load_residual(problem, {}, B, tile);
-    out.data += tile_memory.squares(problem, tile);
-  }
   return out;
 }
 

@@ -29,12 +29,4 @@ struct ResidualSize {
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                            const Eigen::MatrixXd& B, const ChannelFlags& responding);
 
-/// sum W |P|^2 of the groups' model, and sum W |G|^2.
-struct WeightedPower {
-  double model = 0.0;
-  double data = 0.0;
-};
-WeightedPower weighted_power(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                             const Eigen::MatrixXd& B);
-
 }  // namespace stageid

@@ -32,7 +32,6 @@ class SearchLimit {
   /// The same as a sentence.
   const char* message() const;
   /// In seconds of a typical core.
-  double spent_s() const noexcept { return spent_s_; }
   double budget_s() const noexcept { return budget_s_; }
 
  private:

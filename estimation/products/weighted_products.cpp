@@ -153,11 +153,4 @@ std::vector<Eigen::Index> indices(Eigen::Index first, Eigen::Index count) {
   return out;
 }
 
-Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows) {
-  Eigen::MatrixXd out(static_cast<Eigen::Index>(rows.size()), matrix.cols());
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    out.row(static_cast<Eigen::Index>(r)) = matrix.row(rows[r]);
-  return out;
-}
-
 }  // namespace stageid

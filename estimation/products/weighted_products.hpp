@@ -84,7 +84,4 @@ void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im, con
 /// first, first + 1, ...
 std::vector<Eigen::Index> indices(Eigen::Index first, Eigen::Index count);
 
-/// Rows `rows` of a matrix.
-Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<Eigen::Index>& rows);
-
 }  // namespace stageid

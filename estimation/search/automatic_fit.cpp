@@ -27,7 +27,6 @@
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
-#include "estimation/start/search_start.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -115,7 +114,7 @@ class AutomaticFit {
 
   FitResult finish(FitEvidence& evidence) {
     quick_.user_weights = {};  // the last fit computes its own
-    sort_modes(best_.model);
+    sort_modes(best_);
     const bool cut_short = limit_reached();
     options_.limit->begin_completion();
     FitOptions last = options_;
@@ -262,13 +261,29 @@ class AutomaticFit {
       say("start: {} given", counted(modes.size(), "mode"));
     }
     AdditiveModel model = start_of(modes);
-    if (model.submodels.empty())
-      model.submodels.push_back(mode_submodel(frf_, structure_, strongest_peak(frf_)));
+    if (model.submodels.empty()) {
+      Eigen::Index k = 0;
+      cmif(frf_, CmifKind::accelerance).row(0).maxCoeff(&k);
+      model.submodels.push_back(mode_submodel(frf_, structure_, {frf_.frequency_hz[k], 0.01, 1}));
+    }
     return model;
   }
 
+  /// Hold, known delays, the submodels besides the modes, and these modes.
   AdditiveModel start_of(const std::vector<ModeCandidate>& modes) const {
-    return search_start(frf_, structure_, options_, best_.model, modes);
+    AdditiveModel model;
+    model.hold = options_.hold;
+    if (!best_.model.submodels.empty()) {
+      model.input_delay_s = best_.model.input_delay_s;
+      model.output_delay_s = best_.model.output_delay_s;
+    } else if (options_.delay == DelayModel::fixed) {
+      model.input_delay_s.setConstant(frf_.n_inputs(), options_.delay_s);
+      model.output_delay_s.setZero(frf_.n_outputs());
+    }
+    model.submodels = fixed_submodels(frf_, structure_);
+    for (const ModeCandidate& mode : modes)
+      model.submodels.push_back(mode_submodel(frf_, structure_, mode));
+    return model;
   }
 
   int affordable_modes() const { return static_cast<int>(most_modes(frf_, structure_)); }
@@ -571,10 +586,12 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
   std::optional<AutomaticFit> best(std::in_place, frf, structure, selection, options);
   best->begin();
   best->search(0);
-  for (double before = HUGE_VAL; best->is_clearly_below(before) && best->surplus() > 0;) {
+  for (double before = HUGE_VAL; best->is_clearly_below(before);) {
+    const int surplus = best->surplus();
+    if (surplus <= 0) break;
     before = best->score();
     AutomaticFit other = *best;
-    other.search(best->surplus());
+    other.search(surplus);
     if (other.score() < before) best.emplace(std::move(other));
   }
   return best->finish(evidence);

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/model/poles.hpp"
-#include "estimation/problem/residual.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
@@ -49,22 +49,13 @@ std::string too_uncertain(const FitProblem& problem, const FitParameters& beta,
   return {};
 }
 
-/// Why the response of submodel `i` is too small, either by itself or in the part that the others cannot replace; else
-/// empty. Noise alone would let a submodel lower sum W |E|^2 by half of its variance per parameter, and by more if its
-/// frequency is searched.
-std::string too_small(const FitProblem& problem, const FitParameters& beta, double cost,
-                      double removal_cost, std::size_t i) {
-  FitProblem alone = problem;
-  FitParameters own = beta;
-  alone.shapes = {problem.shapes[i]};
-  own.a = {beta.a[i]};
-  Eigen::Index first = 0;
-  for (std::size_t o = 0; o < i; ++o) first += problem.shapes[o].functions();
-  own.B = beta.B.middleCols(first, problem.shapes[i].functions());
-  const WeightedPower power = weighted_power(alone, evaluate_groups(alone, own, false), own.B);
-  if (std::min(power.model, removal_cost) < kRoundingPower * power.data)
-    return "its response is at rounding level";
-  const Eigen::Index parameters = own.B.size() + own.a[0].size();
+/// Why the part of submodel `i` that the others cannot replace is too small; else empty. Noise alone would let a
+/// submodel lower sum W |E|^2 by half of its variance per parameter, and by more if its frequency is searched.
+std::string too_small(const FitProblem& problem, double cost, double removal_cost, std::size_t i) {
+  const double power = 2.0 * static_cast<double>(problem.size()) * signal_cost(problem);
+  if (removal_cost < kRoundingPower * power) return "its response is at rounding level";
+  const SubmodelShape& shape = problem.shapes[i];
+  const Eigen::Index parameters = problem.channels() * shape.functions() + shape.order;
   const double noise = residual_per_degree(problem, cost, problem.parameters());
   if (removal_cost < noise * static_cast<double>(parameters))
     return "its response is within the noise";
@@ -131,7 +122,7 @@ std::string undetermined_poles(const FitProblem& problem, const FitParameters& b
       else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
         reason = "the rest of the model can compensate for a change of its denominator";
       else
-        reason = too_small(problem, beta, cost, removal_cost[i], i);
+        reason = too_small(problem, cost, removal_cost[i], i);
       if (reason.empty() && covariance.size() > 0)
         reason = too_uncertain(problem, beta, covariance, i, first);
       if (!reason.empty())

@@ -292,9 +292,6 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
 }
 
 void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
-  const std::vector<FunctionRange> of_submodels = functions_of_submodels(fit.model);
-  std::vector<Eigen::Index> globals;
-  std::vector<Eigen::Index> functions;
   std::vector<Eigen::Index> first = {0};  // first coefficient of every submodel
   for (const Submodel& s : fit.model.submodels)
     first.push_back(first.back() + static_cast<Eigen::Index>(s.denominator.size()) - 1);
@@ -308,19 +305,12 @@ void rearrange(const std::vector<std::size_t>& sources, FitResult& fit) {
     if (fit.is_held(i)) held.push_back(model.submodels.size());
     for (const Eigen::Index p : fit.frozen)
       if (p >= first[i] && p < first[i + 1]) frozen.push_back(next + p - first[i]);
-    for (Eigen::Index p = first[i]; p < first[i + 1]; ++p) globals.push_back(p);
-    for (Eigen::Index f = 0; f < of_submodels[i].count; ++f)
-      functions.push_back(of_submodels[i].first + f);
     next += first[i + 1] - first[i];
     model.submodels.push_back(fit.model.submodels[i]);
     removal.push_back(fit.removal_cost[i]);
   }
-  if (fit.covariance_parts) {
-    for (Eigen::Index p = first.back(); p < fit.covariance_parts->globals.rows(); ++p)
-      globals.push_back(p);  // delays
-    fit.covariance_parts = std::make_shared<const CovarianceParts>(
-        rearranged(*fit.covariance_parts, globals, functions));
-  }
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    if (sources[i] != i) fit.covariance_parts.reset();  // of another order
   fit.model = std::move(model);
   fit.removal_cost = std::move(removal);
   fit.held = std::move(held);

@@ -246,6 +246,7 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   judge(frf, evidence, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);
+  result.covariance_parts.reset();  // nobody needs them any more
   return result;
 }
 

@@ -40,16 +40,6 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
   return out;
 }
 
-/// Z of the functions of the channels in a range, in the order of dense_covariances().
-template <typename Row>
-Eigen::MatrixXd stacked(const FitProblem& problem, const FunctionRange& range, const Row& row) {
-  Eigen::MatrixXd out(problem.channels() * range.count, problem.globals());
-  Eigen::Index at = 0;
-  for (Eigen::Index f = range.first; f < range.first + range.count; ++f)
-    for (Eigen::Index c = 0; c < problem.channels(); ++c) out.row(at++) = row(c, f);
-  return out;
-}
-
 /// Covariance of (a, b) from that of a, that of nu and that between a and nu; b = nu - Z a.
 Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
                        const Eigen::MatrixXd& cross, const Eigen::MatrixXd& Z) {
@@ -96,29 +86,31 @@ std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ende
                                               const std::vector<FunctionRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
-  if (!result.covariance_parts) return {};
-  const CovarianceParts& known = *result.covariance_parts;
+  const std::shared_ptr<const CovarianceParts> parts =
+      result.covariance_parts
+          ? result.covariance_parts
+          : parameter_covariance(problem, fit.beta, fit.groups, result.model.fit.cost, noise,
+                                 result.frozen, {false, true})
+                .parts;
+  if (!parts) return {};
+  const CovarianceParts& known = *parts;
   const double half = 0.5 * known.residual_scale;
   std::vector<Eigen::MatrixXd> nu = between_channels(fit, noise, half, known, ranges);
   std::vector<FitCovariance> out;
   for (std::size_t r = 0; r < ranges.size(); ++r) {
     const auto [first, n] = ranges[r];
-    const auto channel = [&](Eigen::Index c) -> const ChannelCovariance& {
-      return known.channels[static_cast<std::size_t>(c)];
-    };
-    const Eigen::MatrixXd Z = stacked(problem, ranges[r], [&](Eigen::Index c, Eigen::Index f) {
-      return channel(c).Z.row(f).eval();
-    });
-    const Eigen::MatrixXd cross = stacked(problem, ranges[r], [&](Eigen::Index c, Eigen::Index f) {
-      return channel(c).cross.col(f).transpose().eval();
-    });
+    Eigen::MatrixXd Z(nu[r].rows(), problem.globals());
+    Eigen::MatrixXd cross(problem.globals(), nu[r].rows());
     Eigen::MatrixXd likelihood = Eigen::MatrixXd::Zero(nu[r].rows(), nu[r].cols());
     for (Eigen::Index c = 0; c < problem.channels(); ++c) {
       const auto own = Eigen::seqN(c, n, problem.channels());
-      nu[r](own, own) = channel(c).own.block(first, first, n, n);
-      likelihood(own, own) = half * channel(c).equations_inverse.block(first, first, n, n);
+      const ChannelCovariance& channel = known.channels[static_cast<std::size_t>(c)];
+      Z(own, Eigen::all) = channel.Z.middleRows(first, n);
+      cross(Eigen::all, own) = channel.cross.middleCols(first, n);
+      nu[r](own, own) = channel.own.block(first, first, n, n);
+      likelihood(own, own) = half * channel.equations_inverse.block(first, first, n, n);
     }
-    out.push_back({joined(known.globals, nu[r], cross.transpose(), Z),
+    out.push_back({joined(known.globals, nu[r], cross, Z),
                    joined(half * known.globals_inverse, likelihood,
                           Eigen::MatrixXd::Zero(problem.globals(), nu[r].rows()), Z)});
   }
@@ -132,15 +124,12 @@ Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
   const Eigen::Index globals = problem.globals();
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(globals + problem.channels() * range.count, C.cols());
   T.topLeftCorner(globals, globals).setIdentity();
-  std::vector<ResidueFactors::Entry> entries;
-  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
-    factors.channel_entries(beta, c, entries);
-    for (const auto& [function, parameter, value] : entries) {
+  for (Eigen::Index c = 0; c < problem.channels(); ++c)
+    for (const auto& [function, parameter, value] : factors.channel_entries(beta, c)) {
       const Eigen::Index place = function - range.first;
       if (place < 0 || place >= range.count) continue;
       T(globals + c + problem.channels() * place, parameter) += value;
     }
-  }
   return T * C * T.transpose();
 }
 

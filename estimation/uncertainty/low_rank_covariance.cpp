@@ -12,11 +12,9 @@ std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitPara
                                         const ResidueFactors& factors, Eigen::Index first_channel,
                                         Eigen::Index channels) {
   std::vector<Eigen::Index> own = indices(0, problem.globals());
-  std::vector<ResidueFactors::Entry> entries;
-  for (Eigen::Index c = first_channel; c < first_channel + channels; ++c) {
-    factors.channel_entries(beta, c, entries);
-    for (const ResidueFactors::Entry& t : entries) own.push_back(t.parameter);
-  }
+  for (Eigen::Index c = first_channel; c < first_channel + channels; ++c)
+    for (const ResidueFactors::Entry& t : factors.channel_entries(beta, c))
+      own.push_back(t.parameter);
   std::sort(own.begin(), own.end());
   own.erase(std::unique(own.begin(), own.end()), own.end());
   return own;
@@ -30,9 +28,7 @@ SplitMatrix free_columns(const FitProblem& problem, const FitParameters& beta,
   const auto n = static_cast<Eigen::Index>(own.size());
   out.re.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
   out.im.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
-  std::vector<ResidueFactors::Entry> entries;
-  factors.channel_entries(beta, c, entries);
-  for (const auto& [function, parameter, value] : entries) {
+  for (const auto& [function, parameter, value] : factors.channel_entries(beta, c)) {
     const auto at = std::lower_bound(own.begin(), own.end(), parameter) - own.begin();
     out.re.col(at) += value * group.F.re.col(function).segment(lines.first, lines.count);
     out.im.col(at) += value * group.F.im.col(function).segment(lines.first, lines.count);
@@ -62,8 +58,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
 Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParameters& beta,
                                     const ResidueFactors& factors, Eigen::Index c,
                                     const Eigen::MatrixXd& C) {
-  std::vector<ResidueFactors::Entry> entries;
-  factors.channel_entries(beta, c, entries);
+  const std::vector<ResidueFactors::Entry> entries = factors.channel_entries(beta, c);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(problem.functions());
   for (const ResidueFactors::Entry& t : entries)
     for (const ResidueFactors::Entry& o : entries)

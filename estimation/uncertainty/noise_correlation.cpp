@@ -113,33 +113,27 @@ class GramOfTiles {
 
 }  // namespace
 
-NoiseCorrelation::NoiseCorrelation(const FrfEstimate& frf)
-    : n_y_(frf.n_outputs()), n_u_(frf.n_inputs()) {
-  if (frf.residual_covariance_re.size() == 0) return;
-  re_ = &frf.residual_covariance_re;
-  im_ = &frf.residual_covariance_im;
-  if (frf.input_factor.size() > 0 && n_u_ > 1) S_ = &frf.input_factor;
-}
-
 SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, LineRange lines) const {
   const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    const Eigen::Index at = a + n_y_ * b;
-    return std::complex<double>((*re_)(at, k), (*im_)(at, k));
+    const Eigen::Index at = a + frf_->n_outputs() * b;
+    return std::complex<double>(frf_->residual_covariance_re(at, k),
+                                frf_->residual_covariance_im(at, k));
   };
   return correlation_of(C, y, z, lines);
 }
 
 SplitMatrix NoiseCorrelation::S(Eigen::Index u, Eigen::Index v, LineRange lines) const {
   const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    return (*S_)(a + n_u_ * b, k);
+    return frf_->input_factor(a + frf_->n_inputs() * b, k);
   };
   return correlation_of(C, u, v, lines);
 }
 
 OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lines) const {
   OutputColumns Y = X;  // the diagonal of R is one
-  for (Eigen::Index y = 0; y < n_y_; ++y)
-    for (Eigen::Index z = 0; z < n_y_; ++z) {
+  const Eigen::Index n_y = frf_->n_outputs();
+  for (Eigen::Index y = 0; y < n_y; ++y)
+    for (Eigen::Index z = 0; z < n_y; ++z) {
       if (z == y) continue;
       const SplitMatrix rho = R(y, z, lines);
       const SplitMatrix& from = X[static_cast<std::size_t>(z)];
@@ -159,10 +153,11 @@ void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputCol
 }
 
 SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, LineRange lines) const {
-  const Eigen::Index u = c / n_y_;
-  const Eigen::Index v = d / n_y_;
+  const Eigen::Index n_y = frf_->n_outputs();
+  const Eigen::Index u = c / n_y;
+  const Eigen::Index v = d / n_y;
   if (u != v && !between_inputs()) return {};
-  const SplitMatrix of_outputs = R(c % n_y_, d % n_y_, lines);
+  const SplitMatrix of_outputs = R(c % n_y, d % n_y, lines);
   if (u == v) return of_outputs;
   const auto& [re, im] = of_outputs;
   const SplitMatrix of_inputs = S(u, v, lines);

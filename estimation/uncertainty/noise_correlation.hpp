@@ -21,10 +21,12 @@ class NoiseCorrelation {
  public:
   NoiseCorrelation() = default;  ///< unknown
   /// Correlations that the FRF does not contain are taken as zero. `frf` must outlive it.
-  explicit NoiseCorrelation(const FrfEstimate& frf);
+  explicit NoiseCorrelation(const FrfEstimate& frf) : frf_(&frf) {}
 
-  bool known() const noexcept { return re_ != nullptr; }
-  bool between_inputs() const noexcept { return known() && S_ != nullptr; }
+  bool known() const noexcept { return frf_ != nullptr && frf_->residual_covariance_re.size() > 0; }
+  bool between_inputs() const noexcept {
+    return known() && frf_->input_factor.size() > 0 && frf_->n_inputs() > 1;
+  }
 
   /// Y_y = sum_z R(y, z) X_z of one input. @pre known()
   OutputColumns of_outputs(const OutputColumns& X, LineRange lines) const;
@@ -38,11 +40,7 @@ class NoiseCorrelation {
   SplitMatrix R(Eigen::Index y, Eigen::Index z, LineRange lines) const;
   SplitMatrix S(Eigen::Index u, Eigen::Index v, LineRange lines) const;
 
-  Eigen::Index n_y_ = 0;
-  Eigen::Index n_u_ = 0;
-  const Eigen::MatrixXd* re_ = nullptr;
-  const Eigen::MatrixXd* im_ = nullptr;
-  const Eigen::MatrixXcd* S_ = nullptr;
+  const FrfEstimate* frf_ = nullptr;
 };
 
 /// Columns X = C_diag^1/2 W J of channels, as required by correlated_gram().

@@ -243,19 +243,6 @@ std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
   return out;
 }
 
-CovarianceParts rearranged(const CovarianceParts& parts, const std::vector<Eigen::Index>& globals,
-                           const std::vector<Eigen::Index>& functions) {
-  CovarianceParts out{parts.globals(globals, globals),
-                      parts.globals_inverse(globals, globals),
-                      parts.residual_scale,
-                      {}};
-  for (const ChannelCovariance& channel : parts.channels)
-    out.channels.push_back({channel.own(functions, functions), channel.cross(globals, functions),
-                            channel.Z(functions, globals),
-                            channel.equations_inverse(functions, functions)});
-  return out;
-}
-
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, double cost,
                                          const DataNoise& noise,

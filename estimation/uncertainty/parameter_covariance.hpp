@@ -28,10 +28,6 @@ struct CovarianceParts {
   std::vector<ChannelCovariance> channels;
 };
 
-/// With the globals and the functions in another order. @param globals, functions their former indices
-CovarianceParts rearranged(const CovarianceParts& parts, const std::vector<Eigen::Index>& globals,
-                           const std::vector<Eigen::Index>& functions);
-
 struct ParameterCovariance {
   Eigen::MatrixXd globals;             ///< of denominator coefficients and delays
   Eigen::MatrixXd numerator_variance;  ///< of B, n_c x n_f
