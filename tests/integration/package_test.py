@@ -134,6 +134,18 @@ class Debian(unittest.TestCase):
         self.assertTrue(place.startswith(str(packages)), place)
         self.assertEqual((version, runs), (VERSION, "9"))
 
+    def test_the_program_and_the_module_are_hardened(self):
+        program = self.root / "usr/bin/stageid"
+        self.assertIn("Position-Independent Executable", output("readelf", "-h", program))
+        for file in (program, *self.root.rglob("_native*.so")):
+            segments = output("readelf", "-dlW", file)
+            self.assertIn("GNU_RELRO", segments)
+            self.assertIn("BIND_NOW", segments)
+            self.assertRegex(segments, r"GNU_STACK .* RW  ")  # not executable
+            symbols = output("readelf", "--dyn-syms", "-W", file)
+            self.assertIn("__stack_chk_fail", symbols)
+            self.assertRegex(symbols, r"__(memcpy|memmove|read|snprintf|vsnprintf|fprintf|printf)_chk")
+
     def test_no_place_of_this_machine_is_in_it(self):
         for file in self.root.rglob("*"):
             if file.is_file() and not file.is_symlink() and file.suffix != ".a":
