@@ -47,7 +47,7 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
     : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, use) {}
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
+                         const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
                          ChannelEquationsUse use)
     : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
   const Eigen::Index globals = problem.globals();

@@ -9,12 +9,6 @@
 
 namespace stageid {
 
-/// A contiguous range of channels.
-struct ChannelRange {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
-};
-
 /// Treatment of the equations of the channels.
 enum class ChannelEquationsUse : std::uint8_t {
   eliminated,  ///< and discarded: memory of one block of channels; for solve_globals()
@@ -42,7 +36,7 @@ class ArrowSystem {
 
   /// The contribution of these channels only: M, e and the Schur complement are sums over parts.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method, ChannelRange part,
+              const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
 
   /// The step of the globals with `damping` times the diagonal of the Schur complement added to it; that of the
@@ -62,7 +56,6 @@ class ArrowSystem {
     Eigen::MatrixXd Z;   ///< bb^-1 ba, n_f x globals; if eliminated
     Eigen::VectorXd x;   ///< bb^-1 e
   };
-  const std::vector<Channel>& channels() const noexcept { return channels_; }
   /// @pre the channel is stored
   const Channel& channel(Eigen::Index c) const {
     return channels_[static_cast<std::size_t>(c - range_.first)];
@@ -93,7 +86,7 @@ class ArrowSystem {
 
   const FitProblem& problem_;
   const FitParameters& beta_;
-  ChannelRange range_;
+  IndexRange range_;
   ChannelEquationsUse use_;
   EquationMethod shared_;
   Eigen::MatrixXd M_;

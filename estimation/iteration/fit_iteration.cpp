@@ -85,8 +85,6 @@ class Iteration {
       }
       result_.end_cost = cost_;
     }
-    result_.frozen = frozen_;
-    result_.deviations = deviations_;
     return std::move(result_);
   }
 
@@ -99,9 +97,10 @@ class Iteration {
     bool solved = solve();
     if ((!solved || nearly_exact()) && all_digits()) solved = solve();
     if (!solved)
-      return end(FitStatus::singular,
-                 "the numerators of the start are singular: two modes coincide, or the data do not "
-                 "excite them");
+      return result_.end(
+          FitStatus::singular,
+          "the numerators of the start are singular: two modes coincide, or the data do not "
+          "excite them");
     result_.cost.push_back(cost_);
     return true;
   }
@@ -117,20 +116,15 @@ class Iteration {
     if (options_.limit && options_.limit->reached() && problem_.globals() > 0) {
       if (best_.cost > 0.0 && best_.cost < cost_)
         return end_at_best(options_.limit->status(), options_.limit->message());
-      return end(options_.limit->status(), options_.limit->message());
+      return result_.end(options_.limit->status(), options_.limit->message());
     }
     if (result_.iterations >= options_.max_iterations)
-      return end(problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
-                 fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
-                             "first-order condition; scaled gradient {:.2g}",
-                             result_.iterations, deviations_, gradient_));
+      return result_.end(
+          problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
+          fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
+                      "first-order condition; scaled gradient {:.2g}",
+                      result_.iterations, result_.deviations, gradient_));
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
-  }
-
-  bool end(FitStatus status, std::string message) {
-    result_.status = status;
-    result_.message = std::move(message);
-    return false;
   }
 
   void accept(Trial&& trial) {
@@ -143,10 +137,11 @@ class Iteration {
 
   /// True if the equations show convergence; `result_` is then complete.
   bool at_optimum(const ArrowSystem& system) {
-    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
+    result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
+    gradient_ = scaled_gradient(problem_, system, result_.frozen, cost_);
     if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
-      end(FitStatus::gradient_small,
+      result_.end(
+          FitStatus::gradient_small,
           fmt::format("converged: the first-order condition is satisfied, scaled gradient {:.2g}",
                       gradient_));
       return true;
@@ -156,22 +151,23 @@ class Iteration {
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
     const double decrement =
-        std::abs(system.solve_globals(0.0, frozen_).dot(system.schur_gradient()));
-    deviations_ = std::sqrt(decrement * data / squares);
-    if (deviations_ < options_.deviation_tolerance) {
-      end(FitStatus::gradient_small,
+        std::abs(system.solve_globals(0.0, result_.frozen).dot(system.schur_gradient()));
+    result_.deviations = std::sqrt(decrement * data / squares);
+    if (result_.deviations < options_.deviation_tolerance) {
+      result_.end(
+          FitStatus::gradient_small,
           fmt::format("converged: within {:.1g} standard deviations of the first-order condition, "
                       "scaled gradient {:.2g}",
-                      deviations_, gradient_));
+                      result_.deviations, gradient_));
       return true;
     }
     if (cost_ < 1e-28 * signal_cost_) {
-      end(FitStatus::gradient_small, "converged: the residual is at rounding level");
+      result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
       return true;
     }
     // A quadratic cost falls by the decrement.
     if (cost_ * decrement / squares < kWorthwhilePart * (cost_ - options_.worthwhile_cost)) {
-      end(FitStatus::iteration_limit, "given up: the cost does not fall far enough");
+      result_.end(FitStatus::iteration_limit, "given up: the cost does not fall far enough");
       return true;
     }
     return false;
@@ -188,7 +184,7 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
     if (!system.regular())
       return all_digits() ||
-             end(FitStatus::singular, "the numerators are singular: two modes coincide");
+             result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
     if (at_optimum(system)) return false;
     const double before = cost_;
     const int tries = at_rounding() ? kTriesAtRounding : kTries;
@@ -210,24 +206,16 @@ class Iteration {
       result_.cost.push_back(cost_);
     }
     if (at_rounding())
-      return end(FitStatus::step_small,
-                 "converged: the residual is at rounding level and no step lowers the cost");
-    if (deviations_ < kRoundingDeviations)
-      return end(FitStatus::step_small,
-                 fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
-                             "deviations of the first-order condition; scaled gradient {:.2g}",
-                             deviations_, gradient_));
-    return end(
-        FitStatus::cost_stalled,
-        fmt::format("no step lowers the cost, {:.1g} standard deviations from the first-order "
-                    "condition; scaled gradient {:.2g}",
-                    deviations_, gradient_));
+      return result_.end(
+          FitStatus::step_small,
+          "converged: the residual is at rounding level and no step lowers the cost");
+    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
   }
 
   /// Tries steps with increasing damping; accepts the first that lowers the cost.
   bool attempt(const ArrowSystem& system, int tries) {
     for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
-      const Eigen::VectorXd step = system.solve_globals(levenberg_, frozen_);
+      const Eigen::VectorXd step = system.solve_globals(levenberg_, result_.frozen);
       step_size_ = relative_step(problem_, beta_, step);
       std::optional<Trial> trial = try_step(problem_, bounds_, beta_, step);
       if (trial && trial->cost < cost_) {
@@ -244,8 +232,8 @@ class Iteration {
 
   bool still_moving() {
     if (step_size_ < options_.step_tolerance)
-      return end(FitStatus::step_small,
-                 fmt::format("the last step was {:.1e} of the parameters", step_size_));
+      return result_.end(FitStatus::step_small,
+                         fmt::format("the last step was {:.1e} of the parameters", step_size_));
     return true;
   }
 
@@ -254,10 +242,10 @@ class Iteration {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
-      return end(FitStatus::singular, "the numerators are singular: two modes coincide");
-    frozen_ = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(problem_, system, frozen_, cost_);
-    Eigen::VectorXd step = system.solve_globals(0.0, frozen_);
+      return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
+    result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
+    gradient_ = scaled_gradient(problem_, system, result_.frozen, cost_);
+    Eigen::VectorXd step = system.solve_globals(0.0, result_.frozen);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
       step_size_ = relative_step(problem_, beta_, step);
@@ -279,7 +267,7 @@ class Iteration {
   bool end_at_best(FitStatus status, std::string message) {
     beta_ = best_.beta;
     cost_ = best_.cost;
-    return end(status, std::move(message));
+    return result_.end(status, std::move(message));
   }
 
   FitProblem problem_;
@@ -287,17 +275,33 @@ class Iteration {
   const FitOptions& options_;
   PoleBounds bounds_;
   double signal_cost_;
-  std::vector<Eigen::Index> frozen_;  // coefficients of modes at their bounds
   IterationResult result_;
   double cost_ = 0.0;  // at beta_
   double levenberg_ = 0.0;
   double gradient_ = 1.0;
   double step_size_ = 0.0;
-  double deviations_ = HUGE_VAL;  // from the first-order condition, before the last step
   Trial best_;
 };
 
 }  // namespace
+
+bool IterationResult::end(FitStatus why, std::string reason) {
+  status = why;
+  message = std::move(reason);
+  return false;
+}
+
+bool IterationResult::end_without_step(const std::string& detail) {
+  if (deviations < kRoundingDeviations)
+    return end(FitStatus::step_small,
+               fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
+                           "deviations of the first-order condition{}",
+                           deviations, detail));
+  return end(FitStatus::cost_stalled,
+             fmt::format("no step lowers the cost, {:.1g} standard deviations from the first-order "
+                         "condition{}",
+                         deviations, detail));
+}
 
 double signal_cost(const FitProblem& problem) {
   return (problem.W->array() * problem.G->array().abs2()).sum() /

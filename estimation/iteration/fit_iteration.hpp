@@ -17,6 +17,11 @@ struct IterationResult {
   double deviations = HUGE_VAL;      ///< FitResult::deviations
   double end_cost = 0.0;             ///< at the returned parameters
   std::vector<Eigen::Index> frozen;  ///< globals that ended at a bound and are not unknowns
+
+  /// @returns false: the iteration does not go on
+  bool end(FitStatus why, std::string reason);
+  /// The end if no step lowers the cost: at rounding level, or stalled. @param detail end of the message
+  bool end_without_step(const std::string& detail = {});
 };
 
 /// Improves `beta` in place until the first-order condition holds: solve the numerators, step the denominators and

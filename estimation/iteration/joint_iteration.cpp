@@ -34,8 +34,6 @@ class JointIteration {
     while (iterate_once()) {
     }
     result_.end_cost = E_.cost;
-    result_.frozen = frozen_;
-    result_.deviations = deviations_;
     return std::move(result_);
   }
 
@@ -46,48 +44,37 @@ class JointIteration {
     return E;
   }
 
-  bool end(FitStatus status, std::string message) {
-    result_.status = status;
-    result_.message = std::move(message);
-    return false;
-  }
-
   /// @returns false at the end; `result_` then has the reason.
   bool iterate_once() {
     if (options_.limit && options_.limit->reached())
-      return end(options_.limit->status(), options_.limit->message());
+      return result_.end(options_.limit->status(), options_.limit->message());
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const JointEquations equations(problem_, weights_, beta_, groups, E_);
     if (!equations.regular())
-      return end(FitStatus::singular, "the numerators are singular: two modes coincide");
+      return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
     const Eigen::VectorXd step = free_step(equations);
     if (at_optimum(equations.gradient().dot(step))) return false;
     if (result_.iterations >= options_.max_iterations)
-      return end(FitStatus::iteration_limit,
-                 fmt::format("stopped after {} iterations, {:.2g} standard deviations from the "
-                             "first-order condition",
-                             result_.iterations, deviations_));
+      return result_.end(
+          FitStatus::iteration_limit,
+          fmt::format("stopped after {} iterations, {:.2g} standard deviations from the "
+                      "first-order condition",
+                      result_.iterations, result_.deviations));
     if (descend(equations, step)) return true;
     if (E_.cost < kNothingLeft * signal_cost_)
-      return end(FitStatus::step_small,
-                 "converged: the residual is at rounding level and no step lowers the cost");
-    if (deviations_ < kRoundingDeviations)
-      return end(FitStatus::step_small,
-                 fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
-                             "deviations of the first-order condition",
-                             deviations_));
-    return end(FitStatus::cost_stalled, fmt::format("no step lowers the cost, {:.2g} standard "
-                                                    "deviations from the first-order condition",
-                                                    deviations_));
+      return result_.end(
+          FitStatus::step_small,
+          "converged: the residual is at rounding level and no step lowers the cost");
+    return result_.end_without_step();
   }
 
   /// The step, with the modes held that are at a bound and pushed beyond it.
   Eigen::VectorXd free_step(const JointEquations& equations) {
-    frozen_.clear();
-    Eigen::VectorXd step = equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
-    frozen_ = bounds_.leaning(beta_, step);
-    if (frozen_.empty()) return step;
-    return equations.solve(equations.gradient(), frozen_, kStepTolerance).x;
+    result_.frozen.clear();
+    Eigen::VectorXd step = equations.solve(equations.gradient(), result_.frozen, kStepTolerance).x;
+    result_.frozen = bounds_.leaning(beta_, step);
+    if (result_.frozen.empty()) return step;
+    return equations.solve(equations.gradient(), result_.frozen, kStepTolerance).x;
   }
 
   /// By the Newton decrement over all parameters: the length of the step in standard deviations of the noise estimated
@@ -95,16 +82,19 @@ class JointIteration {
   bool at_optimum(double decrement) {
     const double squares = 2.0 * static_cast<double>(problem_.size()) * E_.cost;
     const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
-    deviations_ = gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
+    result_.deviations =
+        gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
     if (E_.cost < 1e-28 * signal_cost_) {
-      end(FitStatus::gradient_small, "converged: the residual is at rounding level");
+      result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
       return true;
     }
-    if (gradient >= options_.gradient_tolerance && deviations_ >= options_.deviation_tolerance)
+    if (gradient >= options_.gradient_tolerance &&
+        result_.deviations >= options_.deviation_tolerance)
       return false;
-    end(FitStatus::gradient_small,
+    result_.end(
+        FitStatus::gradient_small,
         fmt::format("converged: within {:.1g} standard deviations of the first-order condition",
-                    deviations_));
+                    result_.deviations));
     return true;
   }
 
@@ -112,7 +102,7 @@ class JointIteration {
   bool descend(const JointEquations& equations, Eigen::VectorXd step) {
     for (bool first = true; levenberg_ <= kLargestLevenberg; first = false) {
       if (levenberg_ > 0.0)
-        step = equations.solve(equations.gradient(), frozen_, kStepTolerance, levenberg_).x;
+        step = equations.solve(equations.gradient(), result_.frozen, kStepTolerance, levenberg_).x;
       if (take(step)) {
         if (first) levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
         return true;
@@ -143,11 +133,9 @@ class JointIteration {
   FitParameters& beta_;
   const FitOptions& options_;
   PoleBounds bounds_;
-  std::vector<Eigen::Index> frozen_;
   Residual E_;  // at beta_
   IterationResult result_;
   double signal_cost_ = 0.0;
-  double deviations_ = HUGE_VAL;
   double levenberg_ = 0.0;
 };
 

@@ -9,40 +9,32 @@
 #include "estimation/problem/pole_bounds.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/uncertainty/low_rank_covariance.hpp"
 
 namespace stageid {
 namespace {
 
 class LowRankIteration {
  public:
-  LowRankIteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
+  LowRankIteration(const FitProblem& problem, FitParameters& beta, ResidueFactors& factors,
+                   const FitOptions& options)
       : problem_(problem),
         beta_(beta),
+        factors_(factors),
         options_(options),
-        bounds_(problem, beta),
-        factors_(problem, beta, options) {}
+        bounds_(problem, beta) {}
 
-  LowRankResult run(const DataNoise& noise) {
-    LowRankResult out;
+  IterationResult run() {
     project();
     result_.cost.push_back(result_.end_cost);
     while (iterate_once() && result_.iterations < options_.max_iterations) {
     }
     if (result_.message.empty())
-      end(FitStatus::iteration_limit,
-          fmt::format("residues of given rank: stopped after {} iterations, {:.1g} standard "
-                      "deviations from the first-order condition; scaled gradient {:.2g}",
-                      result_.iterations, deviations_, gradient_));
-    if (options_.uncertainty && result_.status != FitStatus::singular)
-      out.covariance = low_rank_covariance(problem_, beta_, result_.end_cost, factors_, noise,
-                                           frozen_, options_.response_variance);
-    result_.frozen = frozen_;
-    result_.deviations = deviations_;
-    out.parameters = factors_.size();
-    out.ranks = factors_.ranks();
-    out.iteration = std::move(result_);
-    return out;
+      result_.end(FitStatus::iteration_limit,
+                  fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
+                              "first-order condition; scaled gradient {:.2g}",
+                              result_.iterations, result_.deviations, gradient_));
+    result_.message.insert(0, "residues of given rank: ");
+    return std::move(result_);
   }
 
  private:
@@ -56,7 +48,7 @@ class LowRankIteration {
         Eigen::MatrixXd::Identity(problem_.functions(), problem_.functions());
     for (Eigen::Index c = 0; c < problem_.channels(); ++c) {
       Eigen::MatrixXd inverse = unit;
-      solve_scaled(system.channels()[static_cast<std::size_t>(c)].bb, unit, inverse);
+      solve_scaled(system.channel(c).bb, unit, inverse);
       weight.row(c) = inverse.diagonal().cwiseMax(1e-300).cwiseInverse().transpose();
     }
     weight /= weight.maxCoeff();
@@ -70,52 +62,40 @@ class LowRankIteration {
     Eigen::MatrixXd scaled = scale.asDiagonal() * N_ * scale.asDiagonal();
     scaled.diagonal().array() += damping + 1e-13;
     Eigen::VectorXd rhs = scale.cwiseProduct(g_);
-    hold_unknowns(frozen_, scaled);
-    for (const Eigen::Index i : frozen_) rhs[i] = 0.0;
+    hold_unknowns(result_.frozen, scaled);
+    for (const Eigen::Index i : result_.frozen) rhs[i] = 0.0;
     return scale.cwiseProduct(scaled.ldlt().solve(rhs));
-  }
-
-  bool end(FitStatus status, std::string message) {
-    result_.status = status;
-    result_.message = std::move(message);
-    return false;
   }
 
   /// @returns whether to continue.
   bool iterate_once() {
     if (options_.limit && options_.limit->reached())
-      return end(options_.limit->status(), options_.limit->message());
+      return result_.end(options_.limit->status(), options_.limit->message());
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
                              ChannelEquationsUse::only_kept);
     N_ = factors_.reduced_matrix(beta_, system);
     g_ = factors_.reduced_gradient(beta_, system);
-    if (!N_.allFinite()) return end(FitStatus::singular, "the residue factors are singular");
-    frozen_ = bounds_.leaning(beta_, g_.head(problem_.globals()));
+    if (!N_.allFinite())
+      return result_.end(FitStatus::singular, "the residue factors are singular");
+    result_.frozen = bounds_.leaning(beta_, g_.head(problem_.globals()));
     const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
     gradient_ = 0.0;
     for (Eigen::Index i = 0; i < g_.size(); ++i)
-      if (std::find(frozen_.begin(), frozen_.end(), i) == frozen_.end())
+      if (std::find(result_.frozen.begin(), result_.frozen.end(), i) == result_.frozen.end())
         gradient_ =
             std::max(gradient_, std::abs(g_[i]) / std::sqrt(std::max(N_(i, i) * squares, 1e-300)));
     const double data = static_cast<double>(problem_.size() * problem_.channels());
-    deviations_ = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
-    if (gradient_ < options_.gradient_tolerance || deviations_ < options_.deviation_tolerance)
-      return end(FitStatus::gradient_small,
-                 fmt::format("residues of given rank: within {:.1g} standard deviations of the "
-                             "first-order condition, scaled gradient {:.2g}",
-                             deviations_, gradient_));
+    result_.deviations = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
+    if (gradient_ < options_.gradient_tolerance ||
+        result_.deviations < options_.deviation_tolerance)
+      return result_.end(
+          FitStatus::gradient_small,
+          fmt::format("converged: within {:.1g} standard deviations of the first-order "
+                      "condition, scaled gradient {:.2g}",
+                      result_.deviations, gradient_));
     if (attempt()) return true;
-    if (deviations_ < kRoundingDeviations)
-      return end(FitStatus::step_small,
-                 fmt::format("residues of given rank: converged: the cost is at rounding level, "
-                             "within {:.1g} standard deviations of the first-order condition",
-                             deviations_));
-    return end(
-        FitStatus::cost_stalled,
-        fmt::format("residues of given rank: no step lowers the cost, {:.1g} standard deviations "
-                    "from the first-order condition; scaled gradient {:.2g}",
-                    deviations_, gradient_));
+    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
   }
 
   bool attempt() {
@@ -143,23 +123,21 @@ class LowRankIteration {
 
   const FitProblem& problem_;
   FitParameters& beta_;
+  ResidueFactors& factors_;
   const FitOptions& options_;
   PoleBounds bounds_;
-  ResidueFactors factors_;
   IterationResult result_;
   Eigen::MatrixXd N_;
   Eigen::VectorXd g_;
-  std::vector<Eigen::Index> frozen_;
   double levenberg_ = 0.0;
-  double deviations_ = HUGE_VAL;
   double gradient_ = 1.0;
 };
 
 }  // namespace
 
-LowRankResult iterate_low_rank(const FitProblem& problem, FitParameters& beta,
-                               const FitOptions& options, const DataNoise& noise) {
-  return LowRankIteration(problem, beta, options).run(noise);
+IterationResult iterate_low_rank(const FitProblem& problem, FitParameters& beta,
+                                 ResidueFactors& factors, const FitOptions& options) {
+  return LowRankIteration(problem, beta, factors, options).run();
 }
 
 }  // namespace stageid

@@ -8,6 +8,12 @@
 
 namespace stageid {
 
+std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most) {
+  std::vector<IndexRange> out;
+  for (Eigen::Index i = 0; i < count; i += most) out.push_back({i, std::min(most, count - i)});
+  return out;
+}
+
 Eigen::ArrayXd LineVariance::channel(Eigen::Index c) const {
   return matrix->row(c).transpose().array() / divisor;
 }

@@ -19,6 +19,14 @@ namespace stageid {
 //   B(c, j)   the numerator coefficients of channel c
 //   D(k, .)   derivatives of F to the denominator coefficients
 
+/// Neighbouring lines, channels, inputs or functions.
+struct IndexRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+/// 0 to count - 1 in ranges of at most `most`.
+std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most);
+
 /// A variance of the data whose lines are divided by one number each, without copying it.
 struct LineVariance {
   SharedMatrix<Eigen::MatrixXd> matrix;  ///< n_c x N

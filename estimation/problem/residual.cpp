@@ -33,31 +33,22 @@ void subtract_model(const FitProblem& problem, const std::vector<BasisGroup>& gr
 }
 
 /// All channels on some lines; tiles depend on sizes only, never on the number of threads.
-struct LineTile {
-  Eigen::Index first = 0;
-  Eigen::Index lines = 0;
-};
-
-std::vector<LineTile> line_tiles(const FitProblem& problem) {
-  const Eigen::Index N = problem.size();
-  const Eigen::Index most = std::max<Eigen::Index>(1, kTileEntries / problem.channels());
-  std::vector<LineTile> tiles;
-  for (Eigen::Index k = 0; k < N; k += most) tiles.push_back({k, std::min(most, N - k)});
-  return tiles;
+std::vector<IndexRange> line_tiles(const FitProblem& problem) {
+  return ranges_of(problem.size(), std::max<Eigen::Index>(1, kTileEntries / problem.channels()));
 }
 
 /// Memory reused for the data or residual of one tile after another.
 class TileMemory {
  public:
   void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                     const Eigen::MatrixXd& B, LineTile tile) {
-    re = problem.G->middleCols(tile.first, tile.lines).real();
-    im = problem.G->middleCols(tile.first, tile.lines).imag();
+                     const Eigen::MatrixXd& B, IndexRange tile) {
+    re = problem.G->middleCols(tile.first, tile.count).real();
+    im = problem.G->middleCols(tile.first, tile.count).imag();
     subtract_model(problem, groups, B, tile.first, re, im);
   }
   /// sum W (re^2 + im^2)
-  double squares(const FitProblem& problem, LineTile tile) const {
-    const auto W = problem.W->middleCols(tile.first, tile.lines).array();
+  double squares(const FitProblem& problem, IndexRange tile) const {
+    const auto W = problem.W->middleCols(tile.first, tile.count).array();
     return (W * (re.array().square() + im.array().square())).sum();
   }
 
@@ -69,7 +60,7 @@ class TileMemory {
 
 Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                   const Eigen::MatrixXd& B) {
-  const LineTile all{0, problem.size()};
+  const IndexRange all{0, problem.size()};
   TileMemory E;
   E.load_residual(problem, groups, B, all);
   const double cost = E.squares(problem, all) / (2.0 * static_cast<double>(problem.size()));
@@ -78,7 +69,7 @@ Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& grou
 
 double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B) {
-  const std::vector<LineTile> tiles = line_tiles(problem);
+  const std::vector<IndexRange> tiles = line_tiles(problem);
   std::vector<double> squares(tiles.size());
   for_each_task(problem.threads, static_cast<int>(tiles.size()), [&](int i) {
     const auto at = static_cast<std::size_t>(i);
@@ -97,10 +88,10 @@ ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGro
   double sum = 0.0;
   Eigen::Index count = 0;
   TileMemory E;
-  for (const LineTile tile : line_tiles(problem)) {
+  for (const IndexRange tile : line_tiles(problem)) {
     E.load_residual(problem, groups, B, tile);
     out.finite = out.finite && E.re.allFinite() && E.im.allFinite();
-    for (Eigen::Index k = 0; k < tile.lines; ++k)
+    for (Eigen::Index k = 0; k < tile.count; ++k)
       for (Eigen::Index c = 0; c < problem.channels(); ++c) {
         const double power = std::norm((*problem.G)(c, tile.first + k));
         if (!responding[c] || !(power > 0.0)) continue;

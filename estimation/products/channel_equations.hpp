@@ -7,15 +7,9 @@
 
 namespace stageid {
 
-/// A contiguous range of lines.
-struct LineRange {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
-};
-
 /// Columns d vec(P)_c / d globals for one channel, lines x globals.
 SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
-                           const BasisGroup& group, Eigen::Index c, LineRange lines);
+                           const BasisGroup& group, Eigen::Index c, IndexRange lines);
 
 /// What the equations of all channels have in common.
 struct EquationMethod {

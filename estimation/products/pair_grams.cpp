@@ -9,7 +9,7 @@ namespace {
 
 /// Adds the products of channel c and the following ones on a tile of lines.
 void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
-                 LineRange lines, const std::vector<FunctionRange>& ranges,
+                 IndexRange lines, const std::vector<IndexRange>& ranges,
                  std::vector<Eigen::MatrixXd>& out) {
   const SplitMatrix& left = X[static_cast<std::size_t>(c)];
   SplitMatrix right;
@@ -37,16 +37,15 @@ void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, E
 }  // namespace
 
 std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
-                                        const std::vector<FunctionRange>& ranges) {
+                                        const std::vector<IndexRange>& ranges) {
   std::vector<Eigen::MatrixXd> out;
-  for (const FunctionRange& range : ranges) {
+  for (const IndexRange& range : ranges) {
     const Eigen::Index n = pairs.channels * range.count;
     out.emplace_back(Eigen::MatrixXd::Zero(n, n));
   }
   std::vector<SplitMatrix> X(static_cast<std::size_t>(pairs.channels));
   const auto channels = static_cast<int>(pairs.channels);
-  for (Eigen::Index first = 0; first < pairs.lines; first += kTileLines) {
-    const LineRange lines = {first, std::min(kTileLines, pairs.lines - first)};
+  for (const IndexRange lines : ranges_of(pairs.lines, kTileLines)) {
     for_each_task(pairs.threads, channels,
                   [&](int c) { X[static_cast<std::size_t>(c)] = pairs.columns(c, lines); });
     for_each_task(pairs.threads, channels,

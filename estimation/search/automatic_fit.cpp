@@ -214,11 +214,7 @@ class AutomaticFit {
     if (part.all) return false;
     ModelStructure structure = structure_;
     structure.given = structure_of(part.model).given;
-    FitOptions options = options_;
-    options.weighting = Weighting::user;
-    options.user_weights = part.options.user_weights;
-    options.user_weight_matrices.resize(0, 0);
-    AutomaticFit search(part.frf, structure, selection_, options);
+    AutomaticFit search(part.frf, structure, selection_, part.options);
     search.begin_relocated_from(part.model);
     search.search(0);
     if (search.best_.status == FitStatus::singular) return false;
@@ -334,17 +330,16 @@ class AutomaticFit {
 
   /// Replaces two modes closer than a half-power width by one if the second is not worth its parameters.
   void merge() {
-    for (std::size_t done = 0; !limit_reached() && history_.size() != merged_at_;) {
+    while (!limit_reached() && history_.size() != merged_at_) {
       if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
-      for (; done < all.size(); done += kTried) {
-        const auto first = all.begin() + static_cast<std::ptrdiff_t>(done);
-        const auto count = static_cast<std::ptrdiff_t>(std::min(kTried, all.size() - done));
-        if (take_best(sample, {first, first + count})) break;
-      }
-      if (done >= all.size()) merged_at_ = history_.size();
-      done = 0;
+      const std::vector<IndexRange> some = ranges_of(std::ssize(all), kTried);
+      if (std::none_of(some.begin(), some.end(), [&](IndexRange range) {
+            const auto first = all.begin() + range.first;
+            return take_best(sample, {first, first + range.count});
+          }))
+        merged_at_ = history_.size();
     }
   }
 

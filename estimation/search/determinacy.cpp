@@ -62,8 +62,7 @@ std::string too_small(const FitProblem& problem, double cost, double removal_cos
   return {};
 }
 
-}  // namespace
-
+/// For messages: "submodel 2 (l=0, n=4, m=3, poles at 120.4, 181 Hz)", counted from 1.
 std::string submodel_name(const FitProblem& problem, const FitParameters& beta, std::size_t i) {
   const SubmodelShape& shape = problem.shapes[i];
   std::string text = fmt::format("submodel {} (l={}, n={}, m={}", i + 1, shape.integrators,
@@ -75,6 +74,8 @@ std::string submodel_name(const FitProblem& problem, const FitParameters& beta, 
     text += fmt::format(", pole{} at {} Hz", poles.size() > 1 ? "s" : "", fmt::join(poles, ", "));
   return text + ")";
 }
+
+}  // namespace
 
 std::string undetermined_numerators(const FitProblem& problem, const FitParameters& beta,
                                     const std::vector<BasisGroup>& groups) {
@@ -105,24 +106,22 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   return fmt::format("the data do not support the numerators of {}", fmt::join(names, " and "));
 }
 
-std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta, double cost,
-                               const ArrowSystem& gn, const std::vector<double>& removal_cost,
-                               const Eigen::MatrixXd& covariance,
-                               const std::vector<Eigen::Index>& frozen,
-                               const std::vector<std::size_t>& held, bool judge_modes) {
+std::string undetermined_poles(const FitProblem& problem, const FitParameters& beta,
+                               const ArrowSystem& gn, const Eigen::MatrixXd& covariance,
+                               bool judge_modes, const FitResult& fit) {
   if (problem.globals() == 0) return {};
-  const Eigen::VectorXd shares = own_shares(gn, frozen);
+  const Eigen::VectorXd shares = own_shares(gn, fit.frozen);
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {
     const Eigen::Index n = problem.shapes[i].order;
     if (is_judged(problem, i, first, judge_modes)) {
       std::string reason;
-      if (std::find(held.begin(), held.end(), i) != held.end())
+      if (fit.is_held(i))
         reason = "a pole is at a bound, where the lines contain no information on it";
       else if (!(shares.segment(first, n).minCoeff() > kSmallestShare))
         reason = "the rest of the model can compensate for a change of its denominator";
       else
-        reason = too_small(problem, cost, removal_cost[i], i);
+        reason = too_small(problem, fit.model.fit.cost, fit.removal_cost[i], i);
       if (reason.empty() && covariance.size() > 0)
         reason = too_uncertain(problem, beta, covariance, i, first);
       if (!reason.empty())

@@ -23,6 +23,7 @@
 #include "estimation/search/residue_rank_test.hpp"
 #include "estimation/start/delay_search.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
+#include "estimation/uncertainty/low_rank_covariance.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 namespace stageid {
@@ -114,22 +115,22 @@ void fill_record(const FitOptions& options, const IterationResult& iteration, do
 ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& options,
                                     const FitProblem& problem, FitParameters& beta,
                                     IterationResult& iteration, FitResult& result) {
-  const bool likelihood = weighs_by_variance(options.weighting);
-  LowRankResult constrained =
-      iterate_low_rank(problem, beta, options, data_noise(frf, options.weighting));
+  ResidueFactors factors(problem, beta, options);
+  IterationResult constrained = iterate_low_rank(problem, beta, factors, options);
   if (options.mode_ranks.empty())
-    result.decisions.push_back(rank_decision(iteration.end_cost, constrained.iteration.end_cost,
-                                             2.0 * static_cast<double>(problem.size()),
-                                             problem.parameters() - constrained.parameters,
-                                             likelihood));
-  result.parameters = constrained.parameters;
-  constrained.iteration.cost.insert(constrained.iteration.cost.begin(), iteration.cost.begin(),
-                                    iteration.cost.end());
-  constrained.iteration.iterations += iteration.iterations;
-  iteration = std::move(constrained.iteration);
-  for (std::size_t i = 0; i < constrained.ranks.size(); ++i)
-    if (constrained.ranks[i] > 0) result.model.submodels[i].residue_rank = constrained.ranks[i];
-  return std::move(constrained.covariance);
+    result.decisions.push_back(rank_decision(
+        iteration.end_cost, constrained.end_cost, 2.0 * static_cast<double>(problem.size()),
+        problem.parameters() - factors.size(), weighs_by_variance(options.weighting)));
+  result.parameters = factors.size();
+  constrained.cost.insert(constrained.cost.begin(), iteration.cost.begin(), iteration.cost.end());
+  constrained.iterations += iteration.iterations;
+  iteration = std::move(constrained);
+  for (std::size_t i = 0; i < factors.ranks().size(); ++i)
+    if (factors.ranks()[i] > 0) result.model.submodels[i].residue_rank = factors.ranks()[i];
+  if (!options.uncertainty || iteration.status == FitStatus::singular) return {};
+  return low_rank_covariance(problem, beta, iteration.end_cost, factors,
+                             data_noise(frf, options.weighting), iteration.frozen,
+                             options.response_variance);
 }
 
 /// Shrinks the residues of modes whose poles are held because noise hides them.
@@ -205,8 +206,7 @@ std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitPara
 
 /// A converged fit becomes undetermined if the data leave a requested submodel undetermined; one that has not
 /// converged gets the reason too.
-void judge(const FitProblem& problem, const FitParameters& beta, double cost,
-           const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& frozen,
+void judge(const FitProblem& problem, const FitParameters& beta, const Eigen::MatrixXd& covariance,
            bool judge_modes, FitResult& result) {
   const bool asked_for =
       judge_modes || std::any_of(result.model.submodels.begin(), result.model.submodels.end(),
@@ -220,8 +220,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, double cost,
   std::string reason = undetermined_numerators(problem, beta, groups);
   if (reason.empty() && !singular) {
     const ArrowSystem gn(problem, beta, groups, FitMethod::gn, ChannelEquationsUse::eliminated);
-    reason = undetermined_poles(problem, beta, cost, gn, result.removal_cost, covariance, frozen,
-                                result.held, judge_modes);
+    reason = undetermined_poles(problem, beta, gn, covariance, judge_modes, result);
   }
   if (reason.empty()) return;
   result.distrust(FitStatus::undetermined, reason);
@@ -275,6 +274,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.held = held_submodels(problem, beta, iteration.frozen);
   result.frozen = iteration.frozen;
   fill_model(frf, options, problem, beta, result);
+  fill_record(options, iteration, relative_rms, result);
   if (options.uncertainty) {
     if (!low_rank && result.status != FitStatus::singular)
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration,
@@ -284,10 +284,8 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     use_covariance(problem, covariance, weighs_by_variance(options.weighting), result);
     if (!low_rank)
       result.residue_ranks = residue_rank_tests(result.model, independent_numbers(frf));
-    judge(problem, beta, iteration.end_cost, covariance.globals, iteration.frozen,
-          options.judge_modes, result);
+    judge(problem, beta, covariance.globals, options.judge_modes, result);
   }
-  fill_record(options, iteration, relative_rms, result);
   return result;
 }
 

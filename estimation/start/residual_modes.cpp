@@ -97,22 +97,12 @@ Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
   return out;
 }
 
-/// A contiguous range of inputs, with all outputs.
-struct InputRange {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
-};
-
 /// Ranges of some hundred channels each, because temporaries must not need as much memory as the data.
-std::vector<InputRange> input_ranges(const FrfEstimate& frf) {
-  const Eigen::Index most = std::max<Eigen::Index>(1, kChannels / frf.n_outputs());
-  std::vector<InputRange> out;
-  for (Eigen::Index u = 0; u < frf.n_inputs(); u += most)
-    out.push_back({u, std::min(most, frf.n_inputs() - u)});
-  return out;
+std::vector<IndexRange> input_ranges(const FrfEstimate& frf) {
+  return ranges_of(frf.n_inputs(), std::max<Eigen::Index>(1, kChannels / frf.n_outputs()));
 }
 
-AdditiveModel of_inputs(const AdditiveModel& model, const InputRange& inputs) {
+AdditiveModel of_inputs(const AdditiveModel& model, const IndexRange& inputs) {
   if (inputs.count == model.n_inputs()) return model;
   AdditiveModel out = model;
   const auto first = model.inputs.names.begin() + inputs.first;
@@ -128,7 +118,7 @@ AdditiveModel of_inputs(const AdditiveModel& model, const InputRange& inputs) {
 
 /// W E; real parts of all lines, then imaginary parts.
 Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
-                                  const Eigen::MatrixXd& weights, const InputRange& inputs) {
+                                  const Eigen::MatrixXd& weights, const IndexRange& inputs) {
   const Eigen::Index N = frf.lines();
   const Eigen::Index first = inputs.first * frf.n_outputs();
   const Eigen::Index rows = inputs.count * frf.n_outputs();
@@ -154,7 +144,7 @@ std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveM
   Eigen::VectorXd raw = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));
   Eigen::VectorXd share = Eigen::VectorXd::Ones(raw.size());
   const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
-  for (const InputRange& inputs : input_ranges(frf)) {
+  for (const IndexRange& inputs : input_ranges(frf)) {
     const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, inputs);
     const auto W = weights.middleRows(inputs.first * frf.n_outputs(), WE.rows());
     for_each_task(threads, blocks, [&](int block) {

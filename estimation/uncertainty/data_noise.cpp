@@ -57,7 +57,7 @@ double residual_scale(double per_degree, bool likelihood) {
 }
 
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                         LineRange lines, SplitMatrix columns) {
+                         IndexRange lines, SplitMatrix columns) {
   Eigen::ArrayXd scale = problem.W->row(c).segment(lines.first, lines.count).transpose();
   if (noise.variance) {
     const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);

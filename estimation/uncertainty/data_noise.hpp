@@ -52,6 +52,6 @@ FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 
 /// Columns of one channel on some lines, times W C^1/2; for correlated_gram().
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                         LineRange lines, SplitMatrix columns);
+                         IndexRange lines, SplitMatrix columns);
 
 }  // namespace stageid

@@ -58,14 +58,14 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
 /// diagonal blocks are those of the channels, which are known.
 std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
                                               const CovarianceParts& known,
-                                              const std::vector<FunctionRange>& ranges) {
+                                              const std::vector<IndexRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   ChannelPairs pairs;
   pairs.channels = problem.channels();
   pairs.lines = noise.correlation.known() ? problem.size() : 0;
   pairs.threads = problem.threads;
-  pairs.columns = [&](Eigen::Index c, LineRange lines) {
+  pairs.columns = [&](Eigen::Index c, IndexRange lines) {
     const auto at = static_cast<std::size_t>(c);
     const Eigen::MatrixXd& inverse = known.channels[at].equations_inverse;
     const auto& [F_re, F_im] = group_of[at]->F;
@@ -73,7 +73,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
                         {F_re.middleRows(lines.first, lines.count) * inverse,
                          F_im.middleRows(lines.first, lines.count) * inverse});
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines) {
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
     return c == d ? SplitMatrix{} : noise.correlation.of_channels(c, d, lines);
   };
   std::vector<Eigen::MatrixXd> out = pair_grams(pairs, ranges);
@@ -83,7 +83,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
 
 std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
                                               const FitResult& result, const FitOptions& options,
-                                              const std::vector<FunctionRange>& ranges) {
+                                              const std::vector<IndexRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
   const std::shared_ptr<const CovarianceParts> parts =
@@ -119,7 +119,7 @@ std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ende
 
 /// The rows of T, d (globals, numerators of the range) / d free parameters, times C times T^T.
 Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
-                           const ResidueFactors& factors, const FunctionRange& range,
+                           const ResidueFactors& factors, const IndexRange& range,
                            const Eigen::MatrixXd& C) {
   const Eigen::Index globals = problem.globals();
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(globals + problem.channels() * range.count, C.cols());
@@ -135,7 +135,7 @@ Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
 
 std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<FunctionRange>& ranges) {
+                                          const std::vector<IndexRange>& ranges) {
   ResidueFactors factors(fit.problem, fit.beta, options);
   factors.project(fit.beta, Eigen::MatrixXd::Ones(fit.problem.channels(), fit.problem.functions()));
   const FitCovariance free =
@@ -143,7 +143,7 @@ std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& f
                           data_noise(frf, options.weighting), result.frozen);
   std::vector<FitCovariance> out;
   if (free.sandwich.size() == 0) return out;
-  for (const FunctionRange& range : ranges)
+  for (const IndexRange& range : ranges)
     out.push_back({of_factors(fit.problem, fit.beta, factors, range, free.sandwich),
                    of_factors(fit.problem, fit.beta, factors, range, free.likelihood)});
   return out;
@@ -159,10 +159,10 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
   pairs.channels = problem.channels();
   pairs.lines = problem.size();
   pairs.threads = problem.threads;
-  pairs.columns = [&](Eigen::Index c, LineRange lines) {
+  pairs.columns = [&](Eigen::Index c, IndexRange lines) {
     return group_of[static_cast<std::size_t>(c)]->F.middle_rows(lines.first, lines.count);
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, LineRange lines) {
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
     return fit.matrices->between(c, d, lines.first, lines.count);
   };
   const Eigen::Index globals = problem.globals();
@@ -178,7 +178,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
 
 std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
                                               const FitOptions& options,
-                                              const std::vector<FunctionRange>& ranges) {
+                                              const std::vector<IndexRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const double per_degree =
       residual_per_degree(problem, result.model.fit.cost, problem.parameters());
@@ -186,7 +186,7 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
   const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
   if (!inverse.allFinite()) return {};
   std::vector<FitCovariance> out;
-  for (const FunctionRange& range : ranges) {
+  for (const IndexRange& range : ranges) {
     std::vector<Eigen::Index> places = indices(0, problem.globals());
     for (Eigen::Index i = 0; i < problem.channels() * range.count; ++i)
       places.push_back(problem.globals() + problem.channels() * range.first + i);
@@ -197,10 +197,10 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
 }
 
 /// Whether the ranges together have no more numbers than one covariance of kMostParameters.
-bool are_affordable(const FitProblem& problem, const std::vector<FunctionRange>& ranges) {
+bool are_affordable(const FitProblem& problem, const std::vector<IndexRange>& ranges) {
   const auto most = static_cast<double>(kMostParameters);
   double numbers = 0.0;
-  for (const FunctionRange& range : ranges)
+  for (const IndexRange& range : ranges)
     numbers += std::pow(problem.globals() + problem.channels() * range.count, 2);
   return numbers <= most * most;
 }
@@ -213,7 +213,7 @@ bool has_deviations(const FitResult& result) {
 
 std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<FunctionRange>& ranges) {
+                                          const std::vector<IndexRange>& ranges) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (!are_affordable(fit.problem, ranges) ||
       (fit.matrices && fit.problem.parameters() > kMostParameters))
@@ -279,13 +279,12 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
     const BasisGroup& group = *group_of[static_cast<std::size_t>(c)];
     const std::vector<Eigen::Index> own = own_parameters(problem, c);
     const Eigen::MatrixXd C = covariance.sandwich(own, own);
-    for (Eigen::Index first = 0; first < problem.size(); first += kTileLines) {
-      const LineRange lines = {first, std::min(kTileLines, problem.size() - first)};
+    for (const IndexRange lines : ranges_of(problem.size(), kTileLines)) {
       const SplitMatrix of_globals = global_columns(problem, fit.beta, group, c, lines);
       Eigen::MatrixXd re(lines.count, C.rows());
       Eigen::MatrixXd im(lines.count, C.rows());
-      re << of_globals.re, group.F.re.middleRows(first, lines.count);
-      im << of_globals.im, group.F.im.middleRows(first, lines.count);
+      re << of_globals.re, group.F.re.middleRows(lines.first, lines.count);
+      im << of_globals.im, group.F.im.middleRows(lines.first, lines.count);
       const Eigen::MatrixXd half = re * C;
       const Eigen::ArrayXd real = half.cwiseProduct(re).rowwise().sum();
       const Eigen::ArrayXd imaginary = (im * C).cwiseProduct(im).rowwise().sum();
@@ -293,8 +292,8 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
       for (Eigen::Index i = 0; i < lines.count; ++i) {
         const double variance = std::max(real[i] + imaginary[i], 0.0);
         const double relation = std::hypot(real[i] - imaginary[i], 2.0 * between[i]);
-        covariance.response_variance(c, first + i) = variance;
-        covariance.response_radius(c, first + i) =
+        covariance.response_variance(c, lines.first + i) = variance;
+        covariance.response_radius(c, lines.first + i) =
             std::sqrt(variance) * quantile(variance > 0.0 ? relation / variance : 0.0);
       }
     }
@@ -310,7 +309,7 @@ bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel&
 
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<FunctionRange>& ranges) {
+                                             const std::vector<IndexRange>& ranges) {
   if (!has_deviations(result)) return {};
   return covariances_of(frf, ended_fit(frf, result, options), result, options, ranges);
 }
@@ -344,8 +343,8 @@ double error_quantile_95(double relation) {
   return 0.5 * (low + high);
 }
 
-std::vector<FunctionRange> functions_of_submodels(const AdditiveModel& model) {
-  std::vector<FunctionRange> out;
+std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model) {
+  std::vector<IndexRange> out;
   Eigen::Index next = 0;
   for (const Submodel& s : model.submodels) {
     out.push_back({next, static_cast<Eigen::Index>(s.numerator.size())});
@@ -354,9 +353,9 @@ std::vector<FunctionRange> functions_of_submodels(const AdditiveModel& model) {
   return out;
 }
 
-FunctionRange all_functions(const AdditiveModel& model) {
-  FunctionRange out;
-  for (const FunctionRange& range : functions_of_submodels(model)) out.count += range.count;
+IndexRange all_functions(const AdditiveModel& model) {
+  IndexRange out;
+  for (const IndexRange& range : functions_of_submodels(model)) out.count += range.count;
   return out;
 }
 

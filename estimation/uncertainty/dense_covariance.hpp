@@ -24,7 +24,7 @@ bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel&
 /// @returns empty if the fit has no standard deviations, or the ranges exceed kMostParameters
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<FunctionRange>& ranges);
+                                             const std::vector<IndexRange>& ranges);
 
 /// Fills FitResult::covariance, or adds a decision with the reason why there is none.
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
@@ -35,7 +35,7 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
 double error_quantile_95(double relation);
 
 /// The functions of every submodel among those of a channel.
-std::vector<FunctionRange> functions_of_submodels(const AdditiveModel& model);
-FunctionRange all_functions(const AdditiveModel& model);
+std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model);
+IndexRange all_functions(const AdditiveModel& model);
 
 }  // namespace stageid

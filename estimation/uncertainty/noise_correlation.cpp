@@ -13,7 +13,7 @@ constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channel
 
 /// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined; 1 for a = b. @param C (a, b, line) -> complex
 template <typename Covariance>
-SplitMatrix correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, LineRange lines) {
+SplitMatrix correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, IndexRange lines) {
   SplitMatrix out{Eigen::MatrixXd::Ones(lines.count, 1), Eigen::MatrixXd::Zero(lines.count, 1)};
   for (Eigen::Index i = 0; a != b && i < lines.count; ++i) {
     const Eigen::Index k = lines.first + i;
@@ -47,7 +47,7 @@ class GramOfTiles {
         Y_(X_.size()),
         K_(X_.size()) {}
 
-  void add(LineRange lines) {
+  void add(IndexRange lines) {
     const auto count = static_cast<int>(X_.size());
     for_each_task(problem_.threads, count, [&](int u) { read(u, lines); });
     for_each_task(problem_.threads, count, [&](int u) { multiply(u, lines); });
@@ -66,7 +66,7 @@ class GramOfTiles {
     return correlation_.between_inputs() ? indices(0, n_) : inputs_.parameters[u];
   }
 
-  void read(int u, LineRange lines) {
+  void read(int u, IndexRange lines) {
     OutputColumns& X = X_[static_cast<std::size_t>(u)];
     X.resize(static_cast<std::size_t>(problem_.n_outputs));
     for (std::size_t y = 0; y < X.size(); ++y)
@@ -74,7 +74,7 @@ class GramOfTiles {
     Y_[static_cast<std::size_t>(u)] = correlation_.of_outputs(X, lines);
   }
 
-  OutputColumns with_other_inputs(int u, LineRange lines) const {
+  OutputColumns with_other_inputs(int u, IndexRange lines) const {
     OutputColumns Z(static_cast<std::size_t>(problem_.n_outputs));
     for (SplitMatrix& of_output : Z) of_output.set_zero(lines.count, n_);
     for (std::size_t v = 0; v < Y_.size(); ++v)
@@ -84,7 +84,7 @@ class GramOfTiles {
     return Z;
   }
 
-  void multiply(int u, LineRange lines) {
+  void multiply(int u, IndexRange lines) {
     const auto input = static_cast<std::size_t>(u);
     if (correlation_.between_inputs())
       multiply(input, with_other_inputs(u, lines), lines);
@@ -92,7 +92,7 @@ class GramOfTiles {
       multiply(input, Y_[input], lines);
   }
 
-  void multiply(std::size_t u, const OutputColumns& Z, LineRange lines) {
+  void multiply(std::size_t u, const OutputColumns& Z, IndexRange lines) {
     Eigen::MatrixXd& K = K_[u];
     if (K.size() == 0) K.setZero(X_[u].front().cols(), Z.front().cols());
     for (std::size_t y = 0; y < Z.size(); ++y) {
@@ -113,7 +113,7 @@ class GramOfTiles {
 
 }  // namespace
 
-SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, LineRange lines) const {
+SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, IndexRange lines) const {
   const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
     const Eigen::Index at = a + frf_->n_outputs() * b;
     return std::complex<double>(frf_->residual_covariance_re(at, k),
@@ -122,14 +122,14 @@ SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, LineRange lines)
   return correlation_of(C, y, z, lines);
 }
 
-SplitMatrix NoiseCorrelation::S(Eigen::Index u, Eigen::Index v, LineRange lines) const {
+SplitMatrix NoiseCorrelation::S(Eigen::Index u, Eigen::Index v, IndexRange lines) const {
   const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
     return frf_->input_factor(a + frf_->n_inputs() * b, k);
   };
   return correlation_of(C, u, v, lines);
 }
 
-OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lines) const {
+OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, IndexRange lines) const {
   OutputColumns Y = X;  // the diagonal of R is one
   const Eigen::Index n_y = frf_->n_outputs();
   for (Eigen::Index y = 0; y < n_y; ++y)
@@ -144,7 +144,7 @@ OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, LineRange lin
 }
 
 void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
-                                 const std::vector<Eigen::Index>& at, LineRange lines,
+                                 const std::vector<Eigen::Index>& at, IndexRange lines,
                                  OutputColumns& Z) const {
   const SplitMatrix rho = S(u, v, lines);
   for (std::size_t y = 0; y < Y.size(); ++y)
@@ -152,7 +152,7 @@ void NoiseCorrelation::add_input(Eigen::Index u, Eigen::Index v, const OutputCol
       add_scaled(rho, Y[y], static_cast<Eigen::Index>(p), Z[y], at[p]);
 }
 
-SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, LineRange lines) const {
+SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const {
   const Eigen::Index n_y = frf_->n_outputs();
   const Eigen::Index u = c / n_y;
   const Eigen::Index v = d / n_y;
@@ -169,11 +169,9 @@ Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelatio
                                 Eigen::Index n, const CorrelatedColumns& inputs) {
   GramOfTiles gram(problem, correlation, n, inputs);
   const auto channels = static_cast<Eigen::Index>(inputs.parameters.size()) * problem.n_outputs;
-  const Eigen::Index N = problem.size();
   const Eigen::Index most =
       std::max<Eigen::Index>(8, kTileEntries / std::max<Eigen::Index>(1, n * channels));
-  for (Eigen::Index first = 0; first < N; first += most)
-    gram.add({first, std::min(most, N - first)});
+  for (const IndexRange lines : ranges_of(problem.size(), most)) gram.add(lines);
   return gram.sum();
 }
 

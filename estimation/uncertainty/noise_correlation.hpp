@@ -29,16 +29,16 @@ class NoiseCorrelation {
   }
 
   /// Y_y = sum_z R(y, z) X_z of one input. @pre known()
-  OutputColumns of_outputs(const OutputColumns& X, LineRange lines) const;
+  OutputColumns of_outputs(const OutputColumns& X, IndexRange lines) const;
   /// Z += S(u, v) Y, adding the n columns of Y to the columns `at` of Z. @pre between_inputs()
   void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
-                 const std::vector<Eigen::Index>& at, LineRange lines, OutputColumns& Z) const;
+                 const std::vector<Eigen::Index>& at, IndexRange lines, OutputColumns& Z) const;
   /// (S kron R)(c, d) of two channels on some lines, lines x 1; empty: zero. @pre known()
-  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, LineRange lines) const;
+  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const;
 
  private:
-  SplitMatrix R(Eigen::Index y, Eigen::Index z, LineRange lines) const;
-  SplitMatrix S(Eigen::Index u, Eigen::Index v, LineRange lines) const;
+  SplitMatrix R(Eigen::Index y, Eigen::Index z, IndexRange lines) const;
+  SplitMatrix S(Eigen::Index u, Eigen::Index v, IndexRange lines) const;
 
   const FrfEstimate* frf_ = nullptr;
 };
@@ -49,10 +49,10 @@ struct CorrelatedColumns {
   /// Per input: the parameters of its columns, in order.
   std::vector<std::vector<Eigen::Index>> parameters;
   /// Columns of an output (0-based) of the input first_input + u, lines x parameters[u].
-  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, LineRange lines)> columns;
+  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, IndexRange lines)> columns;
   /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
   /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.
-  std::function<void(Eigen::Index u, LineRange lines, const OutputColumns& Z)> use = {};
+  std::function<void(Eigen::Index u, IndexRange lines, const OutputColumns& Z)> use = {};
 };
 
 /// J^H W C W J = sum_k Re{X^H (S kron R) X}, n x n parameters, in tiles of lines.

@@ -24,7 +24,7 @@ constexpr double kColumnTolerance = 1e-2;
 /// of M_bb^-1 M_ba of the channel.
 SplitMatrix projected_columns(const FitProblem& problem, const FitParameters& beta,
                               const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
-                              LineRange lines) {
+                              IndexRange lines) {
   SplitMatrix out = global_columns(problem, beta, group, c, lines);
   out.re -= group.F.re.middleRows(lines.first, lines.count) * Z;
   out.im -= group.F.im.middleRows(lines.first, lines.count) * Z;
@@ -32,15 +32,12 @@ SplitMatrix projected_columns(const FitProblem& problem, const FitParameters& be
 }
 
 /// Channels whose equations are stored together: all that are correlated with each other.
-std::vector<ChannelRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
+std::vector<IndexRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
   const Eigen::Index together = noise.correlation.between_inputs() ? problem.channels()
                                 : noise.correlation.known()        ? problem.n_outputs
                                                                    : 1;
-  const Eigen::Index most = std::max<Eigen::Index>(1, kMostMembers / together) * together;
-  std::vector<ChannelRange> parts;
-  for (Eigen::Index c = 0; c < problem.channels(); c += most)
-    parts.push_back({c, std::min(most, problem.channels() - c)});
-  return parts;
+  return ranges_of(problem.channels(),
+                   std::max<Eigen::Index>(1, kMostMembers / together) * together);
 }
 
 /// The equations of some channels, M and K = sum Re{J^H W C W J}, with uncorrelated noise of the channels.
@@ -51,7 +48,7 @@ struct PartEquations {
 };
 
 /// K for the globals without the part of their columns that the numerators can follow, J_a - F Z.
-Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) {
+Eigen::MatrixXd projected_middle(const PartEquations& part, IndexRange range) {
   Eigen::MatrixXd K = part.middle().M_globals();
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c) {
     const Eigen::MatrixXd& Z = part.gn.channel(c).Z;
@@ -66,7 +63,7 @@ Eigen::MatrixXd projected_middle(const PartEquations& part, ChannelRange range) 
 /// this part are filled
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<const BasisGroup*>& group_of,
-                                  const PartEquations& part, ChannelRange range,
+                                  const PartEquations& part, IndexRange range,
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
@@ -75,13 +72,13 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   inputs.first_input = range.first / n_y;
   inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y),
                            indices(0, problem.globals()));
-  inputs.columns = [&](Eigen::Index u, Eigen::Index y, LineRange lines) {
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
     const Eigen::Index c = range.first + n_y * u + y;
     return noise_scaled(problem, noise, c, lines,
                         projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)],
                                           part.gn.channel(c).Z, c, lines));
   };
-  inputs.use = [&](Eigen::Index u, LineRange lines, const OutputColumns& Z) {
+  inputs.use = [&](Eigen::Index u, IndexRange lines, const OutputColumns& Z) {
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const Eigen::Index c = range.first + n_y * u + y;
       const auto at = static_cast<std::size_t>(c);
@@ -189,7 +186,7 @@ void resize(const FitProblem& problem, bool with_response, ParameterCovariance& 
 }
 
 /// Calls task(channel) for some channels. @returns whether all calls returned true
-bool fill_channels(ChannelRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
+bool fill_channels(IndexRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
   std::atomic<bool> determined = true;
   for_each_task(threads, static_cast<int>(range.count), [&](int r) {
     if (!task(range.first + r)) determined = false;
@@ -253,11 +250,11 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   const double half = 0.5 * out.residual_scale;
   const bool correlate = problem.globals() > 0 && noise.correlation.known();
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
-  const std::vector<ChannelRange> parts = channel_parts(problem, noise);
+  const std::vector<IndexRange> parts = channel_parts(problem, noise);
   std::optional<FitProblem> weighed;
   if (noise.variance) weighed = middle_problem(problem, noise);
   std::optional<PartEquations> equations;
-  const auto make_equations = [&](ChannelRange part) {
+  const auto make_equations = [&](IndexRange part) {
     equations.emplace(
         PartEquations{ArrowSystem(problem, beta, groups, FitMethod::gn, part), std::nullopt});
     if (weighed)
@@ -269,7 +266,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   Eigen::MatrixXd K = S;
   std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
                                                : std::size_t{0});
-  for (const ChannelRange part : parts) {
+  for (const IndexRange part : parts) {
     make_equations(part);
     if (!equations->gn.regular()) return {};
     S += equations->gn.schur();
@@ -287,7 +284,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
         out.globals, inverse, out.residual_scale,
         std::vector<ChannelCovariance>(static_cast<std::size_t>(problem.channels()))});
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
-  for (const ChannelRange part : parts) {
+  for (const IndexRange part : parts) {
     if (parts.size() > 1) make_equations(part);
     const bool determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
       const ArrowSystem::Channel& gn = equations->gn.channel(c);

@@ -218,8 +218,7 @@ void expect_gradient(const DenseProblem& problem, DelayModel delay) {
               slope_of_cost(problem, 0.5, [&](AdditiveModel& model, double h) {
                 model.submodels[i].numerator[m].reshaped()[c] *= 1.0 + h;
               });
-          EXPECT_NEAR(system.channels()[static_cast<std::size_t>(c)].e[f] * size, expected,
-                      error + 1e-10 * std::abs(expected))
+          EXPECT_NEAR(system.channel(c).e[f] * size, expected, error + 1e-10 * std::abs(expected))
               << "channel " << c << ", function " << f;
         }
     }

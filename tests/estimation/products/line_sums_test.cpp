@@ -58,7 +58,7 @@ TEST(LineSums, SharedSumsOfManyChannelsAreTheChannelsOwn) {
       };
       for (Eigen::Index c = 0; c < fit.channels(); ++c) {
         const ChannelEquations own = channel_equations(shared, beta, groups[0], c);
-        const ArrowSystem::Channel& channel = system.channels()[static_cast<std::size_t>(c)];
+        const ArrowSystem::Channel& channel = system.channel(c);
         expect_same(channel.bb, own.M.topLeftCorner(n_f, n_f));
         expect_same(channel.ab, own.M.bottomLeftCorner(fit.globals(), n_f));
         expect_same(channel.ba, own.M.topRightCorner(n_f, fit.globals()));

@@ -66,6 +66,7 @@ TEST(LikelihoodFit, EndsWhereTheDenseFirstOrderConditionHolds) {
   options.deviation_tolerance = 1e-7;
   const FitResult fit = fit_additive_model(m.frf, m.start(), options);
   ASSERT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_LT(fit.deviations, 1e-3);  // before the last step
   for (std::size_t i = 1; i < fit.cost.size(); ++i) EXPECT_LT(fit.cost[i], fit.cost[i - 1]);
   DenseProblem at = m.problem;
   at.model = fit.model;
