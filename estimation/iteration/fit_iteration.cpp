@@ -21,8 +21,8 @@ constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
 constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step
 constexpr int kTries = 40;
-// A trial whose iteration predicts less than this part of what it must gain is given up. Of the successful trials on 25
-// plants of unknown structure, nine of ten stay above it; without it, the same models result.
+// A trial whose iteration predicts less than this part of what it must gain is given up. On 25 plants of unknown
+// structure, 65 of 73 successful trials stay above it; 24 plants end at the same cost as without it, one at a lower one.
 constexpr double kWorthwhilePart = 1.0 / 3.0;
 // Numerators are re-solved after every step.
 constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;

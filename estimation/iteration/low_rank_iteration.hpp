@@ -6,7 +6,8 @@
 namespace stageid {
 
 /// Minimizes the cost over numerators of given ranks (FitOptions::residue_rank and rigid_body_rank), starting from an
-/// unconstrained fit `beta`, which is updated with its `factors`. Modes outside the lines represent several modes and remain free.
+/// unconstrained fit `beta`, which is updated with its `factors`. Modes outside the lines represent several modes and
+/// remain free.
 /// Method: damped Gauss-Newton on denominators, delays and residue factors together. The unconstrained normal matrix
 /// is multiplied by the derivatives of the factors from both sides, so an iteration costs as much as an unconstrained
 /// one. See docs/theory.md, section 5.
