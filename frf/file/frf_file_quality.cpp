@@ -142,6 +142,11 @@ void write_quality(Hdf5File& file, const FrfEstimate& frf) {
                  [](const DroppedPeriod& one) {
                    return std::array{one.realization, one.experiment, one.period};
                  });
+  write_left_out(
+      file, frf.replaced_samples, "/replaced_samples", "/replaced_reasons",
+      [](const ReplacedSamples& one) {
+        return std::array{one.realization, one.experiment, one.period, one.first, one.samples};
+      });
   write_left_out(file, frf.left_out_realizations, "/left_out_realizations", "/left_out_reasons",
                  [](const LeftOutRealization& one) { return std::array{one.realization}; });
 }
@@ -152,6 +157,10 @@ void read_quality(const Hdf5File& file, FrfEstimate& frf) {
   read_left_out(file, "/dropped_periods", "/dropped_reasons", 3,
                 [&](const std::vector<int>& at, const std::string& reason) {
                   frf.dropped_periods.push_back({at[0], at[1], at[2], reason});
+                });
+  read_left_out(file, "/replaced_samples", "/replaced_reasons", 5,
+                [&](const std::vector<int>& at, const std::string& reason) {
+                  frf.replaced_samples.push_back({at[0], at[1], at[2], at[3], at[4], reason});
                 });
   read_left_out(file, "/left_out_realizations", "/left_out_reasons", 1,
                 [&](const std::vector<int>& at, const std::string& reason) {

@@ -190,10 +190,38 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
   return a < 1 ? 0.0 : log_tail_of_f(ratio, a, 0.5 * dof.core);
 }
 
+/// Samples of a period, from the first to before the end; none if they are equal.
+struct SampleRange {
+  Index first = 0;
+  Index end = 0;
+  void include(const SampleRange& other) {
+    if (other.first == other.end) return;
+    first = first == end ? other.first : std::min(first, other.first);
+    end = std::max(end, other.end);
+  }
+};
+
 struct Excess {
   double ratio = 0.0;  ///< power of the period over that of the core
   double power = 0.0;  ///< of the period's deviation
+  SampleRange where;   ///< the coefficients that cannot be noise
 };
+
+/// The samples of the coefficients whose square has a probability below `log_chance` as that of normal noise.
+SampleRange deviating_samples(const OctaveRecord& octave, const Periods& positions,
+                              const Eigen::VectorXd& deviation, double variance,
+                              double log_chance) {
+  const double least = -2.0 * (log_chance - std::log(static_cast<double>(positions.size())));
+  SampleRange range;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!(deviation[static_cast<Index>(i)] * deviation[static_cast<Index>(i)] > least * variance))
+      continue;
+    const Index first = octave.begin + positions[i] * octave.step;
+    range.include({std::max<Index>(0, first),
+                   std::min(first + octave.length, octave.detail.rows() * octave.step)});
+  }
+  return range;
+}
 
 /// Of p in one octave, if it is significant.
 std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> number,
@@ -218,8 +246,10 @@ std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> nu
   const double alone = degrees_of_freedom(own - mean, {p}, number).period;
   dof = {std::min(dof.period, alone), std::min(dof.core, alone * static_cast<double>(n - 1))};
   if (!(log_tail(ratio, dof) < log_chance)) return std::nullopt;
+  const double variance = scatter * static_cast<double>(n + 1) / static_cast<double>(n * M);
   // The coefficients of an octave have the density of the power in it.
-  return Excess{ratio, deviation / static_cast<double>(M) * (octave.high_hz - octave.low_hz)};
+  return Excess{ratio, deviation / static_cast<double>(M) * (octave.high_hz - octave.low_hz),
+                deviating_samples(octave, positions, own - mean, variance, log_chance)};
 }
 
 /// The record of one channel, samples x periods.
@@ -242,6 +272,7 @@ double log_choices(Index P, std::size_t n) {
 struct Candidate {
   PeriodOutlier outlier;
   double gain = 0.0;
+  SampleRange where;
 };
 
 /// Outlier candidates of one channel.
@@ -263,13 +294,15 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
                                              static_cast<double>(octaves.size()));
   for (Index p = 0; p < P; ++p) {
     if (std::binary_search(core.begin(), core.end(), p)) continue;
-    Candidate most{{static_cast<std::size_t>(p), channel, 0.0, 0.0, 0.0},
-                   mean_ratio(grams, core, p)};
+    Candidate most;
+    most.gain = mean_ratio(grams, core, p);
     double power = 0.0;
     for (const OctaveRecord& octave : octaves) {
       const std::optional<Excess> here =
           excess(octave, periods.number, core, p, std::log(kDropByChance) - log_tests);
-      if (!here || !(here->power > power)) continue;
+      if (!here) continue;
+      if (power == 0.0) most.where = here->where;  // the highest octave
+      if (!(here->power > power)) continue;
       power = here->power;
       most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
                       here->ratio};
@@ -287,15 +320,24 @@ std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods) {
   const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLinesOfBand);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
-    for (const Candidate& candidate : candidates(periods, c, bands))
-      if (candidate.gain > most[candidate.outlier.period].gain)
-        most[candidate.outlier.period] = candidate;
+    for (Candidate& candidate : candidates(periods, c, bands)) {
+      Candidate& of_period = most[candidate.outlier.period];
+      candidate.where.include(of_period.where);
+      if (candidate.gain > of_period.gain)
+        of_period = candidate;
+      else
+        of_period.where = candidate.where;
+    }
   std::erase_if(most, [](const Candidate& candidate) { return candidate.gain == 0.0; });
   std::sort(most.begin(), most.end(),
             [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   most.resize(std::min(most.size(), (P - 1) / 2));
   std::vector<PeriodOutlier> outliers;
-  for (const Candidate& candidate : most) outliers.push_back(candidate.outlier);
+  for (const Candidate& candidate : most) {
+    PeriodOutlier& outlier = outliers.emplace_back(candidate.outlier);
+    outlier.first_sample = candidate.where.first;
+    outlier.samples = candidate.where.end - candidate.where.first;
+  }
   std::sort(outliers.begin(), outliers.end(),
             [](const PeriodOutlier& a, const PeriodOutlier& b) { return a.period < b.period; });
   return outliers;

@@ -22,6 +22,9 @@ struct PeriodOutlier {
   double low_hz = 0.0;       ///< octave with the largest deviation
   double high_hz = 0.0;
   double ratio = 0.0;  ///< its power there over that of the other periods
+  /// The samples that deviate, of any channel, in the highest octave with a significant deviation. None: all of them.
+  Eigen::Index first_sample = 0;
+  Eigen::Index samples = 0;
 };
 
 /// Largest probability that a clean run loses a period.

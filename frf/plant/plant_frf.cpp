@@ -87,7 +87,7 @@ class PlantEstimation {
         R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
       RealizationSpectra spectra(realization.realization, std::move(R), run_workers_.pool());
       measure(m, excitation, health, spectra);
-      note_dropped(realization, spectra);
+      note_spoilt(realization, spectra);
       if (leave_out(realization, spectra)) continue;
       refuse_constant_inputs(realization, spectra, channels_);
       note_quality(realization, spectra);
@@ -223,12 +223,17 @@ class PlantEstimation {
       alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
   }
 
-  void note_dropped(const RealizationRuns& realization, const RealizationSpectra& spectra) {
+  void note_spoilt(const RealizationRuns& realization, const RealizationSpectra& spectra) {
     for (std::size_t e = 0; e < realization.runs.size(); ++e) {
       for (DroppedPeriod dropped : spectra.run(e).dropped) {
         dropped.realization = realization.realization;
         dropped.experiment = realization.runs[e].run().experiment;
         dropped_.push_back(std::move(dropped));
+      }
+      for (ReplacedSamples replaced : spectra.run(e).replaced) {
+        replaced.realization = realization.realization;
+        replaced.experiment = realization.runs[e].run().experiment;
+        replaced_.push_back(std::move(replaced));
       }
     }
   }
@@ -285,6 +290,7 @@ class PlantEstimation {
     frf.hold = Hold::zoh;
     frf.method = options_.method;
     frf.dropped_periods = dropped_;
+    frf.replaced_samples = replaced_;
     std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
                std::back_inserter(frf.left_out_realizations),
                [](const auto& a, const auto& b) { return a.realization < b.realization; });
@@ -329,6 +335,7 @@ class PlantEstimation {
   std::unique_ptr<AlignmentAverage> alignment_;
   std::unique_ptr<FrfProvenance> provenance_;
   std::vector<DroppedPeriod> dropped_;
+  std::vector<ReplacedSamples> replaced_;
   std::vector<LeftOutRealization> left_out_;
   const UsedRun* first_marked_ = nullptr;  // first run without a clean period
   int fewest_periods_ = std::numeric_limits<int>::max();
@@ -372,6 +379,14 @@ bool scatters_less(const FrfEstimate& with_steps, const FrfEstimate& without) {
   return ratio.isFinite().all() && std::exp(ratio.max(kRounding).log().mean()) < kClearlyLess;
 }
 
+/// The periods that were dropped, and those of which samples were replaced. Both are dropped if steps are undone.
+std::vector<DroppedPeriod> spoilt_periods(const FrfEstimate& frf) {
+  std::vector<DroppedPeriod> spoilt = frf.dropped_periods;
+  for (const ReplacedSamples& one : frf.replaced_samples)
+    spoilt.push_back({one.realization, one.experiment, one.period, one.reason});
+  return spoilt;
+}
+
 /// The steps of the actuators, from all realizations. The response of a single one would contain most of their effect.
 /// Each found step makes the others more visible. @param frf of the options' realizations
 std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, FrfOptions options,
@@ -380,7 +395,7 @@ std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, Fr
     options.realizations.clear();
     frf = estimate_once(logs, options, {}, false).frf;
   }
-  EarlierEstimate earlier{{}, frf.dropped_periods};
+  EarlierEstimate earlier{{}, spoilt_periods(frf)};
   while (frf.realizations > 1 && is_suspicious(frf)) {
     const std::vector<ActuatorStep> found =
         find_actuator_steps(runs_of(logs, options, earlier).realizations, frf, options);
@@ -401,7 +416,7 @@ std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, Fr
 FrfAndHealth estimate(const std::vector<const LogReader*>& logs, const FrfOptions& options,
                       bool health_wanted) {
   FrfAndHealth done = estimate_once(logs, options, {}, health_wanted);
-  EarlierEstimate earlier{{}, done.frf.dropped_periods};
+  EarlierEstimate earlier{{}, spoilt_periods(done.frf)};
   try {
     earlier.steps = steps_of(logs, options, done.frf);
   } catch (const FormatError&) {

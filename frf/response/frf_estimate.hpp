@@ -39,6 +39,17 @@ struct DroppedPeriod {
   friend bool operator==(const DroppedPeriod&, const DroppedPeriod&) = default;
 };
 
+/// Samples of a period that were replaced, because they deviate from those of the other periods.
+struct ReplacedSamples {
+  int realization = 0;  ///< 0-based, as the other two
+  int experiment = 0;
+  int period = 0;  ///< index among the periods after the transient ones
+  int first = 0;   ///< sample of the period, 0-based
+  int samples = 0;
+  std::string reason;
+  friend bool operator==(const ReplacedSamples&, const ReplacedSamples&) = default;
+};
+
 /// A realization that was discarded.
 struct LeftOutRealization {
   int realization = 0;  ///< 0-based
@@ -93,6 +104,7 @@ struct FrfEstimate {
   DetectionLines detection;       ///< empty if unknown
   NonlinearityTest nonlinearity;  ///< empty unless there are two periods and two realizations
   std::vector<DroppedPeriod> dropped_periods;
+  std::vector<ReplacedSamples> replaced_samples;
   std::vector<LeftOutRealization> left_out_realizations;
   std::vector<std::string> excluded_channels;  ///< actuators outside the sub-plant
   Eigen::VectorXd excluded_power;      ///< their power on excited lines over that of the inputs

@@ -17,8 +17,9 @@ template <>
 inline constexpr std::array kWords<CovarianceKind> = {"diagonal", "full"};
 
 enum class PeriodChoice : std::uint8_t {
-  consistent,  ///< excludes periods with a glitch, a disturbance or a transient; lpm: with a glitch
-  unmarked     ///< all without a marked sample
+  /// Replaces short glitches and excludes periods with a disturbance or a transient; lpm: excludes those with a glitch.
+  consistent,
+  unmarked  ///< all without a marked sample
 };
 template <>
 inline constexpr std::array kWords<PeriodChoice> = {"consistent", "unmarked"};

@@ -97,7 +97,7 @@ void HealthPart::end() {
   start_ = recorder_.finish();
 }
 
-void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
+void HealthPart::take(int period, RunWorkspace& w, const KnownSpectra* known) {
   scan_period(w.samples, drive_, scan_);
   if (recorder_.on() && known != nullptr) {
     recorder_.take(
@@ -119,6 +119,7 @@ void HealthPart::take(RunWorkspace& w, const KnownSpectra* known) {
   }
   transform_others(w, is_known, Z);
   periods_.push_back(std::move(Z));
+  numbers_.push_back(period);
 }
 
 void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_known,
@@ -140,6 +141,14 @@ void HealthPart::leave_out() {
   recorder_.give_up();
 }
 
+void HealthPart::forget(int period, bool start) {
+  if (!start) start_ = RunStart();
+  const auto at = std::find(numbers_.begin(), numbers_.end(), period);
+  if (at == numbers_.end() || periods_.size() == 1) return;
+  periods_.erase(periods_.begin() + (at - numbers_.begin()));
+  numbers_.erase(at);
+}
+
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& w,
                   HealthPart* health, const std::function<void(double bytes)>& read_done,
                   const std::function<const KnownSpectra*(int period)>& take,
@@ -151,7 +160,7 @@ void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWork
   }
   health->begin(run, excitation);
   health->slips_ = for_each_period(
-      run, w, read_done, [&](int p) { health->take(w, take(p)); },
+      run, w, read_done, [&](int p) { health->take(p, w, take(p)); },
       [&](int p, const std::string& why) {
         leave_out(p, why);
         health->leave_out();

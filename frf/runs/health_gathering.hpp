@@ -33,6 +33,10 @@ class HealthPart {
   void watch_start(const UsedRun& run, const std::vector<int>& lines,
                    const std::vector<Eigen::Index>& sensors, RunWorkspace& workspace);
 
+  /// Call after read_periods() for a period that differs from the others by more than noise: it is no evidence about
+  /// wiring and drift. `start`: it may be that of the start's transient.
+  void forget(int period, bool start);
+
  private:
   friend class HealthGathering;
   friend void read_periods(
@@ -42,7 +46,7 @@ class HealthPart {
       const std::function<void(int period, const std::string& why)>& leave_out);
   void begin(const UsedRun& run, const Eigen::MatrixXd& excitation);
   /// Adds the clean period in workspace.samples. Channels that are not in `known` are transformed here.
-  void take(RunWorkspace& workspace, const KnownSpectra* known);
+  void take(int period, RunWorkspace& workspace, const KnownSpectra* known);
   void leave_out();
   void end();
   void transform_others(RunWorkspace& workspace, const std::vector<char>& is_known,
@@ -51,6 +55,7 @@ class HealthPart {
   std::vector<int> lines_;  // empty: no spectra of this run are needed
   std::size_t most_periods_ = std::numeric_limits<std::size_t>::max();  // whose spectra are kept
   std::vector<Eigen::MatrixXcd> periods_;
+  std::vector<int> numbers_;  // of these periods
   std::vector<ChannelScan> scan_;
   std::vector<SampleSlip> slips_;
   DriveMask drive_;

@@ -41,6 +41,7 @@ struct RunSpectra {
   std::string fingerprint;         ///< of the excitation and of every unmarked sample
   /// In order of the periods. The caller sets realization and experiment.
   std::vector<DroppedPeriod> dropped;
+  std::vector<ReplacedSamples> replaced;
   void drop(int period, std::string reason);
   double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }
 };
@@ -85,7 +86,8 @@ struct RunWorkspace {
 class HealthPart;
 
 /// Reads a run period by period and averages. Periods with a marked sample are discarded, and with
-/// PeriodChoice::consistent those that find_outliers() finds among about 16 neighbours.
+/// PeriodChoice::consistent those that find_outliers() finds among about 16 neighbours. If at most a tenth of such a
+/// period deviates, only these samples are replaced (bridge_samples()), and the period is used.
 /// `health`, if not null, receives each period as well; `read_done` receives the bytes read, period by period.
 /// @returns zero periods and only the dropped ones if none is clean
 /// @throws the same as LogReader::read().

@@ -3,10 +3,11 @@
 //   period_study [first seed = 1] [periods per colour = 1000] [method = 0: periodic | 1: lpm]
 //                [channels = 3] [periods per run = 0: 3, 4, 6, 10 and 20 in turn] [colour]
 //
-// Per colour of noise: the clean periods that are dropped, of 1000; the error of the FRF over that of the plain
-// average of the same clean periods; the same with glitches of 5 to 500 standard deviations in every twentieth
-// period (of less than half of a run's), spikes, bumps and steps, in one channel or all; and that without dropping. Errors are rms, on each line
-// relative to the plain clean average; in brackets absolute, which the noisiest lines decide.
+// Per colour of noise: the clean periods that are dropped or changed, of 1000; the error of the FRF over that of the
+// plain average of the same clean periods; the same with glitches of 5 to 500 standard deviations in every twentieth
+// period (of less than half of a run's), spikes, bumps and steps, in one channel or all; and that without dropping.
+// Errors are rms, on each line relative to the plain clean average; in brackets absolute, which the noisiest lines
+// decide.
 #include <fmt/format.h>
 
 #include <array>
@@ -178,7 +179,7 @@ void study(const Colour& colour, const Study& s) {
   FrfOptions check{.method = s.method, .threads = 1};
   Errors clean_plain, clean_check, glitch_plain, glitch_detection;
   int done = 0;
-  std::size_t dropped = 0, spoilt = 0, found = 0;
+  std::size_t dropped = 0, spoilt = 0, found = 0, replaced = 0;
   for (std::size_t run = 0; done < s.wanted; ++run) {
     const int P = s.periods > 0 ? s.periods : kPeriods[run % kPeriods.size()];
     done += P;
@@ -209,7 +210,7 @@ void study(const Colour& colour, const Study& s) {
     clean_plain.add(estimate_plant_frf({&log}, plain), P);
     const FrfEstimate clean = estimate_plant_frf({&log}, check);
     clean_check.add(clean, P);
-    dropped += clean.dropped_periods.size();
+    dropped += clean.dropped_periods.size() + clean.replaced_samples.size();
     if (std::getenv("PERIOD_STUDY_TELL") != nullptr)
       for (const auto& one : clean.dropped_periods)
         fmt::print("  run {} of {} periods: {} {}\n", run, P, one.period, one.reason);
@@ -223,13 +224,15 @@ void study(const Colour& colour, const Study& s) {
     const FrfEstimate glitched = estimate_plant_frf({&log}, check);
     glitch_detection.add(glitched, P);
     found += glitched.dropped_periods.size();
+    replaced += glitched.replaced_samples.size();
   }
-  fmt::print("{:18} {:7} {:9.2f} {:8.3f} ({:.3f}) {:8} {:8} {:9.3f} ({:.3f}) {:9.1f} ({:.1f})\n",
-             colour.name, done, 1e3 * static_cast<double>(dropped) / done,
-             clean_check.relative_to(clean_plain), clean_check.absolute_to(clean_plain), spoilt,
-             found, glitch_detection.relative_to(clean_plain),
-             glitch_detection.absolute_to(clean_plain), glitch_plain.relative_to(clean_plain),
-             glitch_plain.absolute_to(clean_plain));
+  fmt::print(
+      "{:18} {:7} {:9.2f} {:8.3f} ({:.3f}) {:8} {:8} {:8} {:9.3f} ({:.3f}) {:9.1f} ({:.1f})\n",
+      colour.name, done, 1e3 * static_cast<double>(dropped) / done,
+      clean_check.relative_to(clean_plain), clean_check.absolute_to(clean_plain), spoilt, found,
+      replaced, glitch_detection.relative_to(clean_plain),
+      glitch_detection.absolute_to(clean_plain), glitch_plain.relative_to(clean_plain),
+      glitch_plain.absolute_to(clean_plain));
   std::fflush(stdout);
 }
 
@@ -246,8 +249,9 @@ int main(int argc, char** argv) {
   s.channels = number(4, 3);
   s.periods = static_cast<int>(number(5, 0));
   const std::string only = argc > 6 ? argv[6] : "";
-  fmt::print("{:18} {:>7} {:>9} {:>16} {:>8} {:>8} {:>17} {:>15}\n", "noise", "periods",
-             "dropped,‰", "clean error", "glitches", "dropped", "glitched error", "undropped");
+  fmt::print("{:18} {:>7} {:>9} {:>16} {:>8} {:>8} {:>8} {:>17} {:>15}\n", "noise", "periods",
+             "dropped,‰", "clean error", "glitches", "dropped", "replaced", "glitched error",
+             "undropped");
   for (const Colour& colour : kColours)
     if (std::string(colour.name).find(only) != std::string::npos) study(colour, s);
 }

@@ -64,6 +64,7 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
     json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
   json["nonlinearity"] = linearity_json(frf);
   json["dropped_periods"] = dropped_json(frf);
+  json["replaced_samples"] = replaced_json(frf);
   json["left_out_realizations"] = left_out_json(frf);
   return json;
 }
@@ -165,8 +166,8 @@ void frf_command(CLI::App& app, Console& console) {
   add_choice(*command, "--method", flags->method,
              "periodic: means over periods | lpm: whole records, transient modelled");
   add_choice(*command, "--periods", flags->periods,
-             "consistent: discard periods with glitches, bumps or transients (lpm: only "
-             "glitches) | unmarked: use all periods without marked samples");
+             "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
+             "discard periods with glitches) | unmarked: use all periods without marked samples");
   command
       ->add_option("--smooth-covariance", flags->covariance_lines,
                    "odd number of neighbouring lines over which the noise covariance is averaged; "

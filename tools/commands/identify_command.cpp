@@ -362,6 +362,7 @@ Json Identification::summary() const {
                {"modes", modes_json(model_)}};
   json["nonlinearity"] = linearity_json(*frf_);
   json["dropped_periods"] = dropped_json(*frf_);
+  json["replaced_samples"] = replaced_json(*frf_);
   json["left_out_realizations"] = left_out_json(*frf_);
   if (validation_) json["validation"] = validation_json(*validation_);
   if (truth_) json["truth"] = truth_json(*truth_);

@@ -135,7 +135,8 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   choose(v, "method", f.method, kOptional,
          "periodic: means over periods; lpm: whole records, transient modelled");
   choose(v, "periods", f.periods, kOptional,
-         "consistent: discard periods with glitches, bumps or transients (lpm: only glitches); "
+         "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
+         "discard periods with glitches); "
          "unmarked: use all periods without marked samples");
   count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
         "odd number of neighbouring lines over which the noise covariance is averaged");

@@ -147,6 +147,17 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   }
   if (more > 0)
     lines.push_back(fmt::format("... and {} more periods, listed in /dropped_periods", more));
+  for (std::size_t i = 0; i < std::min(frf.replaced_samples.size(), kMostLines); ++i) {
+    const ReplacedSamples& one = frf.replaced_samples[i];
+    lines.push_back(fmt::format(
+        "realization {}, experiment {}: samples {} ... {} of period {} replaced, the others are "
+        "used: {}",
+        one.realization + 1, one.experiment + 1, one.first + 1, one.first + one.samples,
+        one.period + 1, one.reason));
+  }
+  if (frf.replaced_samples.size() > kMostLines)
+    lines.push_back(fmt::format("... and {} more replacements, listed in /replaced_samples",
+                                frf.replaced_samples.size() - kMostLines));
   if (const int starts = runs_with_discarded_start(frf); starts > 0)
     lines.push_back(fmt::format(
         "the first measured period of {} of {} experiments was discarded: the transient was not "
@@ -170,6 +181,18 @@ Json dropped_json(const FrfEstimate& frf) {
                     {"experiment", period.experiment + 1},
                     {"period", period.period + 1},
                     {"reason", period.reason}});
+  return list;
+}
+
+Json replaced_json(const FrfEstimate& frf) {
+  Json list = Json::array();
+  for (const ReplacedSamples& one : frf.replaced_samples)
+    list.push_back({{"realization", one.realization + 1},
+                    {"experiment", one.experiment + 1},
+                    {"period", one.period + 1},
+                    {"first_sample", one.first + 1},
+                    {"samples", one.samples},
+                    {"reason", one.reason}});
   return list;
 }
 

@@ -18,7 +18,8 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf);
 /// odd: p_value and level of the least probable one, or null without such lines.
 nlohmann::ordered_json linearity_json(const FrfEstimate& frf);
 
-/// Excluded realizations and periods with the reasons, one line each; only the first ones of very many periods.
+/// Excluded realizations and periods, and replaced samples, with the reasons, one line each; only the first ones of
+/// very many.
 std::vector<std::string> dropped_lines(const FrfEstimate& frf);
 
 /// [{"realization": 1, "reason": ...}, ...], counted from 1.
@@ -26,5 +27,9 @@ nlohmann::ordered_json left_out_json(const FrfEstimate& frf);
 
 /// [{"realization": 1, "experiment": 1, "period": 3, "reason": ...}, ...], counted from 1.
 nlohmann::ordered_json dropped_json(const FrfEstimate& frf);
+
+/// [{"realization": 1, "experiment": 1, "period": 3, "first_sample": 12, "samples": 6, "reason": ...}, ...], counted
+/// from 1.
+nlohmann::ordered_json replaced_json(const FrfEstimate& frf);
 
 }  // namespace stageid

@@ -67,6 +67,7 @@ FrfEstimate with_quality() {
   frf.nonlinearity.even = {numbered(6, 2, 20.0), numbered(6, 2, 40.0)};
   frf.nonlinearity.odd = {numbered(6, 2, 30.0), numbered(6, 2, 50.0)};
   frf.dropped_periods = {{0, 1, 4, "a marked sample"}, {2, 0, 7, "12 times the scatter"}};
+  frf.replaced_samples = {{1, 0, 2, 345, 6, "9 times the scatter"}};
   frf.left_out_realizations = {{3, "run.slog:/runs/0007: each of its 4 periods"}};
   return frf;
 }
@@ -321,8 +322,9 @@ TEST_F(FrfFile, ARefusedEstimateLeavesNoFile) {
 TEST_F(FrfFile, SpoiltDatasetsAreNamed) {
   for (const char* dataset :
        {"/detection_line", "/detection_power", "/detection_noise", "/detection_runs",
-        "/detection_linear_power", "/dropped_periods", "/left_out_realizations",
-        "/nonlinearity_p_value", "/nonlinearity_settled_p_value", "/nonlinearity_even_level"}) {
+        "/detection_linear_power", "/dropped_periods", "/replaced_samples",
+        "/left_out_realizations", "/nonlinearity_p_value", "/nonlinearity_settled_p_value",
+        "/nonlinearity_even_level"}) {
     write_frf(folder_ / "frf.h5", with_quality());
     test::Hdf5Surgery(folder_ / "frf.h5").reshape(dataset, {7});
     EXPECT_THAT(read_error("frf.h5"), HasSubstr(dataset)) << dataset;

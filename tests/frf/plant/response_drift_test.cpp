@@ -133,5 +133,18 @@ TEST(ResponseDrift, NeitherATransientNorADistortionIsTakenForOne) {
   }
 }
 
+// Beyond three standard deviations the response misleads whoever fits it.
+TEST(ResponseDrift, ADriftThatMisleadsIsAFault) {
+  ModeDrift drift;
+  drift.frequency_hz = 90.0;
+  drift.change = 5e-4;
+  drift.bias = 2.9;
+  EXPECT_EQ(to_finding(drift).severity, Severity::doubt);
+  drift.bias = 3.1;
+  EXPECT_EQ(to_finding(drift).severity, Severity::fault);
+  EXPECT_NE(to_finding(drift).what.find("near 90 Hz a mode moves by +0.05 %"), std::string::npos)
+      << to_finding(drift).what;
+}
+
 }  // namespace test_response_drift
 }  // namespace stageid

@@ -99,6 +99,28 @@ TEST(StepSearch, EqualConvertersAreFoundEqual) {
   EXPECT_GT(found, 30);
 }
 
+// Every command is rounded at once, so the errors of eleven others hide an actuator's own ones. Axes are excited one by
+// one: all commands but one are only those of the controller.
+TEST(StepSearch, TwelveEqualConvertersAreAllFound) {
+  SampledPlant plant = test::sampled_plant(
+      5, 12, {{7.1, 0.1}, {12.3, 0.1}, {23.0, 0.1}, {37.0, 0.1}, {61.0, 0.1}}, 200.0, 0.1);
+  LoopExperiment x = experiment(11);
+  x.axes = 12;
+  const MemoryLog linear = test::simulate_sampled_log(plant, x, 0.0);
+  const Eigen::MatrixXd& u = linear.records[0].actuators;
+  const double step = 0.3 * std::sqrt(u.col(0).squaredNorm() / static_cast<double>(u.rows()));
+  plant.applied = [step](Eigen::Index, double command) {
+    return step * std::round(command / step);
+  };
+  const MemoryLog log = test::simulate_sampled_log(plant, x, 1e-4 * step);
+  const std::vector<ActuatorStep> steps = estimate_plant_frf_and_health({&log}).health.steps;
+  ASSERT_EQ(steps.size(), 12U);
+  for (const ActuatorStep& one : steps) {
+    EXPECT_NEAR(one.step / step, 1.0, 2e-3) << one.actuator;
+    EXPECT_EQ(one.rounding, Rounding::nearest) << one.actuator;
+  }
+}
+
 // The idle actuator of an experiment moves by less than a step: its command is recorded, its force is zero.
 TEST(StepSearch, TheResponseIsThatOfThePlant) {
   const double rms = command_rms();

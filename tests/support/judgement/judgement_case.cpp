@@ -247,7 +247,10 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
       frf.json.contains("nonlinearity") && frf.json["nonlinearity"].value("nonlinear", false);
   if (validation.json.contains("frequency_domain"))
     result["chi_square"] = number(validation.json["frequency_domain"], "chi_square_per_dof");
-  result["dropped"] = frf.json.contains("dropped_periods") ? frf.json["dropped_periods"].size() : 0;
+  result["dropped"] = 0;
+  for (const char* list : {"dropped_periods", "replaced_samples"})
+    if (frf.json.contains(list))
+      result["dropped"] = result["dropped"].get<std::size_t>() + frf.json[list].size();
   result["periods"] = stage.plan().experiments() * (stage.realizations - 1) * stage.periods;
   if (fitted)
     compare(read_model(directory / "model.json"), read_frf(directory / "frf.h5"), stage, plan,

@@ -55,6 +55,7 @@ inline void expect_same(const FrfEstimate& a, const FrfEstimate& b) {
   EXPECT_EQ(a.correlated_lines, b.correlated_lines);
   EXPECT_EQ(a.experiment_noise_ratio, b.experiment_noise_ratio);
   EXPECT_EQ(a.dropped_periods, b.dropped_periods);
+  EXPECT_EQ(a.replaced_samples, b.replaced_samples);
   EXPECT_EQ(a.left_out_realizations, b.left_out_realizations);
   EXPECT_EQ(a.excluded_channels, b.excluded_channels);
   EXPECT_EQ(a.provenance_json, b.provenance_json);

@@ -124,6 +124,11 @@ TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) 
       steps += finding["channel"].get<std::string>() + ": " + finding["figure"].get<std::string>();
   EXPECT_EQ(steps, "a1 a2 a3: 0.1 N, rounded to the nearest");
   EXPECT_LT(summary["truth"]["relative_rms_error"].get<double>(), 0.02);
+  EXPECT_EQ(summary["truth"]["extra_modes_hz"].size(), 0U);
+  for (const json& mode : summary["truth"]["modes"]) {
+    ASSERT_TRUE(mode["found"]) << mode;
+    EXPECT_LT(std::abs(mode["frequency_deviation_in_std"].get<double>()), 4.5) << mode;
+  }
 }
 
 TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {

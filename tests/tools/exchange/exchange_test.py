@@ -148,6 +148,8 @@ class RoundTrips(Case):
                 "nonlinearity_band_hz": np.cumsum(g.uniform(1.0, 2.0, (bands, 2)).ravel()).reshape(bands, 2),
                 "dropped_periods": g.integers(0, 9, (bands, 3)),
                 "dropped_reasons": [f"reason \u00b5{k}" for k in range(bands)],
+                "replaced_samples": g.integers(0, 9, (bands, 5)),
+                "replaced_reasons": [f"glitch {k}" for k in range(bands)],
                 "left_out_realizations": np.arange(bands),
                 "left_out_reasons": [f"run {k}" for k in range(bands)],
             }

@@ -126,6 +126,20 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
   EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, listed in /dropped_periods"));
 }
 
+TEST(DroppedLines, TellWhichSamplesWereReplaced) {
+  FrfEstimate frf;
+  frf.replaced_samples = {{0, 2, 4, 99, 6, "a glitch"}};
+  EXPECT_THAT(dropped_lines(frf),
+              ElementsAre("realization 1, experiment 3: samples 100 ... 105 of period 5 replaced, "
+                          "the others are used: a glitch"));
+  EXPECT_EQ(replaced_json(frf).dump(),
+            R"([{"realization":1,"experiment":3,"period":5,"first_sample":100,"samples":6,)"
+            R"("reason":"a glitch"}])");
+  frf.replaced_samples.resize(13, frf.replaced_samples.front());
+  EXPECT_THAT(dropped_lines(frf),
+              Contains("... and 3 more replacements, listed in /replaced_samples"));
+}
+
 TEST(DroppedLines, SayThatTheTransientLasts) {
   const auto told =
       testing::StartsWith("the first measured period of 3 of 4 experiments was discarded");

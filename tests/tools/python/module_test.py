@@ -184,6 +184,14 @@ class SameAsTheProgram(unittest.TestCase):
         np.testing.assert_array_equal(ours.channel_error.ravel("F"), theirs.pop("channel_error"))
         self.assertEqual(as_json(ours, without="channel_error"), theirs)
 
+    def test_a_model_that_leaves_more_than_noise(self):
+        frf = stageid.read_frf(WORK / "frf.h5")
+        fit = stageid.fit(frf, band_hz=BAND, modes=1)
+        self.assertEqual((fit.trustworthy, fit.status), (False, "unexplained"))
+        found = stageid.validate(fit.model, frf)
+        self.assertIs(found.explained, False)
+        self.assertRegex(found.reason, "^the residual is ")
+
     def test_a_validation_without_variances(self):
         frf = stageid.read_frf(WORK / "frf.h5")
         bare = stageid.Frf(frf.frequency_hz, frf.response, inputs=frf.inputs, outputs=frf.outputs,

@@ -52,7 +52,8 @@ TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
     else
       log = test::simulate_faulty_log(request, planted.fault);
     if (log.log_runs.empty()) continue;  // the loop did not hold: nothing was measured
-    const auto findings = check_health(estimate_plant_frf_and_health({&log}).health, nominal);
+    FrfAndHealth both = estimate_plant_frf_and_health({&log});
+    const auto findings = examine(both.frf, std::move(both.health), nominal);
     const test::Judgement judgement = test::judge(planted, findings, log.log_info);
     EXPECT_TRUE(judgement.named) << planted.name << " of " << planted.expected_channel << "\n"
                                  << told(findings);

@@ -22,10 +22,10 @@ std::vector<std::string> words_in(const char* text) {
 /// The datasets by their number of axes; 0: texts.
 constexpr const char* kDatasets[] = {
     "inputs outputs excluded_channels provenance detection_groups dropped_reasons "
-    "left_out_reasons",
+    "replaced_reasons left_out_reasons",
     "frequency_hz input_condition interpolation_misfit excluded_power detection_frequency_hz "
     "detection_line detection_runs nonlinearity_settled_p_value left_out_realizations",
-    "detection_noise nonlinearity_band_hz dropped_periods",
+    "detection_noise nonlinearity_band_hz dropped_periods replaced_samples",
     "response noise_variance total_variance covariance residual_covariance input_factor "
     "detection_power detection_linear_power nonlinearity_p_value nonlinearity_distortion "
     "nonlinearity_even_p_value nonlinearity_even_level nonlinearity_odd_p_value "

@@ -539,7 +539,8 @@ def frf(
     covariance
         'diagonal' or 'full'.
     periods
-        'consistent' discards outliers ('lpm': periods with a glitch); 'unmarked' uses all unmarked periods.
+        'consistent' replaces short glitches and discards other outliers ('lpm': discards periods with a glitch);
+        'unmarked' uses all unmarked periods.
     covariance_lines
         Odd number of lines over which the noise covariance is smoothed.
     health
