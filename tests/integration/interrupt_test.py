@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Ctrl-C at any moment, a closed terminal: every command ends by itself or with 130 and one line, an output is there whole or not
 at all, nothing else is left behind, and an interrupted run goes on to the same log.
 
@@ -17,6 +17,9 @@ import sys
 import time
 import unittest
 
+import h5py
+import numpy as np
+
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SMALL = "configs/experiment/small_stage.yaml"
 # In order: each uses the output of the previous ones. All outputs are identical byte for byte in every run.
@@ -31,6 +34,15 @@ COMMANDS = {
 }
 # From before main() to after the end of most commands, in steps that cover everything in between.
 DELAYS_S = [0.0, 0.003, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12]
+
+# Writes lines into a pipe until nobody reads them.
+ENDLESS = """
+import sys, time
+with open(sys.argv[1], "w") as pipe:
+    while True:
+        pipe.write("- 1.0,2.0,3.0\\n" * 200)
+        time.sleep(0.005)
+"""
 
 
 def run(*words, interrupt_after_s=None, by=signal.SIGINT, start=None):
@@ -98,35 +110,66 @@ class InterruptTest(unittest.TestCase):
                     (WORK / new).unlink()
         self.assertIn(0, ends)
 
-    def test_every_command_ends_at_the_first_signal(self):
-        """A file that never comes to its end: the first signal ends whoever reads it."""
-        for ending, words in {".yaml": ["config", "check"], ".slog": ["log", "verify"], ".csv": ["import"],
-                              ".json": ["report", "-o", "x.html"]}.items():
+    def test_every_command_that_reads_ends_at_the_first_signal(self):
+        """A file that never comes to its end."""
+        for ending, words in {".yaml": ["config", "check"], ".csv": ["import"], ".json": ["report", "-o", "x.html"]}.items():
             for by in (signal.SIGINT, signal.SIGTERM):
                 with self.subTest(words, by=by):
                     pipe = WORK / f"endless{ending}"
                     os.mkfifo(pipe)
                     before = files()
+                    writer = subprocess.Popen([sys.executable, "-c", ENDLESS, pipe], stderr=subprocess.DEVNULL)
                     try:
                         begun = time.monotonic()
-                        code, error = run(*words, str(pipe), interrupt_after_s=1.0, by=by)
-                        self.assertIn(code, (1, 2, 130), error)  # 1, 2: not a valid file
-                        if code == 130:
-                            self.assertRegex(error.strip().splitlines()[-1], "^stageid: interrupted; ")
+                        code, error = run(*words, str(pipe), interrupt_after_s=1.5, by=by)
                         self.assertLess(time.monotonic() - begun, 30.0)
+                        self.assertEqual(code, 130, error)
+                        self.assertRegex(error.strip().splitlines()[-1], "^stageid: interrupted; ")
                         self.assertEqual(files(), before)
                     finally:
+                        writer.kill()
+                        writer.wait()
                         pipe.unlink()
 
-    def test_a_long_fit_and_a_long_design_end_at_the_first_signal(self):
+    def test_a_long_design_ends_at_the_first_signal(self):
         slow = WORK / "configs/experiment/slow.yaml"
         slow.write_text((WORK / SMALL).read_text().replace("seed: 7", "seed: 7\n  crest_iterations: 100000"))
         for by in (signal.SIGINT, signal.SIGTERM):
+            for words, output in ((["design", str(slow)], "slow.h5"), (["identify", str(slow)], "slow")):
+                with self.subTest(words[0], by=by):
+                    code, error = run(*words, "-o", output, interrupt_after_s=1.5, by=by)
+                    self.assertEqual(code, 130, error)
+                    self.assertIn("stageid: interrupted; ", error)
+                    self.assertFalse((WORK / "slow.h5").exists())
+                    shutil.rmtree(WORK / "slow", ignore_errors=True)
+
+    def test_a_long_search_writes_its_best_model_at_the_first_signal(self):
+        """Sixty modes of four sensors and four actuators, closer than their widths: the search takes minutes."""
+        random = np.random.default_rng(3)
+        f = np.linspace(20.0, 900.0, 1500)
+        G = np.zeros((len(f), 4, 4), complex)
+        for hz in np.sort(random.uniform(30.0, 890.0, 60)):
+            shape = random.standard_normal((4, 4)) + 1j * random.standard_normal((4, 4))
+            G += shape / (hz**2 - f**2 + 0.06j * hz * f)[:, None, None]
+        G += 1e-4 * np.abs(G).mean() * (random.standard_normal(G.shape) + 1j * random.standard_normal(G.shape))
+        with h5py.File(WORK / "dense.h5", "w") as file:
+            file.attrs.update({"format": "stageid-frf", "format_version": 1, "sample_rate_hz": 0.0, "hold": "none",
+                               "compensated": "none", "delay_s": 0.0})
+            file["frequency_hz"], file["response"] = f, G
+            file["noise_variance"] = np.full(G.shape, 2e-8 * np.abs(G).mean() ** 2)
+            for name, unit in (("inputs", "N"), ("outputs", "m")):
+                file.create_dataset(name, data=[f"{name[0]}{i}" for i in range(4)], dtype=h5py.string_dtype())
+                file[name].attrs["unit"] = unit
+        for by in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(by=by):
-                code, error = run("design", str(slow), "-o", "slow.h5", interrupt_after_s=1.5, by=by)
+                code, error = run("fit", "dense.h5", "-o", "best.json", "--search-seconds", "0", interrupt_after_s=4.0,
+                                  by=by)
                 self.assertEqual(code, 130, error)
-                self.assertIn("stageid: interrupted; nothing was written", error)
-                self.assertFalse((WORK / "slow.h5").exists())
+                model = json.loads((WORK / "best.json").read_text())
+                self.assertEqual(model["fit"]["status"], "interrupted")
+                self.assertTrue(model["submodels"])
+                self.assertTrue(model["provenance"]["decisions"])
+                (WORK / "best.json").unlink()
 
     def cut_and_resume(self, delay_s):
         for path in WORK.glob("cut.*"):

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <memory>
 
 #include "acquisition/loop/run_experiment.hpp"
@@ -87,6 +88,16 @@ TEST_F(RunExperimentEvents, AStopIsToldWithItsReasonAndCycle) {
   const auto stops = told("stop");
   ASSERT_EQ(stops.size(), 1U);
   EXPECT_THAT(stops[0], HasSubstr(R"("cycle":141,"reason":"limit")"));
+}
+
+TEST_F(RunExperimentEvents, ATripOfThePlantIsToldAsSuch) {
+  make_stage();
+  std::atomic<bool> tripped = false;
+  inner_->raise = {{150, &tripped}};
+  measure({.plant_tripped = &tripped, .plant_reason = [] { return std::string("too hot"); }});
+  const auto stops = told("stop");
+  ASSERT_EQ(stops.size(), 1U);
+  EXPECT_THAT(stops[0], HasSubstr(R"("reason":"plant")"));
 }
 
 TEST_F(RunExperimentEvents, ObserversSeeEveryRowOfEveryRun) {

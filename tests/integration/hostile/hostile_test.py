@@ -70,6 +70,10 @@ def matrix(kind, shape, name, *parts):
                    + element(1, name) + b"".join(parts))
 
 
+# What only a library or a bug would say.
+LIBRARY_TEXT = r"json\.exception|basic_|vector::|std::|a bug in stageid"
+
+
 class Case(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -84,13 +88,14 @@ class Case(unittest.TestCase):
         done = run(*arguments)
         self.assertEqual(done.returncode, code, (arguments, done.stderr[-300:]))
         self.assertRegex(done.stderr.strip().splitlines()[-1], r"^stageid: .*" + says)
-        self.assertNotRegex(done.stderr, r"json\.exception|basic_|vector::|std::|a bug in stageid")
+        self.assertNotRegex(done.stderr, LIBRARY_TEXT)
         return done
 
     def ends(self, *arguments):
         """Whatever the answer, it is one, and not a crash."""
         done = run(*arguments)
         self.assertIn(done.returncode, (0, 1, 2, 3), (arguments, done.returncode, done.stderr[-300:]))
+        self.assertNotRegex(done.stderr, LIBRARY_TEXT)
         return done
 
     def flipped(self, name, to, places, bytes_each):
