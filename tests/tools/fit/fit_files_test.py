@@ -39,14 +39,14 @@ def circular(random, shape):
     return (random.standard_normal(shape) + 1j * random.standard_normal(shape)) / np.sqrt(2)
 
 
-def write_frf(name, f, G, variance=None, **attributes):
+def write_frf(name, f, G, variance=None, units=("N", "m"), **attributes):
     with h5py.File(WORK / name, "w") as h:
         h.attrs.update({"format": "stageid-frf", "format_version": 1, "sample_rate_hz": 0.0, "hold": "none",
                         "compensated": "none", "delay_s": 0.0, **attributes})
         h["frequency_hz"], h["response"] = f, G
         if variance is not None:
             h["noise_variance"] = np.broadcast_to(variance, G.shape)
-        for name, unit, n in (("inputs", "N", N_U), ("outputs", "m", N_Y)):
+        for name, unit, n in (("inputs", units[0], G.shape[2]), ("outputs", units[1], G.shape[1])):
             h.create_dataset(name, data=[f"{name[0]}{i}" for i in range(n)], dtype=h5py.string_dtype())
             h[name].attrs["unit"] = unit
 
@@ -304,6 +304,61 @@ class CoarseLines(unittest.TestCase):
         write_frf("fine.h5", f, G + 10 * sd * circular(random, G.shape), sd**2, realizations=1)
         fit("fine.h5", "-o", "model.json", "--modes", "120,250")
         self.assertEqual(model()["fit"]["weighting"], "total_variance")
+
+
+class FilesOfOthers(unittest.TestCase):
+    """Structures that the defaults do not describe, without any flag: the search ends by itself, with the true modes."""
+
+    def found(self, f, G, sd, true_hz, units, seed):
+        write_frf("others.h5", f, G + sd * circular(np.random.default_rng(seed), G.shape), sd**2, units)
+        fit("others.h5", "-o", "model.json")
+        modes = [m for m in modes_of(model()) if f[0] < m["natural_frequency_hz"] < f[-1]]
+        np.testing.assert_equal(len(modes), len(true_hz))
+        for mode, hz in zip(sorted(modes, key=lambda m: m["natural_frequency_hz"]), true_hz):
+            self.assertLess(abs(mode["natural_frequency_hz"] - hz), 4.5 * mode["natural_frequency_std_hz"], mode)
+
+    def test_an_impact_test_of_five_accelerometers(self):
+        for seed in (11, 12, 13):
+            with self.subTest(seed=seed):
+                random = np.random.default_rng(seed)
+                f = np.arange(5.0, 800.0, 0.5)
+                s = 2j * np.pi * f[:, None, None]
+                true_hz = np.sort(random.uniform(20.0, 780.0, 14))
+                G = 0.0
+                for w in 2.0 * np.pi * true_hz:
+                    zeta = random.uniform(0.002, 0.02)
+                    G = G + random.standard_normal((5, 1)) * w * s**2 / (s**2 + 2.0 * zeta * w * s + w**2)
+                sd = 0.02 * np.abs(G).mean() * (1.0 + 20.0 / f)[:, None, None] * np.ones(G.shape)
+                self.found(f, G, sd, true_hz, ("N", "m/s^2"), seed)
+
+    def test_a_beam_with_complex_modes_and_a_delay(self):
+        for seed in (21, 22, 23):
+            with self.subTest(seed=seed):
+                random = np.random.default_rng(seed)
+                f = np.arange(10.0, 1000.0, 0.625)
+                s = 2j * np.pi * f[:, None, None]
+                true_hz = np.array([31.0, 86.0, 169.0, 279.0, 417.0, 582.0, 775.0])
+                G = 0.0
+                for hz in (*true_hz, 1094.5):
+                    zeta = random.uniform(0.004, 0.01)
+                    pole = 2.0 * np.pi * hz * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+                    residue = 1j * np.outer(random.standard_normal(2), random.standard_normal(2)) \
+                        * np.exp(0.2j * random.standard_normal((2, 2)))
+                    G = G + residue / (s - pole) + residue.conj() / (s - np.conj(pole))
+                G = G * s**2 * np.exp(-3e-4 * s)
+                self.found(f, G, 0.01 * np.abs(G).mean() * np.ones(G.shape), true_hz, ("N", "m/s^2"), seed)
+
+    def test_an_actuator_that_was_not_excited(self):
+        random = np.random.default_rng(31)
+        f = np.arange(10.0, 500.0, 0.5)
+        s = 2j * np.pi * f[:, None, None]
+        true_hz = np.array([60.0, 140.0, 230.0, 310.0])
+        G = 0.0
+        for w in 2.0 * np.pi * true_hz:
+            G = G + np.outer(random.standard_normal(3), random.standard_normal(3)) * w / (s**2 + 0.02 * w * s + w**2)
+        G[:, :, 2] = 0.0
+        sd = 1e-3 * np.abs(G).mean() * np.array([1.0, 1.0, 3e3]) * np.ones(G.shape)
+        self.found(f, G, sd, true_hz, ("N", "m"), 31)
 
 
 if __name__ == "__main__":
