@@ -73,7 +73,8 @@ void Examination::check_cycles() {
 void Examination::check_samples() {
   const double limit = std::log(kSignificance / (2.0 * static_cast<double>(record_.scan.size())));
   const auto run_samples =
-      static_cast<double>(record_.periods.empty() ? 1 : record_.periods.front()) *
+      static_cast<double>(record_.periods.empty() ? 1
+                                                  : *std::ranges::max_element(record_.periods)) *
       record_.info.period_samples;
   for (Index c = 0; c < static_cast<Index>(record_.scan.size()); ++c) {
     const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];

@@ -87,11 +87,18 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
 }
 
 int runs_with_discarded_start(const FrfEstimate& frf) {
-  const auto starts = static_cast<int>(
-      std::count_if(frf.dropped_periods.begin(), frf.dropped_periods.end(),
-                    [](const DroppedPeriod& dropped) { return dropped.period == 0; }));
-  const bool most_runs = starts > 1 && 2 * starts > frf.realizations * frf.experiments;
-  return most_runs && 2 * starts > static_cast<int>(frf.dropped_periods.size()) ? starts : 0;
+  int starts = 0;
+  int others = 0;  // dropped periods that do not follow from the start on
+  const DroppedPeriod* last = nullptr;
+  for (const DroppedPeriod& one : frf.dropped_periods) {
+    const bool follows = last != nullptr && one.realization == last->realization &&
+                         one.experiment == last->experiment && one.period == last->period + 1;
+    if (one.period == 0) ++starts;
+    if (one.period > 0 && !follows) ++others;
+    last = one.period == 0 || follows ? &one : nullptr;
+  }
+  return starts > 1 && 2 * starts > frf.realizations * frf.experiments && starts > others ? starts
+                                                                                          : 0;
 }
 
 std::vector<Finding> check_discarded_starts(const FrfEstimate& frf) {

@@ -7,10 +7,9 @@ namespace stageid {
 
 /// Replaces the samples first ... first + count - 1 of one period, in all channels.
 ///
-/// The new samples are the mean of the reference periods, which have the same excitation, plus a straight line
-/// through what this period deviates from them before and after. Slow noise is thereby continued: without the
-/// whole period, the step in it from the end of the period before to the start of the one after would leak into
-/// all lines.
+/// Each becomes the mean of the reference periods, which have the same excitation, plus a straight line. The line joins
+/// the deviations of this period from them just before and just after the gap. If the whole period were dropped, slow
+/// noise would jump from the period before to the one after, and the jump would leak into all lines.
 /// @param periods    samples x channels of each
 /// @param reference  indices of the other periods to compare with, at least one
 /// @pre at least one sample of the period before and after

@@ -214,11 +214,13 @@ SampleRange deviating_samples(const OctaveRecord& octave, const Periods& positio
   const double least = -2.0 * (log_chance - std::log(static_cast<double>(positions.size())));
   SampleRange range;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!(deviation[static_cast<Index>(i)] * deviation[static_cast<Index>(i)] > least * variance))
-      continue;
+    const double here = deviation[static_cast<Index>(i)];
+    if (!(here * here > least * variance)) continue;
+    // Coefficients beyond an end of the period are not compared: a deviation of the last one may go on.
     const Index first = octave.begin + positions[i] * octave.step;
-    range.include({std::max<Index>(0, first),
-                   std::min(first + octave.length, octave.detail.rows() * octave.step)});
+    range.include({i == 0 ? 0 : first, i + 1 == positions.size()
+                                           ? octave.detail.rows() * octave.step
+                                           : first + octave.length});
   }
   return range;
 }
@@ -314,9 +316,10 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
 
 }  // namespace
 
-std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods) {
+PeriodOutliers find_outliers(const ComparedPeriods& periods) {
+  PeriodOutliers result;
   const std::size_t P = periods.spectra.size();
-  if (P < 3) return {};
+  if (P < 3) return result;
   const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLinesOfBand);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
@@ -328,19 +331,20 @@ std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods) {
       else
         of_period.where = candidate.where;
     }
+  for (std::size_t p = 0; p < P; ++p)
+    if (most[p].gain == 0.0) result.consistent.push_back(p);
   std::erase_if(most, [](const Candidate& candidate) { return candidate.gain == 0.0; });
   std::sort(most.begin(), most.end(),
             [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   most.resize(std::min(most.size(), (P - 1) / 2));
-  std::vector<PeriodOutlier> outliers;
   for (const Candidate& candidate : most) {
-    PeriodOutlier& outlier = outliers.emplace_back(candidate.outlier);
+    PeriodOutlier& outlier = result.found.emplace_back(candidate.outlier);
     outlier.first_sample = candidate.where.first;
     outlier.samples = candidate.where.end - candidate.where.first;
   }
-  std::sort(outliers.begin(), outliers.end(),
+  std::sort(result.found.begin(), result.found.end(),
             [](const PeriodOutlier& a, const PeriodOutlier& b) { return a.period < b.period; });
-  return outliers;
+  return result;
 }
 
 }  // namespace stageid

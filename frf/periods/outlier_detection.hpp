@@ -27,10 +27,15 @@ struct PeriodOutlier {
   Eigen::Index samples = 0;
 };
 
+struct PeriodOutliers {
+  std::vector<PeriodOutlier> found;     ///< ascending periods
+  std::vector<std::size_t> consistent;  ///< periods without a deviation in any channel, ascending
+};
+
 /// Largest probability that a clean run loses a period.
 inline constexpr double kDropByChance = 1e-3;
 
-/// Finds periods with a glitch, a disturbance or a transient, in ascending order (docs/theory.md, section 3).
+/// Finds periods with a glitch, a disturbance or a transient (docs/theory.md, section 3), at most (P - 1) / 2 of P.
 ///
 /// In each channel, the closest majority of the periods is the core. The next closest period joins the core as
 /// long as this reduces the variance of the mean. With n clean periods and one with g times their noise, the
@@ -47,6 +52,6 @@ inline constexpr double kDropByChance = 1e-3;
 /// with S smoothed to the resolution of one period for the period, and unsmoothed for the core.
 /// Three periods are needed: of two, either could be wrong.
 /// Source: Satterthwaite, Biometrics Bulletin 2 (1946) 110.
-std::vector<PeriodOutlier> find_outliers(const ComparedPeriods& periods);
+PeriodOutliers find_outliers(const ComparedPeriods& periods);
 
 }  // namespace stageid

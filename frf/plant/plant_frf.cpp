@@ -187,6 +187,7 @@ class PlantEstimation {
                                workspace, part, read_done)
               : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
                             options_.periods, workspace, part, read_done);
+      if (part != nullptr) part->forget_deviating(run);
       const std::lock_guard lock(mutex);
       spectra.add(e, std::move(run));
     });
@@ -347,7 +348,7 @@ class PlantEstimation {
 ChosenRuns runs_of(const std::vector<const LogReader*>& logs, const FrfOptions& options,
                    const EarlierEstimate& earlier) {
   ChosenRuns chosen = choose_runs(logs, options);
-  if (earlier.steps.empty()) return chosen;
+  if (earlier.steps.empty() && earlier.dropped.empty()) return chosen;
   for (RealizationRuns& realization : chosen.realizations)
     for (UsedRun& run : realization.runs) run.earlier = &earlier;
   return chosen;

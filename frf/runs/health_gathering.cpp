@@ -141,12 +141,16 @@ void HealthPart::leave_out() {
   recorder_.give_up();
 }
 
-void HealthPart::forget(int period, bool start) {
-  if (!start) start_ = RunStart();
-  const auto at = std::find(numbers_.begin(), numbers_.end(), period);
-  if (at == numbers_.end() || periods_.size() == 1) return;
-  periods_.erase(periods_.begin() + (at - numbers_.begin()));
-  numbers_.erase(at);
+void HealthPart::forget_deviating(const RunSpectra& run) {
+  int of_start = 0;
+  for (const int period : run.deviating) {
+    if (period == of_start) ++of_start;
+    const auto at = std::find(numbers_.begin(), numbers_.end(), period);
+    if (at == numbers_.end() || periods_.size() == 1) continue;
+    periods_.erase(periods_.begin() + (at - numbers_.begin()));
+    numbers_.erase(at);
+  }
+  if (of_start < std::ssize(run.deviating) || !run.replaced.empty()) start_ = RunStart();
 }
 
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& w,

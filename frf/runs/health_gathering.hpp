@@ -33,9 +33,9 @@ class HealthPart {
   void watch_start(const UsedRun& run, const std::vector<int>& lines,
                    const std::vector<Eigen::Index>& sensors, RunWorkspace& workspace);
 
-  /// Call after read_periods() for a period that differs from the others by more than noise: it is no evidence about
-  /// wiring and drift. `start`: it may be that of the start's transient.
-  void forget(int period, bool start);
+  /// Call after read_periods(): periods that differ from the others are no evidence about wiring and drift. The last one
+  /// is kept in any case. What is known of the start's transient is kept if only the first periods were dropped.
+  void forget_deviating(const RunSpectra& run);
 
  private:
   friend class HealthGathering;

@@ -18,7 +18,7 @@
 namespace stageid {
 
 /// Spectra (DFT / number of samples) of all channels of a log on one line, for all clean periods of all experiments
-/// of one realization.
+/// of one realization. An estimate leaves out those that differ from the others.
 struct LineRecord {
   Eigen::MatrixXcd R;  ///< n_r x E: every excitation channel
   Eigen::MatrixXcd Z;  ///< [Y; U], n_y + n_u x columns: one per period, ordered by experiment

@@ -104,6 +104,7 @@ class RecordMeasurement {
       const int end = segment_.periods;
       for (const Glitch& glitch : glitches) {
         settle(part(begin, glitch.period));
+        run_.deviating.push_back(segment_.first + glitch.period);
         run_.drop(segment_.first + glitch.period,
                   fmt::format("a glitch: {} deviates by {:.3g} times the surrounding noise",
                               channels_.name(used_.log->info(), glitch.channel), glitch.ratio));

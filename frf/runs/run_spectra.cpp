@@ -1,15 +1,12 @@
 #include "frf/runs/run_spectra.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <numeric>
+#include <iterator>
 #include <optional>
-#include <span>
+#include <utility>
 
-#include "frf/periods/bridge.hpp"
-#include "frf/periods/outlier_detection.hpp"
 #include "frf/runs/health_gathering.hpp"
+#include "frf/runs/period_comparison.hpp"
 #include "frf/runs/run_steps.hpp"
 
 namespace stageid {
@@ -17,16 +14,17 @@ namespace {
 
 /// Largest number of periods that are compared and averaged together; limits the memory for their spectra.
 constexpr int kMostTogether = 16;
-/// Largest part of a period that is replaced. Replaced samples have less noise, so the scatter of at least three periods
-/// is at most 1/30 too small.
-constexpr Eigen::Index kPeriodPerGap = 10;
 
 /// One run in progress.
 class RunMeasurement {
  public:
   RunMeasurement(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
                  PeriodChoice choice, RunWorkspace& workspace)
-      : used_(used), lines_(lines), channels_(channels), w_(workspace) {
+      : used_(used),
+        lines_(lines),
+        channels_(channels),
+        w_(workspace),
+        comparison_(used, lines, channels, workspace) {
     // Groups of equal size: outliers cannot be found in a last group of one or two periods.
     const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
     together_ = (used.periods + groups - 1) / groups;
@@ -56,7 +54,7 @@ class RunMeasurement {
     line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
     line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
                  std::ssize(channels_.outputs), w_.dft, spectra);
-    if (compare_) keep_samples();
+    if (compare_) comparison_.keep_samples(waiting_.size());
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
       w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
@@ -76,87 +74,17 @@ class RunMeasurement {
   }
 
  private:
-  /// Stores the period in workspace.samples minus the first waiting one, which has the same excitation: the difference
-  /// is noise, for which a float is accurate enough.
-  void keep_samples() {
-    const auto n_y = std::ssize(channels_.outputs);
-    Eigen::MatrixXd& first = w_.first_samples;
-    Eigen::MatrixXf& kept = w_.record[waiting_.size()];
-    kept.resize(w_.dft.length(), run_.mean.rows());
-    first.resize(kept.rows(), kept.cols());
-    for (Eigen::Index c = 0; c < kept.cols(); ++c) {
-      const Eigen::Ref<const Eigen::VectorXd> samples =
-          c < n_y
-              ? w_.samples.sensors.col(channels_.outputs[static_cast<std::size_t>(c)])
-              : w_.samples.actuators.col(channels_.estimated[static_cast<std::size_t>(c - n_y)]);
-      if (waiting_.empty()) first.col(c) = samples;
-      kept.col(c) = (samples - first.col(c)).cast<float>();
-    }
-  }
-
-  /// Which of the waiting periods to use, after short glitches have been replaced.
-  std::vector<char> consistent_periods() {
-    const ComparedPeriods compared{
-        std::span<const Eigen::MatrixXcd>(w_.spectra).first(waiting_.size()),
-        std::span<const Eigen::MatrixXf>(w_.record).first(waiting_.size()), waiting_,
-        frequencies_hz(used_.log->info(), lines_.excited_lines()),
-        used_.log->info().sample_rate_hz};
-    std::vector<ReplacedSamples> replaced(waiting_.size());
-    while (true) {
-      const std::vector<PeriodOutlier> outliers = find_outliers(compared);
-      std::vector<char> in(waiting_.size(), 1);
-      for (const PeriodOutlier& outlier : outliers) in[outlier.period] = 0;
-      bool changed = false;
-      for (const PeriodOutlier& outlier : outliers)
-        changed |= replace(outlier, in, replaced[outlier.period]);
-      if (changed) continue;
-      for (const PeriodOutlier& outlier : outliers)
-        run_.drop(waiting_[outlier.period], reason(outlier));
-      for (std::size_t i = 0; i < in.size(); ++i)
-        if (in[i] != 0 && replaced[i].samples > 0) run_.replaced.push_back(replaced[i]);
-      return in;
-    }
-  }
-
-  /// Replaces the samples that deviate. If this is not enough, the next call replaces at least twice as many.
-  /// @returns false if there would be too many, or if they reach an end of the period; nothing has changed then
-  bool replace(const PeriodOutlier& outlier, const std::vector<char>& in, ReplacedSamples& done) {
-    const Eigen::Index N = w_.dft.length();
-    Eigen::Index first = outlier.first_sample;
-    Eigen::Index end = first + outlier.samples;
-    if (done.samples > 0) {
-      const int more = (done.samples + 1) / 2;
-      first = std::min<Eigen::Index>(first, done.first - more);
-      end = std::max<Eigen::Index>(end, done.first + done.samples + more);
-    }
-    if (outlier.samples == 0 || kPeriodPerGap * (end - first) > N) return false;
-    if (first <= 0 || end >= N) return false;  // not a glitch: it began before, or goes on
-    if (done.samples == 0) {
-      done.period = waiting_[outlier.period];
-      done.reason = reason(outlier);
-    }
-    done.first = static_cast<int>(first);
-    done.samples = static_cast<int>(end - first);
-    std::vector<std::size_t> reference;
-    for (std::size_t i = 0; i < in.size(); ++i)
-      if (in[i] != 0) reference.push_back(i);
-    Eigen::MatrixXf& period = w_.record[outlier.period];
-    Eigen::MatrixXd change = -period.cast<double>();
-    bridge_samples(std::span(w_.record).first(waiting_.size()), reference, outlier.period, first,
-                   end - first);
-    change += period.cast<double>();
-    std::vector<Eigen::Index> all(static_cast<std::size_t>(change.cols()));
-    std::iota(all.begin(), all.end(), Eigen::Index{0});
-    Eigen::MatrixXcd& spectra = w_.spectra[outlier.period];
-    Eigen::MatrixXcd difference(spectra.rows(), spectra.cols());
-    line_spectra(change, all, lines_.lines, 0, w_.dft, difference);
-    spectra += difference;
-    return true;
-  }
-
   void include_waiting() {
-    const std::vector<char> in =
-        compare_ ? consistent_periods() : std::vector<char>(waiting_.size(), 1);
+    std::vector<char> in(waiting_.size(), 1);
+    if (compare_) {
+      PeriodComparison::Result compared = comparison_.settle(waiting_);
+      in = std::move(compared.use);
+      for (const DroppedPeriod& one : compared.dropped) run_.deviating.push_back(one.period);
+      for (const ReplacedSamples& one : compared.replaced) run_.deviating.push_back(one.period);
+      for (DroppedPeriod& one : compared.dropped) run_.drop(one.period, std::move(one.reason));
+      std::move(compared.replaced.begin(), compared.replaced.end(),
+                std::back_inserter(run_.replaced));
+    }
     std::vector<const Eigen::MatrixXcd*> periods;
     std::vector<double> numbers;
     for (std::size_t i = 0; i < waiting_.size(); ++i) {
@@ -246,16 +174,11 @@ class RunMeasurement {
     run_.scatter_im.col(k) = w_.scatter_im;
   }
 
-  std::string reason(const PeriodOutlier& outlier) const {
-    return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
-                       outlier.ratio, channels_.name(used_.log->info(), outlier.channel),
-                       outlier.low_hz, outlier.high_hz);
-  }
-
   const UsedRun& used_;
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
+  PeriodComparison comparison_;
   int together_ = 1;  // periods that are compared and included together
   bool compare_ = true;
   int unmarked_ = 0;
@@ -285,10 +208,6 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   read_periods(used, excitation_period, w, health, read_done, take,
                [&](int p, const std::string& why) { measurement.leave_out(p, why); });
   RunSpectra run = measurement.finish();
-  if (health != nullptr) {
-    for (const ReplacedSamples& one : run.replaced) health->forget(one.period, false);
-    for (const DroppedPeriod& one : run.dropped) health->forget(one.period, one.period == 0);
-  }
   run.fingerprint = fingerprint.hex();
   return run;
 }

@@ -12,7 +12,7 @@
 
 namespace stageid {
 
-/// Spectra Z = [Y; U] of one run on the excited lines: DFT / number of samples, averaged over the clean periods.
+/// Spectra Z = [Y; U] of one run on the excited lines: DFT / number of samples, averaged over the used periods.
 struct RunSpectra {
   Eigen::MatrixXcd mean;  ///< (n_y + n_u) x lines
   /// sum_p (Z_p - Z)(Z_p - Z)^H, lower half: one column per line, entry (i, j <= i) at row i (i + 1) / 2 + j. Empty
@@ -36,12 +36,14 @@ struct RunSpectra {
   /// their number if slow noise leaks into all of them. Empty from a whole record.
   Eigen::MatrixXd common_sum{};
   Eigen::MatrixXd own_sum{};
-  int periods = 0;                 ///< number of clean ones
+  int periods = 0;                 ///< number of those used
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every unmarked sample
   /// In order of the periods. The caller sets realization and experiment.
   std::vector<DroppedPeriod> dropped;
   std::vector<ReplacedSamples> replaced;
+  /// Periods that differ from the others by more than noise: dropped, or with replaced samples.
+  std::vector<int> deviating;
   void drop(int period, std::string reason);
   double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }
 };

@@ -111,7 +111,7 @@ class InterruptTest(unittest.TestCase):
         self.assertIn(0, ends)
 
     def test_every_command_that_reads_ends_at_the_first_signal(self):
-        """A file that never comes to its end."""
+        """A file that never comes to its end. Logs are not among them: they must be regular files."""
         for ending, words in {".yaml": ["config", "check"], ".csv": ["import"], ".json": ["report", "-o", "x.html"]}.items():
             for by in (signal.SIGINT, signal.SIGTERM):
                 with self.subTest(words, by=by):

@@ -147,17 +147,22 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   }
   if (more > 0)
     lines.push_back(fmt::format("... and {} more periods, listed in /dropped_periods", more));
-  for (std::size_t i = 0; i < std::min(frf.replaced_samples.size(), kMostLines); ++i) {
-    const ReplacedSamples& one = frf.replaced_samples[i];
+  told = 0;
+  more = 0;
+  for (const ReplacedSamples& one : frf.replaced_samples) {
+    if (left_out.contains(one.realization)) continue;
+    if (++told > kMostLines) {
+      ++more;
+      continue;
+    }
     lines.push_back(fmt::format(
         "realization {}, experiment {}: samples {} ... {} of period {} replaced, the others are "
         "used: {}",
         one.realization + 1, one.experiment + 1, one.first + 1, one.first + one.samples,
         one.period + 1, one.reason));
   }
-  if (frf.replaced_samples.size() > kMostLines)
-    lines.push_back(fmt::format("... and {} more replacements, listed in /replaced_samples",
-                                frf.replaced_samples.size() - kMostLines));
+  if (more > 0)
+    lines.push_back(fmt::format("... and {} more replacements, listed in /replaced_samples", more));
   if (const int starts = runs_with_discarded_start(frf); starts > 0)
     lines.push_back(fmt::format(
         "the first measured period of {} of {} experiments was discarded: the transient was not "

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "excitation/multisine/dft.hpp"
@@ -95,7 +96,8 @@ struct NoisyRun {
     }
     return find_outliers({spectra, samples, number,
                           Eigen::VectorXd::LinSpaced(kLines, 1.0, static_cast<double>(kLines)),
-                          kSamples});
+                          kSamples})
+        .found;
   }
   std::vector<std::size_t> which() {
     std::vector<std::size_t> periods;
@@ -148,6 +150,8 @@ TEST_P(Colour, GlitchesAreFound) {
       EXPECT_EQ(found[0].channel, 1);
       EXPECT_GT(found[0].ratio, 2.0);
       EXPECT_GT(found[0].high_hz, found[0].low_hz);
+      EXPECT_LE(found[0].first_sample, first + width / 2);
+      EXPECT_GT(found[0].first_sample + found[0].samples, first + width / 2);
     }
   }
 }
@@ -157,6 +161,19 @@ NoisyRun run_with_a_noisy_period(int periods, double factor, std::uint64_t seed)
   NoisyRun run = run_of(white, periods, 1, seed);
   run.samples[1] *= static_cast<float>(std::sqrt(factor));
   return run;
+}
+
+// From the first to the last one of any channel.
+TEST(OutlierDetection, TheDeviatingSamplesAreThoseOfAllChannels) {
+  NoisyRun run = run_of(white, 6, 2, 7);
+  run.add(2, 300, 0, 1000.0);
+  run.add(2, 500, 1, 1000.0);
+  const std::vector<PeriodOutlier> found = run.outliers();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_LE(found[0].first_sample, 300);
+  EXPECT_GE(found[0].first_sample, 290);
+  EXPECT_GT(found[0].first_sample + found[0].samples, 500);
+  EXPECT_LE(found[0].first_sample + found[0].samples, 511);
 }
 
 // For the variance of the mean, n + 1 periods with 2 + 1 / n times the noise in one are as bad as n periods.
@@ -237,56 +254,58 @@ TEST(OutlierDetection, ColouredNoiseCostsNoPeriod) {
   EXPECT_LE(dropped, 3u);  // 300 runs, at most 0.3 expected
 }
 
-/// Squared errors of a response of 1 on 600 lines, for slow noise below 16 Hz in periods of 4000 samples at 8 kHz.
-struct SlowErrors {
-  Eigen::ArrayXd clean_plain = Eigen::ArrayXd::Zero(600);
-  Eigen::ArrayXd clean = clean_plain;
-  Eigen::ArrayXd glitched = clean_plain;
+/// One run of six periods of 4000 samples at 8 kHz, through a gain of 1, with slow noise below 16 Hz.
+MemoryLog slow_log(std::uint64_t seed) {
+  constexpr int kPeriod = 4000;
+  test::ComplexNoise random(seed);
+  RealDft dft(kPeriod);
+  MemoryLog log;
+  log.log_info.sample_rate_hz = 8000.0;
+  log.log_info.period_samples = kPeriod;
+  log.log_info.excitation = log.log_info.actuators = test::channels("a", 1, "N");
+  log.log_info.sensors = test::channels("z", 1, "m");
+  const auto lines = test::line_range(1, 601, 1);
+  Eigen::MatrixXcd R(1, std::ssize(lines));
+  for (auto& value : R.reshaped()) value = random.phase();
+  const Eigen::MatrixXd period = test::synthesize(R, lines, dft);
+  LogSamples record;
+  record.actuators = period.replicate(6, 1);
+  const double hz = 1.0 + 15.0 * random.uniform();
+  record.sensors =
+      record.actuators + resonant(record.actuators.rows(),
+                                  std::exp(std::complex<double>(-1.0, 1.0) * hz / 1800.0), random);
+  log.append(0, 0, period, record);
+  return log;
+}
 
-  /// A run of six periods. A half sine of 10 ms, `deviations` of the noise high, is added to the fourth one.
-  void add(double deviations, std::uint64_t seed) {
-    constexpr int kPeriod = 4000;
-    constexpr int kPeriods = 6;
-    test::ComplexNoise random(seed);
-    RealDft dft(kPeriod);
-    MemoryLog log;
-    log.log_info.sample_rate_hz = 8000.0;
-    log.log_info.period_samples = kPeriod;
-    log.log_info.excitation = log.log_info.actuators = test::channels("a", 1, "N");
-    log.log_info.sensors = test::channels("z", 1, "m");
-    const auto lines = test::line_range(1, 601, 1);
-    Eigen::MatrixXcd R(1, std::ssize(lines));
-    for (auto& value : R.reshaped()) value = random.phase();
-    const Eigen::MatrixXd period = test::synthesize(R, lines, dft);
-    LogSamples record;
-    record.actuators = period.replicate(kPeriods, 1);
-    const double hz = 1.0 + 15.0 * random.uniform();
-    const Eigen::VectorXd noise = resonant(
-        record.actuators.rows(), std::exp(std::complex<double>(-1.0, 1.0) * hz / 1800.0), random);
-    record.sensors = record.actuators + noise;
-    log.append(0, 0, period, record);
-    const FrfOptions plain{.periods = PeriodChoice::unmarked, .threads = 1};
-    add_error(estimate_plant_frf({&log}, plain), clean_plain);
-    add_error(estimate_plant_frf({&log}, {.threads = 1}), clean);
-    for (int n = 0; n < 80; ++n)
-      log.records[0].sensors(3 * kPeriod + 700 + n, 0) +=
-          deviations * 100.0 * std::sin(std::numbers::pi * (n + 0.5) / 80.0);
-    add_error(estimate_plant_frf({&log}, {.threads = 1}), glitched);
-  }
+/// A half sine of 10 ms, `deviations` of that noise high.
+void add_half_sine(MemoryLog& log, Eigen::Index first, double deviations) {
+  for (int n = 0; n < 80; ++n)
+    log.records[0].sensors(first + n, 0) +=
+        deviations * 100.0 * std::sin(std::numbers::pi * (n + 0.5) / 80.0);
+}
 
-  static void add_error(const FrfEstimate& frf, Eigen::ArrayXd& squares) {
-    squares += (frf.response.row(0).transpose().array() - 1.0).abs2();
-  }
-};
+Eigen::ArrayXd squared_errors(const MemoryLog& log, PeriodChoice periods) {
+  const FrfEstimate frf = estimate_plant_frf({&log}, {.periods = periods, .threads = 1});
+  return (frf.response.row(0).transpose().array() - 1.0).abs2();
+}
 
 // Slow noise leaks into all lines; the leakage of neighbouring periods cancels in their mean, so a dropped period costs
 // more than its share.
 TEST(OutlierDetection, SlowNoiseAndItsGlitchesCostNoAccuracy) {
   for (const double deviations : {5.0, 50.0, 500.0}) {
-    SlowErrors errors;
-    for (std::uint64_t seed = 1; seed <= 26; ++seed) errors.add(deviations, seed);
-    EXPECT_LE((errors.clean / errors.clean_plain).sqrt().mean(), 1.01) << deviations;
-    EXPECT_LE((errors.glitched / errors.clean_plain).sqrt().mean(), 1.1) << deviations;
+    Eigen::ArrayXd plain = Eigen::ArrayXd::Zero(600);
+    Eigen::ArrayXd clean = plain;
+    Eigen::ArrayXd glitched = plain;
+    for (std::uint64_t seed = 1; seed <= 26; ++seed) {
+      MemoryLog log = slow_log(seed);
+      plain += squared_errors(log, PeriodChoice::unmarked);
+      clean += squared_errors(log, PeriodChoice::consistent);
+      add_half_sine(log, 3 * 4000 + 700, deviations);
+      glitched += squared_errors(log, PeriodChoice::consistent);
+    }
+    EXPECT_LE((clean / plain).sqrt().mean(), 1.01) << deviations;
+    EXPECT_LE((glitched / plain).sqrt().mean(), 1.1) << deviations;
   }
 }
 
@@ -366,6 +385,73 @@ TEST(OutlierDetection, ADeviationAtAnEndOfAPeriodCostsTheWholePeriod) {
     EXPECT_TRUE(frf.replaced_samples.empty()) << at;
     ASSERT_EQ(frf.dropped_periods.size(), 1u) << at;
     EXPECT_EQ(frf.dropped_periods[0].period, 5) << at;
+  }
+}
+
+/// |change of the response|^2 relative to its variance, without glitches and with those that `spoil` adds.
+double change_by(const std::function<void(MemoryLog&)>& spoil, std::size_t replaced) {
+  MemoryLog log = coloured_log(3, 8);
+  const FrfEstimate clean = estimate_plant_frf({&log});
+  spoil(log);
+  const FrfEstimate frf = estimate_plant_frf({&log});
+  EXPECT_TRUE(frf.dropped_periods.empty());
+  EXPECT_EQ(frf.replaced_samples.size(), replaced);
+  EXPECT_EQ(frf.response, estimate_plant_frf({&log}, {.threads = 4}).response);
+  return (frf.response - clean.response).squaredNorm() / clean.noise_variance.sum();
+}
+
+// The first period of a run is the one that the others are compared with.
+TEST(OutlierDetection, AGlitchInTheFirstPeriodIsReplacedAsWell) {
+  EXPECT_LT(change_by([](MemoryLog& log) { log.records[1].sensors(3 * 400 + 200, 0) += 40.0; }, 1),
+            0.01);
+}
+
+// Neither may be replaced by a mean that contains the other.
+TEST(OutlierDetection, TwoGlitchesInOnePlaceAreReplacedByTheOtherPeriods) {
+  EXPECT_LT(change_by(
+                [](MemoryLog& log) {
+                  for (const int period : {2, 6})
+                    log.records[1].sensors((3 + period) * 400 + 200, 0) += 40.0;
+                },
+                2),
+            0.02);
+}
+
+TEST(OutlierDetection, ADeviationOfMoreThanATenthCostsThePeriod) {
+  for (const int width : {30, 60}) {
+    MemoryLog log = coloured_log(3, 8);
+    for (int n = 0; n < width; ++n)
+      log.records[1].sensors((3 + 5) * 400 + 150 + n, 0) += 40.0 * (n % 2 == 0 ? 1.0 : -1.0);
+    const FrfEstimate frf = estimate_plant_frf({&log});
+    EXPECT_EQ(frf.replaced_samples.size(), width < 40 ? 1U : 0U);
+    EXPECT_EQ(frf.dropped_periods.size(), width < 40 ? 0U : 1U);
+  }
+}
+
+// Some of its samples stand out by themselves, but replacing them is not enough.
+TEST(OutlierDetection, ANoisyPeriodIsDroppedWhole) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    MemoryLog log = coloured_log(3, 8);
+    test::ComplexNoise random(seed);
+    for (int n = 0; n < 400; ++n)
+      log.records[1].sensors((3 + 5) * 400 + n, 0) += 0.1 * test::real_gaussian(random);
+    const FrfEstimate frf = estimate_plant_frf({&log});
+    EXPECT_TRUE(frf.replaced_samples.empty()) << seed;
+    ASSERT_EQ(frf.dropped_periods.size(), 1U) << seed;
+    EXPECT_EQ(frf.dropped_periods[0].period, 5) << seed;
+  }
+}
+
+// Smooth, so that only octaves with long wavelets show it.
+TEST(OutlierDetection, ADeviationAcrossTheEndOfAPeriodCostsBoth) {
+  for (const double deviations : {5.0, 50.0}) {
+    MemoryLog log = slow_log(5);
+    add_half_sine(log, 4 * 4000 - 40, deviations);
+    const FrfEstimate frf = estimate_plant_frf({&log});
+    EXPECT_TRUE(frf.replaced_samples.empty()) << deviations;
+    ASSERT_EQ(frf.dropped_periods.size(), 2U) << deviations;
+    EXPECT_EQ(frf.dropped_periods[0].period, 3) << deviations;
+    EXPECT_EQ(frf.dropped_periods[1].period, 4) << deviations;
   }
 }
 

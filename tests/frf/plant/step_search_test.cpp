@@ -175,6 +175,24 @@ TEST(StepSearch, LostSamplesAreStillFound) {
   EXPECT_THAT(found.frf.dropped_periods[0].reason, testing::HasSubstr("lost"));
 }
 
+// Steps are undone in the records as they are, so a period of which samples were replaced is dropped then.
+TEST(StepSearch, AGlitchCostsItsPeriod) {
+  const double rms = command_rms();
+  MemoryLog log =
+      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(7), 1e-4 * rms);
+  MemoryLog marked = log;
+  marked.records[1].marked[2300] = 1;
+  const FrfEstimate by_mark = estimate_plant_frf({&marked});
+  log.records[1].sensors(2300, 0) += 1e3 * log.records[1].sensors.cwiseAbs().maxCoeff();
+  const FrfAndHealth found = estimate_plant_frf_and_health({&log});
+  EXPECT_EQ(found.health.steps.size(), 2U);
+  ASSERT_EQ(found.frf.dropped_periods.size(), 1U);
+  EXPECT_EQ(found.frf.dropped_periods[0].period, 1);
+  EXPECT_TRUE(found.frf.replaced_samples.empty());
+  EXPECT_LT((found.frf.response - by_mark.response).squaredNorm(),
+            0.1 * by_mark.total_variance.sum());
+}
+
 TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
   const double rms = command_rms();
   const MemoryLog log =

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
@@ -109,6 +111,36 @@ TEST(HealthRecord, HoldsAllChannelsWhateverIsEstimated) {
   const FrfOptions lpm{.transient_periods = log.log_info.transient_periods,
                        .method = FrfMethod::lpm};
   expect_equal(estimate_plant_frf_and_health({&log}, lpm).health, alone);
+}
+
+// A glitch would be taken for a fault of its channel, or for a drift.
+TEST(HealthRecord, PeriodsThatDifferFromTheOthersAreNoEvidence) {
+  MemoryLog log = recorded_log();
+  Eigen::MatrixXd& y = log.records[0].sensors;
+  const Eigen::Index N = log.log_info.period_samples;
+  const Eigen::Index second = (log.log_info.transient_periods + 1) * N;
+  y(second + N / 2, 0) += 1e3 * y.cwiseAbs().maxCoeff();
+  EXPECT_EQ(read_health_record({&log}, {}).periods, (std::vector<int>{4, 3}));
+  const HealthRecord of_glitch = estimate_plant_frf_and_health({&log}).health;
+  EXPECT_EQ(of_glitch.periods, (std::vector<int>{3, 3}));
+  EXPECT_EQ(of_glitch.start.runs.size(), 2U);  // the second run has a marked period
+  y.middleRows(second, N) += 10.0 * y.middleRows(second - N / 3, N);
+  EXPECT_EQ(estimate_plant_frf_and_health({&log}).health.periods, (std::vector<int>{3, 3}));
+}
+
+// The transient of the start is what the evidence of the start is about.
+TEST(HealthRecord, TheEvidenceOfTheStartStaysIfItsTransientCostsTheFirstPeriod) {
+  MemoryLog log = recorded_log();
+  const std::size_t before = estimate_plant_frf_and_health({&log}).health.start.runs.size();
+  const Eigen::Index first = log.log_info.transient_periods * log.log_info.period_samples;
+  for (LogSamples& record : log.records)
+    for (Eigen::Index n = 0; n < log.log_info.period_samples; ++n)
+      record.sensors.row(first + n).array() +=
+          100.0 * std::exp(-8.0 * static_cast<double>(n) / log.log_info.period_samples) *
+          std::cos(0.3 * static_cast<double>(n));
+  const FrfAndHealth both = estimate_plant_frf_and_health({&log});
+  EXPECT_EQ(both.frf.dropped_periods.size(), 5U);  // one is marked
+  EXPECT_EQ(both.health.start.runs.size(), before);
 }
 
 }  // namespace test_health_record

@@ -115,6 +115,7 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
   frf.dropped_periods = {{0, 2, 4, "a glitch"}};
   for (int period = 0; period < 30; ++period)
     frf.dropped_periods.push_back({1, 0, period, "marked"});
+  frf.replaced_samples = {{1, 1, 2, 50, 6, "a spike"}};
   EXPECT_THAT(
       dropped_lines(frf),
       ElementsAre(
@@ -123,6 +124,8 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
   EXPECT_EQ(left_out_json(frf),
             json({{{"realization", 2}, {"reason", "run.slog:/runs/0003: no clean period"}}}));
   frf.left_out_realizations.clear();
+  EXPECT_THAT(dropped_lines(frf), Contains("realization 2, experiment 2: samples 51 ... 56 of "
+                                           "period 3 replaced, the others are used: a spike"));
   EXPECT_THAT(dropped_lines(frf), Contains("... and 21 more periods, listed in /dropped_periods"));
 }
 
@@ -151,11 +154,23 @@ TEST(DroppedLines, SayThatTheTransientLasts) {
   EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
   frf.dropped_periods.back().period = 0;
   EXPECT_THAT(dropped_lines(frf), Contains(told));
-  frf.dropped_periods.push_back({1, 1, 1, "a glitch"});
+  frf.dropped_periods.push_back({1, 1, 2, "a glitch"});
   EXPECT_THAT(dropped_lines(frf), Contains(told));
-  for (int period = 2; period < 5; ++period)
+  for (int period = 4; period < 10; period += 2)
     frf.dropped_periods.push_back({1, 1, period, "a glitch"});
   EXPECT_THAT(dropped_lines(frf), testing::Not(Contains(told)));
+}
+
+// A slow transient costs several periods of each run.
+TEST(DroppedLines, CountTheRunsOfWhichTheFirstPeriodsWereDiscarded) {
+  FrfEstimate frf;
+  frf.realizations = 1;
+  frf.experiments = 3;
+  for (int experiment = 0; experiment < 3; ++experiment)
+    for (int period = 0; period < 3; ++period)
+      frf.dropped_periods.push_back({0, experiment, period, "unlike"});
+  EXPECT_THAT(dropped_lines(frf),
+              Contains(testing::StartsWith("the first measured period of 3 of 3 experiments")));
 }
 
 }  // namespace test_frf_quality

@@ -1,0 +1,116 @@
+#include "frf/runs/period_comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+
+#include "frf/periods/bridge.hpp"
+#include "frf/runs/run_steps.hpp"
+
+namespace stageid {
+namespace {
+
+using Eigen::Index;
+
+/// Largest part of a period that is replaced. What replaces it has less noise: docs/theory.md, section 3.
+constexpr double kLargestGap = 0.1;
+
+}  // namespace
+
+void PeriodComparison::keep_samples(std::size_t place) {
+  const auto n_y = std::ssize(channels_.outputs);
+  const auto n = n_y + std::ssize(channels_.estimated);
+  Eigen::MatrixXd& first = w_.first_samples;
+  Eigen::MatrixXf& kept = w_.record[place];
+  kept.resize(w_.dft.length(), n);
+  first.resize(kept.rows(), kept.cols());
+  for (Index c = 0; c < n; ++c) {
+    const Eigen::Ref<const Eigen::VectorXd> samples =
+        c < n_y ? w_.samples.sensors.col(channels_.outputs[static_cast<std::size_t>(c)])
+                : w_.samples.actuators.col(channels_.estimated[static_cast<std::size_t>(c - n_y)]);
+    if (place == 0) first.col(c) = samples;
+    kept.col(c) = (samples - first.col(c)).cast<float>();
+  }
+}
+
+// Each replacement makes the others more visible, and may not be enough.
+PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& numbers) {
+  const std::size_t P = numbers.size();
+  const ComparedPeriods compared{std::span<const Eigen::MatrixXcd>(w_.spectra).first(P),
+                                 std::span<const Eigen::MatrixXf>(w_.record).first(P), numbers,
+                                 frequencies_hz(used_.log->info(), lines_.excited_lines()),
+                                 used_.log->info().sample_rate_hz};
+  std::vector<SampleRange> replaced(P);
+  std::vector<std::string> reasons(P);  // before anything was replaced
+  PeriodOutliers outliers;
+  bool changed = true;
+  while (changed) {
+    outliers = find_outliers(compared);
+    changed = false;
+    for (const PeriodOutlier& outlier : outliers.found) {
+      const std::size_t p = outlier.period;
+      if (reasons[p].empty()) reasons[p] = reason(outlier);
+      // As with dropped ones, the others must be the majority.
+      const auto others = std::count_if(replaced.begin(), replaced.end(),
+                                        [](const SampleRange& range) { return range.end > 0; });
+      if (replaced[p].end > 0 || others < (std::ssize(numbers) - 1) / 2)
+        changed |= replace(outlier, outliers.consistent, replaced[p]);
+    }
+  }
+  Result result;
+  result.use.assign(P, 1);
+  for (const PeriodOutlier& outlier : outliers.found) {
+    result.use[outlier.period] = 0;
+    result.dropped.push_back({0, 0, numbers[outlier.period], reasons[outlier.period]});
+  }
+  for (std::size_t p = 0; p < P; ++p)
+    if (result.use[p] != 0 && replaced[p].end > 0)
+      result.replaced.push_back({0, 0, numbers[p], static_cast<int>(replaced[p].first),
+                                 static_cast<int>(replaced[p].end - replaced[p].first),
+                                 reasons[p]});
+  return result;
+}
+
+/// Replaces the samples that deviate. If this is not enough, the next call replaces at least twice as many.
+/// @returns false if there would be too many, or if they reach an end of the period; nothing has changed then
+bool PeriodComparison::replace(const PeriodOutlier& outlier,
+                               const std::vector<std::size_t>& reference, SampleRange& replaced) {
+  const auto N = static_cast<Index>(w_.dft.length());
+  SampleRange range{outlier.first_sample, outlier.first_sample + outlier.samples};
+  if (outlier.samples == 0 || reference.empty()) return false;
+  if (replaced.end > 0) {
+    const Index more = (replaced.end - replaced.first + 1) / 2;
+    range = {std::min(range.first, replaced.first - more),
+             std::max(range.end, replaced.end + more)};
+  }
+  if (static_cast<double>(range.end - range.first) > kLargestGap * static_cast<double>(N))
+    return false;
+  if (range.first <= 0 || range.end >= N) return false;  // it began before, or goes on
+  bridge(outlier.period, reference, range);
+  replaced = range;
+  return true;
+}
+
+void PeriodComparison::bridge(std::size_t place, const std::vector<std::size_t>& reference,
+                              SampleRange range) {
+  Eigen::MatrixXf& period = w_.record[place];
+  Eigen::MatrixXd change = -period.cast<double>();
+  bridge_samples(w_.record, reference, place, range.first, range.end - range.first);
+  change += period.cast<double>();
+  std::vector<Index> all(static_cast<std::size_t>(change.cols()));
+  std::iota(all.begin(), all.end(), Index{0});
+  Eigen::MatrixXcd& spectra = w_.spectra[place];
+  Eigen::MatrixXcd difference(spectra.rows(), spectra.cols());
+  line_spectra(change, all, lines_.lines, 0, w_.dft, difference);
+  spectra += difference;
+}
+
+std::string PeriodComparison::reason(const PeriodOutlier& outlier) const {
+  return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
+                     outlier.ratio, channels_.name(used_.log->info(), outlier.channel),
+                     outlier.low_hz, outlier.high_hz);
+}
+
+}  // namespace stageid

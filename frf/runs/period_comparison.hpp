@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "frf/periods/outlier_detection.hpp"
+#include "frf/response/frf_estimate.hpp"
+#include "frf/runs/channel_choice.hpp"
+#include "frf/runs/run_spectra.hpp"
+#include "frf/runs/run_table.hpp"
+
+namespace stageid {
+
+/// Compares the periods of a group of one run in RunWorkspace::record and spectra. A short glitch is replaced
+/// (bridge_samples()), another difference costs the period.
+class PeriodComparison {
+ public:
+  PeriodComparison(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
+                   RunWorkspace& workspace)
+      : used_(used), lines_(lines), channels_(channels), w_(workspace) {}
+
+  /// Stores the samples of the period in the workspace as number `place` of the group, minus those of the first one,
+  /// which has the same excitation: the difference is noise, for which a float is accurate enough.
+  void keep_samples(std::size_t place);
+
+  struct Result {
+    std::vector<char> use;                  ///< of each period of the group
+    std::vector<DroppedPeriod> dropped;     ///< without realization and experiment
+    std::vector<ReplacedSamples> replaced;  ///< the same
+  };
+  /// @param numbers  of the group's periods in the run, ascending
+  Result settle(const std::vector<int>& numbers);
+
+ private:
+  struct SampleRange {
+    Eigen::Index first = 0;
+    Eigen::Index end = 0;
+  };
+  bool replace(const PeriodOutlier& outlier, const std::vector<std::size_t>& reference,
+               SampleRange& replaced);
+  void bridge(std::size_t place, const std::vector<std::size_t>& reference, SampleRange range);
+  std::string reason(const PeriodOutlier& outlier) const;
+
+  const UsedRun& used_;
+  const SpectrumLines& lines_;
+  const ChannelChoice& channels_;
+  RunWorkspace& w_;
+};
+
+}  // namespace stageid
