@@ -264,7 +264,7 @@ MemoryLog slow_log(std::uint64_t seed) {
   log.log_info.period_samples = kPeriod;
   log.log_info.excitation = log.log_info.actuators = test::channels("a", 1, "N");
   log.log_info.sensors = test::channels("z", 1, "m");
-  const auto lines = test::line_range(1, 601, 1);
+  const auto lines = test::line_range(1, 600, 1);
   Eigen::MatrixXcd R(1, std::ssize(lines));
   for (auto& value : R.reshaped()) value = random.phase();
   const Eigen::MatrixXd period = test::synthesize(R, lines, dft);
