@@ -156,6 +156,20 @@ TEST_P(Colour, GlitchesAreFound) {
   }
 }
 
+// So smooth that only octaves whose last wavelet ends some samples before the period show it.
+TEST(OutlierDetection, ADeviationInTheLastCoefficientReachesTheEnd) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    NoisyRun run = run_of(white, 8, 1, seed);
+    for (Eigen::Index n = 0; n < 160; ++n) {
+      const double sine = std::sin(std::numbers::pi * (static_cast<double>(n) + 0.5) / 160.0);
+      run.add(3, kSamples - 160 + n, 0, 80.0 * sine * sine);
+    }
+    const std::vector<PeriodOutlier> found = run.outliers();
+    ASSERT_EQ(found.size(), 1U) << seed;
+    EXPECT_EQ(found[0].first_sample + found[0].samples, kSamples) << seed;
+  }
+}
+
 /// `factor` times as much white noise in one period.
 NoisyRun run_with_a_noisy_period(int periods, double factor, std::uint64_t seed) {
   NoisyRun run = run_of(white, periods, 1, seed);
