@@ -97,8 +97,8 @@ int runs_with_discarded_start(const FrfEstimate& frf) {
     if (one.period > 0 && !follows) ++others;
     last = one.period == 0 || follows ? &one : nullptr;
   }
-  return starts > 1 && 2 * starts > frf.realizations * frf.experiments && starts > others ? starts
-                                                                                          : 0;
+  const bool most_runs = starts > 1 && 2 * starts > frf.realizations * frf.experiments;
+  return most_runs && starts > others ? starts : 0;
 }
 
 std::vector<Finding> check_discarded_starts(const FrfEstimate& frf) {

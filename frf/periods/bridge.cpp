@@ -26,12 +26,13 @@ Point mean_point(const Eigen::VectorXf& deviation, Index first, Index count) {
 }  // namespace
 
 void bridge_samples(std::span<Eigen::MatrixXf> periods, std::span<const std::size_t> reference,
-                    std::size_t period, Index first, Index count) {
+                    std::size_t period, SampleRange gap) {
   Eigen::MatrixXf& own = periods[period];
+  const Index count = gap.count();
   const auto most = static_cast<Index>(std::ceil(kEndShare * static_cast<double>(count)));
-  const Index before = std::min(most, first);
-  const Index after = std::min(most, own.rows() - first - count);
-  const Index begin = first - before;
+  const Index before = std::min(most, gap.first);
+  const Index after = std::min(most, own.rows() - gap.end);
+  const Index begin = gap.first - before;
   Eigen::VectorXf mean(before + count + after);
   for (Index c = 0; c < own.cols(); ++c) {
     mean.setZero();

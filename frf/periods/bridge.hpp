@@ -3,9 +3,11 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "frf/periods/sample_range.hpp"
+
 namespace stageid {
 
-/// Replaces the samples first ... first + count - 1 of one period, in all channels.
+/// Replaces the samples `gap` of one period, in all channels.
 ///
 /// Each becomes the mean of the reference periods, which have the same excitation, plus a straight line. The line joins
 /// the deviations of this period from them just before and just after the gap. If the whole period were dropped, slow
@@ -14,6 +16,6 @@ namespace stageid {
 /// @param reference  indices of the other periods to compare with, at least one
 /// @pre at least one sample of the period before and after
 void bridge_samples(std::span<Eigen::MatrixXf> periods, std::span<const std::size_t> reference,
-                    std::size_t period, Eigen::Index first, Eigen::Index count);
+                    std::size_t period, SampleRange gap);
 
 }  // namespace stageid

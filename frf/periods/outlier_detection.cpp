@@ -190,17 +190,6 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
   return a < 1 ? 0.0 : log_tail_of_f(ratio, a, 0.5 * dof.core);
 }
 
-/// Samples of a period, from the first to before the end; none if they are equal.
-struct SampleRange {
-  Index first = 0;
-  Index end = 0;
-  void include(const SampleRange& other) {
-    if (other.first == other.end) return;
-    first = first == end ? other.first : std::min(first, other.first);
-    end = std::max(end, other.end);
-  }
-};
-
 struct Excess {
   double ratio = 0.0;  ///< power of the period over that of the core
   double power = 0.0;  ///< of the period's deviation
@@ -274,7 +263,6 @@ double log_choices(Index P, std::size_t n) {
 struct Candidate {
   PeriodOutlier outlier;
   double gain = 0.0;
-  SampleRange where;
 };
 
 /// Outlier candidates of one channel.
@@ -299,15 +287,16 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
     Candidate most;
     most.gain = mean_ratio(grams, core, p);
     double power = 0.0;
+    SampleRange where;
     for (const OctaveRecord& octave : octaves) {
       const std::optional<Excess> here =
           excess(octave, periods.number, core, p, std::log(kDropByChance) - log_tests);
       if (!here) continue;
-      if (power == 0.0) most.where = here->where;  // the highest octave
+      if (power == 0.0) where = here->where;  // the highest octave
       if (!(here->power > power)) continue;
       power = here->power;
-      most.outlier = {static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz,
-                      here->ratio};
+      most.outlier = {
+          static_cast<std::size_t>(p), channel, octave.low_hz, octave.high_hz, here->ratio, where};
     }
     if (most.outlier.ratio > 0.0) found.push_back(most);
   }
@@ -323,13 +312,12 @@ PeriodOutliers find_outliers(const ComparedPeriods& periods) {
   const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLinesOfBand);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
-    for (Candidate& candidate : candidates(periods, c, bands)) {
+    for (const Candidate& candidate : candidates(periods, c, bands)) {
       Candidate& of_period = most[candidate.outlier.period];
-      candidate.where.include(of_period.where);
-      if (candidate.gain > of_period.gain)
-        of_period = candidate;
-      else
-        of_period.where = candidate.where;
+      SampleRange where = of_period.outlier.where;
+      where.include(candidate.outlier.where);
+      if (candidate.gain > of_period.gain) of_period = candidate;
+      of_period.outlier.where = where;
     }
   for (std::size_t p = 0; p < P; ++p)
     if (most[p].gain == 0.0) result.consistent.push_back(p);
@@ -337,11 +325,7 @@ PeriodOutliers find_outliers(const ComparedPeriods& periods) {
   std::sort(most.begin(), most.end(),
             [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   most.resize(std::min(most.size(), (P - 1) / 2));
-  for (const Candidate& candidate : most) {
-    PeriodOutlier& outlier = result.found.emplace_back(candidate.outlier);
-    outlier.first_sample = candidate.where.first;
-    outlier.samples = candidate.where.end - candidate.where.first;
-  }
+  for (const Candidate& candidate : most) result.found.push_back(candidate.outlier);
   std::sort(result.found.begin(), result.found.end(),
             [](const PeriodOutlier& a, const PeriodOutlier& b) { return a.period < b.period; });
   return result;

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "frf/periods/sample_range.hpp"
+
 namespace stageid {
 
 /// Periods of one run to compare.
@@ -23,8 +25,7 @@ struct PeriodOutlier {
   double high_hz = 0.0;
   double ratio = 0.0;  ///< its power there over that of the other periods
   /// The samples that deviate, of any channel, in the highest octave with a significant deviation. None: all of them.
-  Eigen::Index first_sample = 0;
-  Eigen::Index samples = 0;
+  SampleRange where{};
 };
 
 struct PeriodOutliers {

@@ -226,16 +226,13 @@ class PlantEstimation {
 
   void note_spoilt(const RealizationRuns& realization, const RealizationSpectra& spectra) {
     for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-      for (DroppedPeriod dropped : spectra.run(e).dropped) {
-        dropped.realization = realization.realization;
-        dropped.experiment = realization.runs[e].run().experiment;
-        dropped_.push_back(std::move(dropped));
-      }
-      for (ReplacedSamples replaced : spectra.run(e).replaced) {
-        replaced.realization = realization.realization;
-        replaced.experiment = realization.runs[e].run().experiment;
-        replaced_.push_back(std::move(replaced));
-      }
+      const auto note = [&](auto of_run, auto& all) {
+        of_run.realization = realization.realization;
+        of_run.experiment = realization.runs[e].run().experiment;
+        all.push_back(std::move(of_run));
+      };
+      for (const DroppedPeriod& one : spectra.run(e).dropped) note(one, dropped_);
+      for (const ReplacedSamples& one : spectra.run(e).replaced) note(one, replaced_);
     }
   }
 

@@ -54,8 +54,8 @@ PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& number
       if (reasons[p].empty()) reasons[p] = reason(outlier);
       // As with dropped ones, the others must be the majority.
       const auto others = std::count_if(replaced.begin(), replaced.end(),
-                                        [](const SampleRange& range) { return range.end > 0; });
-      if (replaced[p].end > 0 || others < (std::ssize(numbers) - 1) / 2)
+                                        [](const SampleRange& range) { return !range.empty(); });
+      if (!replaced[p].empty() || others < (std::ssize(numbers) - 1) / 2)
         changed |= replace(outlier, outliers.consistent, replaced[p]);
     }
   }
@@ -66,10 +66,9 @@ PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& number
     result.dropped.push_back({0, 0, numbers[outlier.period], reasons[outlier.period]});
   }
   for (std::size_t p = 0; p < P; ++p)
-    if (result.use[p] != 0 && replaced[p].end > 0)
+    if (result.use[p] != 0 && !replaced[p].empty())
       result.replaced.push_back({0, 0, numbers[p], static_cast<int>(replaced[p].first),
-                                 static_cast<int>(replaced[p].end - replaced[p].first),
-                                 reasons[p]});
+                                 static_cast<int>(replaced[p].count()), reasons[p]});
   return result;
 }
 
@@ -78,15 +77,13 @@ PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& number
 bool PeriodComparison::replace(const PeriodOutlier& outlier,
                                const std::vector<std::size_t>& reference, SampleRange& replaced) {
   const auto N = static_cast<Index>(w_.dft.length());
-  SampleRange range{outlier.first_sample, outlier.first_sample + outlier.samples};
-  if (outlier.samples == 0 || reference.empty()) return false;
-  if (replaced.end > 0) {
-    const Index more = (replaced.end - replaced.first + 1) / 2;
-    range = {std::min(range.first, replaced.first - more),
-             std::max(range.end, replaced.end + more)};
+  SampleRange range = outlier.where;
+  if (range.empty() || reference.empty()) return false;
+  if (!replaced.empty()) {
+    const Index more = (replaced.count() + 1) / 2;
+    range.include({replaced.first - more, replaced.end + more});
   }
-  if (static_cast<double>(range.end - range.first) > kLargestGap * static_cast<double>(N))
-    return false;
+  if (static_cast<double>(range.count()) > kLargestGap * static_cast<double>(N)) return false;
   if (range.first <= 0 || range.end >= N) return false;  // it began before, or goes on
   bridge(outlier.period, reference, range);
   replaced = range;
@@ -97,7 +94,7 @@ void PeriodComparison::bridge(std::size_t place, const std::vector<std::size_t>&
                               SampleRange range) {
   Eigen::MatrixXf& period = w_.record[place];
   Eigen::MatrixXd change = -period.cast<double>();
-  bridge_samples(w_.record, reference, place, range.first, range.end - range.first);
+  bridge_samples(w_.record, reference, place, range);
   change += period.cast<double>();
   std::vector<Index> all(static_cast<std::size_t>(change.cols()));
   std::iota(all.begin(), all.end(), Index{0});

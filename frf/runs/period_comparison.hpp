@@ -32,10 +32,6 @@ class PeriodComparison {
   Result settle(const std::vector<int>& numbers);
 
  private:
-  struct SampleRange {
-    Eigen::Index first = 0;
-    Eigen::Index end = 0;
-  };
   bool replace(const PeriodOutlier& outlier, const std::vector<std::size_t>& reference,
                SampleRange& replaced);
   void bridge(std::size_t place, const std::vector<std::size_t>& reference, SampleRange range);

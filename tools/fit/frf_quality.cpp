@@ -133,36 +133,28 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
     lines.push_back(fmt::format("realization {} discarded, the others are used: {}",
                                 one.realization + 1, one.reason));
   }
-  std::size_t told = 0;
-  std::size_t more = 0;
-  for (const DroppedPeriod& period : frf.dropped_periods) {
-    if (left_out.contains(period.realization)) continue;
-    if (++told > kMostLines) {
-      ++more;
-      continue;
+  const auto tell = [&](const auto& items, const auto& text_of, const char* others) {
+    std::size_t count = 0;
+    for (const auto& one : items) {
+      if (left_out.contains(one.realization)) continue;
+      if (++count > kMostLines) continue;
+      lines.push_back(fmt::format("realization {}, experiment {}: {}: {}", one.realization + 1,
+                                  one.experiment + 1, text_of(one), one.reason));
     }
-    lines.push_back(fmt::format("realization {}, experiment {}: period {} discarded: {}",
-                                period.realization + 1, period.experiment + 1, period.period + 1,
-                                period.reason));
-  }
-  if (more > 0)
-    lines.push_back(fmt::format("... and {} more periods, listed in /dropped_periods", more));
-  told = 0;
-  more = 0;
-  for (const ReplacedSamples& one : frf.replaced_samples) {
-    if (left_out.contains(one.realization)) continue;
-    if (++told > kMostLines) {
-      ++more;
-      continue;
-    }
-    lines.push_back(fmt::format(
-        "realization {}, experiment {}: samples {} ... {} of period {} replaced, the others are "
-        "used: {}",
-        one.realization + 1, one.experiment + 1, one.first + 1, one.first + one.samples,
-        one.period + 1, one.reason));
-  }
-  if (more > 0)
-    lines.push_back(fmt::format("... and {} more replacements, listed in /replaced_samples", more));
+    if (count > kMostLines)
+      lines.push_back(fmt::format("... and {} more {}", count - kMostLines, others));
+  };
+  tell(
+      frf.dropped_periods,
+      [](const DroppedPeriod& one) { return fmt::format("period {} discarded", one.period + 1); },
+      "periods, listed in /dropped_periods");
+  tell(
+      frf.replaced_samples,
+      [](const ReplacedSamples& one) {
+        return fmt::format("samples {} ... {} of period {} replaced, the others are used",
+                           one.first + 1, one.first + one.samples, one.period + 1);
+      },
+      "replacements, listed in /replaced_samples");
   if (const int starts = runs_with_discarded_start(frf); starts > 0)
     lines.push_back(fmt::format(
         "the first measured period of {} of {} experiments was discarded: the transient was not "

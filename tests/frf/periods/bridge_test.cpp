@@ -28,7 +28,7 @@ TEST(BridgeSamples, ContinuesTheDriftOfThePeriodAcrossTheGap) {
   const std::vector<std::size_t> reference = {0, 2};
   for (const Eigen::Index count : {1, 10, 30}) {
     periods[1].block(40, 0, count, 2).setConstant(1e3F);
-    bridge_samples(periods, reference, 1, 40, count);
+    bridge_samples(periods, reference, 1, {40, 40 + count});
     for (std::size_t p = 0; p < 3; ++p)
       EXPECT_LT((periods[p] - clean[p]).cwiseAbs().maxCoeff(), 1e-4) << p << ", " << count;
   }
@@ -39,7 +39,7 @@ TEST(BridgeSamples, OneSampleBesideTheGapIsEnough) {
   periods[1](0, 0) = 1.0F;
   periods[1](kSamples - 1, 0) = 1.0F;
   const std::vector<std::size_t> reference = {0};
-  bridge_samples(periods, reference, 1, 1, kSamples - 2);
+  bridge_samples(periods, reference, 1, {1, kSamples - 1});
   EXPECT_EQ(periods[1], Eigen::MatrixXf::Ones(kSamples, 1));
 }
 

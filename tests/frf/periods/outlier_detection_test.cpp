@@ -150,8 +150,8 @@ TEST_P(Colour, GlitchesAreFound) {
       EXPECT_EQ(found[0].channel, 1);
       EXPECT_GT(found[0].ratio, 2.0);
       EXPECT_GT(found[0].high_hz, found[0].low_hz);
-      EXPECT_LE(found[0].first_sample, first + width / 2);
-      EXPECT_GT(found[0].first_sample + found[0].samples, first + width / 2);
+      EXPECT_LE(found[0].where.first, first + width / 2);
+      EXPECT_GT(found[0].where.end, first + width / 2);
     }
   }
 }
@@ -166,7 +166,7 @@ TEST(OutlierDetection, ADeviationInTheLastCoefficientReachesTheEnd) {
     }
     const std::vector<PeriodOutlier> found = run.outliers();
     ASSERT_EQ(found.size(), 1U) << seed;
-    EXPECT_EQ(found[0].first_sample + found[0].samples, kSamples) << seed;
+    EXPECT_EQ(found[0].where.end, kSamples) << seed;
   }
 }
 
@@ -184,10 +184,10 @@ TEST(OutlierDetection, TheDeviatingSamplesAreThoseOfAllChannels) {
   run.add(2, 500, 1, 1000.0);
   const std::vector<PeriodOutlier> found = run.outliers();
   ASSERT_EQ(found.size(), 1U);
-  EXPECT_LE(found[0].first_sample, 300);
-  EXPECT_GE(found[0].first_sample, 290);
-  EXPECT_GT(found[0].first_sample + found[0].samples, 500);
-  EXPECT_LE(found[0].first_sample + found[0].samples, 511);
+  EXPECT_LE(found[0].where.first, 300);
+  EXPECT_GE(found[0].where.first, 290);
+  EXPECT_GT(found[0].where.end, 500);
+  EXPECT_LE(found[0].where.end, 511);
 }
 
 // For the variance of the mean, n + 1 periods with 2 + 1 / n times the noise in one are as bad as n periods.

@@ -309,7 +309,11 @@ class CoarseLines(unittest.TestCase):
 class FilesOfOthers(unittest.TestCase):
     """Structures that the defaults do not describe, without any flag: the search ends by itself, with the true modes."""
 
-    def found(self, f, G, sd, true_hz, units, seed):
+    def found(self, seed, first_hz, last_hz, step_hz, measure, units):
+        """The modes of what measure(random, s) describes: natural frequencies in the band, response and deviation."""
+        random = np.random.default_rng(seed)
+        f = np.arange(first_hz, last_hz, step_hz)
+        true_hz, G, sd = measure(random, 2j * np.pi * f[:, None, None])
         write_frf("others.h5", f, G + sd * circular(np.random.default_rng(seed), G.shape), sd**2, units)
         fit("others.h5", "-o", "model.json")
         modes = [m for m in modes_of(model()) if f[0] < m["natural_frequency_hz"] < f[-1]]
@@ -318,47 +322,42 @@ class FilesOfOthers(unittest.TestCase):
             self.assertLess(abs(mode["natural_frequency_hz"] - hz), 4.5 * mode["natural_frequency_std_hz"], mode)
 
     def test_an_impact_test_of_five_accelerometers(self):
+        def measure(random, s):
+            true_hz = np.sort(random.uniform(20.0, 780.0, 14))
+            G = 0.0
+            for w in 2.0 * np.pi * true_hz:
+                zeta = random.uniform(0.002, 0.02)
+                G = G + random.standard_normal((5, 1)) * w * s**2 / (s**2 + 2.0 * zeta * w * s + w**2)
+            return true_hz, G, 0.02 * np.abs(G).mean() * (1.0 + 40.0 * np.pi / np.abs(s)) * np.ones(G.shape)
         for seed in (11, 12, 13):
             with self.subTest(seed=seed):
-                random = np.random.default_rng(seed)
-                f = np.arange(5.0, 800.0, 0.5)
-                s = 2j * np.pi * f[:, None, None]
-                true_hz = np.sort(random.uniform(20.0, 780.0, 14))
-                G = 0.0
-                for w in 2.0 * np.pi * true_hz:
-                    zeta = random.uniform(0.002, 0.02)
-                    G = G + random.standard_normal((5, 1)) * w * s**2 / (s**2 + 2.0 * zeta * w * s + w**2)
-                sd = 0.02 * np.abs(G).mean() * (1.0 + 20.0 / f)[:, None, None] * np.ones(G.shape)
-                self.found(f, G, sd, true_hz, ("N", "m/s^2"), seed)
+                self.found(seed, 5.0, 800.0, 0.5, measure, ("N", "m/s^2"))
 
     def test_a_beam_with_complex_modes_and_a_delay(self):
+        def measure(random, s):
+            true_hz = np.array([31.0, 86.0, 169.0, 279.0, 417.0, 582.0, 775.0])
+            G = 0.0
+            for hz in (*true_hz, 1094.5):
+                zeta = random.uniform(0.004, 0.01)
+                pole = 2.0 * np.pi * hz * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+                residue = 1j * np.outer(random.standard_normal(2), random.standard_normal(2)) \
+                    * np.exp(0.2j * random.standard_normal((2, 2)))
+                G = G + residue / (s - pole) + residue.conj() / (s - np.conj(pole))
+            G = G * s**2 * np.exp(-3e-4 * s)
+            return true_hz, G, 0.01 * np.abs(G).mean() * np.ones(G.shape)
         for seed in (21, 22, 23):
             with self.subTest(seed=seed):
-                random = np.random.default_rng(seed)
-                f = np.arange(10.0, 1000.0, 0.625)
-                s = 2j * np.pi * f[:, None, None]
-                true_hz = np.array([31.0, 86.0, 169.0, 279.0, 417.0, 582.0, 775.0])
-                G = 0.0
-                for hz in (*true_hz, 1094.5):
-                    zeta = random.uniform(0.004, 0.01)
-                    pole = 2.0 * np.pi * hz * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
-                    residue = 1j * np.outer(random.standard_normal(2), random.standard_normal(2)) \
-                        * np.exp(0.2j * random.standard_normal((2, 2)))
-                    G = G + residue / (s - pole) + residue.conj() / (s - np.conj(pole))
-                G = G * s**2 * np.exp(-3e-4 * s)
-                self.found(f, G, 0.01 * np.abs(G).mean() * np.ones(G.shape), true_hz, ("N", "m/s^2"), seed)
+                self.found(seed, 10.0, 1000.0, 0.625, measure, ("N", "m/s^2"))
 
     def test_an_actuator_that_was_not_excited(self):
-        random = np.random.default_rng(31)
-        f = np.arange(10.0, 500.0, 0.5)
-        s = 2j * np.pi * f[:, None, None]
-        true_hz = np.array([60.0, 140.0, 230.0, 310.0])
-        G = 0.0
-        for w in 2.0 * np.pi * true_hz:
-            G = G + np.outer(random.standard_normal(3), random.standard_normal(3)) * w / (s**2 + 0.02 * w * s + w**2)
-        G[:, :, 2] = 0.0
-        sd = 1e-3 * np.abs(G).mean() * np.array([1.0, 1.0, 3e3]) * np.ones(G.shape)
-        self.found(f, G, sd, true_hz, ("N", "m"), 31)
+        def measure(random, s):
+            true_hz = np.array([60.0, 140.0, 230.0, 310.0])
+            G = 0.0
+            for w in 2.0 * np.pi * true_hz:
+                G = G + np.outer(random.standard_normal(3), random.standard_normal(3)) * w / (s**2 + 0.02 * w * s + w**2)
+            G[:, :, 2] = 0.0
+            return true_hz, G, 1e-3 * np.abs(G).mean() * np.array([1.0, 1.0, 3e3]) * np.ones(G.shape)
+        self.found(31, 10.0, 500.0, 0.5, measure, ("N", "m"))
 
 
 if __name__ == "__main__":
