@@ -12,9 +12,11 @@ import subprocess
 import sys
 import unittest
 
-import h5py
 import numpy as np
 import scipy.linalg
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+from frf_file import write_frf  # noqa: E402
 
 PROGRAM, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 RATE_HZ, N_Y, N_U = 5000.0, 3, 6
@@ -58,17 +60,8 @@ def stage(delay_s):
     return G
 
 
-def fitted(G, *arguments, hold="exact", exit_code=0, **variances):
-    with h5py.File(WORK / "frf.h5", "w") as f:
-        f.attrs["format"], f.attrs["format_version"] = "stageid-frf", 1
-        f.attrs["sample_rate_hz"], f.attrs["hold"] = RATE_HZ, "zoh"
-        f.attrs["compensated"], f.attrs["delay_s"] = "none", 0.0
-        f["frequency_hz"], f["response"] = FREQUENCY_HZ, G
-        for name, values in variances.items():
-            f[name] = values
-        for side, letter, count, unit in (("outputs", "y", N_Y, "m"), ("inputs", "u", N_U, "N")):
-            f[side] = [f"{letter}{k + 1}" for k in range(count)]
-            f[side].attrs["unit"] = [unit] * count
+def fitted(G, *arguments, hold="exact", exit_code=0, variance=None):
+    write_frf(WORK / "frf.h5", FREQUENCY_HZ, G, variance, sample_rate_hz=RATE_HZ, hold="zoh")
     done = subprocess.run([PROGRAM, "fit", WORK / "frf.h5", "-o", WORK / "model.json", "--modes", str(len(MODES_HZ)),
                            "--hold", hold, *arguments], capture_output=True, text=True)  # fmt: skip
     assert done.returncode == exit_code, done.stderr
@@ -106,7 +99,7 @@ class ExactData(unittest.TestCase):
         G = stage(delay_s)
         std = 0.01 * abs(G)
         G = G + std * (g.normal(size=G.shape) + 1j * g.normal(size=G.shape)) / np.sqrt(2)
-        model = fitted(G, "--delay", "per_channel", noise_variance=std**2)
+        model = fitted(G, "--delay", "per_channel", variance=std**2)
         np.testing.assert_allclose(delays_of(model), delay_s, rtol=0, atol=1e-7)
 
     def test_the_other_holds_leave_an_error(self):

@@ -17,8 +17,10 @@ import sys
 import time
 import unittest
 
-import h5py
 import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+from frf_file import write_frf  # noqa: E402
 
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SMALL = "configs/experiment/small_stage.yaml"
@@ -29,6 +31,7 @@ COMMANDS = {
     "modes.json": ["modes", "frf.h5"],
     "model.json": ["fit", "frf.h5", "--band", "120", "800", "--direct-term", "full"],
     "model.mat": ["export", "model.json"],
+    "page.html": ["report", "model.json", "frf.h5"],
     "table.csv": ["log", "convert", "run.slog"],
     "back.h5": ["import", "table.csv", "--map", "configs/import/bench_csv.yaml"],
 }
@@ -110,6 +113,14 @@ class InterruptTest(unittest.TestCase):
                     (WORK / new).unlink()
         self.assertIn(0, ends)
 
+    def test_what_writes_no_file_ends_and_leaves_none(self):
+        before = files()
+        for delay_s in DELAYS_S:
+            for words in (["validate", "model.json", "run.slog"], ["log", "info", "run.slog"]):
+                with self.subTest(words[0], delay_s=delay_s):
+                    self.check_end(*run(*words, interrupt_after_s=delay_s))
+                    self.assertEqual(files(), before)
+
     def test_every_command_that_reads_ends_at_the_first_signal(self):
         """A file that never comes to its end. Logs are not among them: they must be regular files."""
         for ending, words in {".yaml": ["config", "check"], ".csv": ["import"], ".json": ["report", "-o", "x.html"]}.items():
@@ -152,14 +163,7 @@ class InterruptTest(unittest.TestCase):
             shape = random.standard_normal((4, 4)) + 1j * random.standard_normal((4, 4))
             G += shape / (hz**2 - f**2 + 0.06j * hz * f)[:, None, None]
         G += 1e-4 * np.abs(G).mean() * (random.standard_normal(G.shape) + 1j * random.standard_normal(G.shape))
-        with h5py.File(WORK / "dense.h5", "w") as file:
-            file.attrs.update({"format": "stageid-frf", "format_version": 1, "sample_rate_hz": 0.0, "hold": "none",
-                               "compensated": "none", "delay_s": 0.0})
-            file["frequency_hz"], file["response"] = f, G
-            file["noise_variance"] = np.full(G.shape, 2e-8 * np.abs(G).mean() ** 2)
-            for name, unit in (("inputs", "N"), ("outputs", "m")):
-                file.create_dataset(name, data=[f"{name[0]}{i}" for i in range(4)], dtype=h5py.string_dtype())
-                file[name].attrs["unit"] = unit
+        write_frf(WORK / "dense.h5", f, G, 2e-8 * np.abs(G).mean() ** 2)
         for by in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(by=by):
                 code, error = run("fit", "dense.h5", "-o", "best.json", "--search-seconds", "0", interrupt_after_s=4.0,

@@ -19,6 +19,9 @@ import scipy.io
 
 import uff_reader
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from frf_file import write_frf  # noqa: E402
+
 PROGRAM, WORK = sys.argv[1], pathlib.Path(sys.argv[2]).resolve()
 N, N_Y, N_U = 23, 2, 3
 # Uneven, and of no grid that single precision or six digits hold.
@@ -40,18 +43,11 @@ def random_frf(frequency_hz=FREQUENCY_HZ):
     }
 
 
-def write_frf(path, arrays, outputs=("z1", "x\u00b52"), inputs=("a1", "a,2", "a3")):
-    with h5py.File(path, "w") as f:
-        f.attrs["format"], f.attrs["format_version"] = "stageid-frf", 1
-        f.attrs["sample_rate_hz"], f.attrs["hold"] = 1000 / 3, "zoh"
-        f.attrs["compensated"], f.attrs["delay_s"] = "delay", 1.3e-4
-        f.attrs["noise_dof"] = 7.0
-        for name, values in arrays.items():
-            f[name] = values
-        f["outputs"] = list(outputs)
-        f["outputs"].attrs["unit"] = ["m", "rad"]
-        f["inputs"] = list(inputs)
-        f["inputs"].attrs["unit"] = "N"
+def write_foreign(arrays):
+    rest = {name: values for name, values in arrays.items() if name not in ("frequency_hz", "response")}
+    write_frf(WORK / "foreign.h5", arrays["frequency_hz"], arrays["response"], datasets=rest,
+              inputs=["a1", "a,2", "a3"], outputs=["z1", "x\u00b52"], units=("N", ["m", "rad"]),
+              sample_rate_hz=1000 / 3, hold="zoh", compensated="delay", delay_s=1.3e-4, noise_dof=7.0)
 
 
 def content(path="back.h5"):
@@ -109,7 +105,7 @@ class Case(unittest.TestCase):
 
     def frf(self, arrays=None):
         """The program's own writing of a foreign frf.h5."""
-        write_frf(WORK / "foreign.h5", arrays or random_frf())
+        write_foreign(arrays or random_frf())
         self.succeed("import", "foreign.h5", "-o", "frf.h5")
         return WORK / "frf.h5"
 
@@ -156,7 +152,7 @@ class RoundTrips(Case):
             for name, columns in (("p_value", N_U), ("distortion", N_U), ("even_p_value", len(groups)),
                                   ("even_level", len(groups)), ("odd_p_value", len(groups)), ("odd_level", len(groups))):
                 arrays[f"nonlinearity_{name}"] = g.uniform(size=(bands, N_Y, columns))
-            write_frf(WORK / "foreign.h5", arrays)
+            write_foreign(arrays)
             with h5py.File(WORK / "foreign.h5", "a") as file:
                 file["detection_noise"].attrs["dof"] = 12.0
             self.succeed("import", "foreign.h5", "-o", "frf.h5")
@@ -168,12 +164,7 @@ class RoundTrips(Case):
     def test_one_line_and_one_channel_keep_their_axes(self):
         for shape in ((1, 2, 3), (5, 1, 1), (1, 1, 1)):
             f = np.arange(1.0, 1.0 + shape[0])
-            with h5py.File(WORK / "one.h5", "w") as file:
-                file.attrs["format"] = "stageid-frf"
-                file["frequency_hz"], file["response"] = f, np.full(shape, 1 + 2j)
-                for name, count in (("outputs", shape[1]), ("inputs", shape[2])):
-                    file[name] = [f"{name}{k}" for k in range(count)]
-                    file[name].attrs["unit"] = "m"
+            write_frf(WORK / "one.h5", f, np.full(shape, 1 + 2j))
             for name in ("a.mat", "a.npz", "a.uff"):
                 with self.subTest(shape=shape, name=name):
                     self.succeed("export", "one.h5", "-o", name)

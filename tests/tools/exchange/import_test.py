@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-from exchange_test import FREQUENCY_HZ, WORK, Case, content, random_frf
+from exchange_test import FREQUENCY_HZ, WORK, Case, content, random_frf, write_frf
 
 G = random_frf()["response"]  # lines x 2 x 3
 
@@ -331,11 +331,8 @@ class Damaged(Case):
 
     def test_what_a_universal_file_cannot_hold(self):
         for name, unit, text in (("y" * 73, "m", "at most 72 characters"), ("y", "m" * 21, "20 characters")):
-            with h5py.File(WORK / "long.h5", "w") as f:
-                f.attrs["format"] = "stageid-frf"
-                f["frequency_hz"], f["response"] = [1.0], np.ones((1, 1, 1), complex)
-                f["outputs"], f["inputs"] = [name], ["a"]
-                f["outputs"].attrs["unit"], f["inputs"].attrs["unit"] = unit, "N"
+            write_frf(WORK / "long.h5", [1.0], np.ones((1, 1, 1), complex), inputs=["a"], outputs=[name],
+                      units=("N", unit))
             self.refuse(text, "export", "long.h5", "-o", "n.unv")
 
     def test_channels_that_do_not_match(self):

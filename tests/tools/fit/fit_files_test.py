@@ -14,6 +14,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+sys.path.append(str(Path(__file__).resolve().parents[2] / "support"))
+from frf_file import write_frf  # noqa: E402
+
 PROGRAM = Path(sys.argv[1]).resolve()
 WORK = Path(sys.argv[2])
 F = np.linspace(20.0, 400.0, 300)
@@ -37,18 +40,6 @@ def plant(f, rigid=True):
 
 def circular(random, shape):
     return (random.standard_normal(shape) + 1j * random.standard_normal(shape)) / np.sqrt(2)
-
-
-def write_frf(name, f, G, variance=None, units=("N", "m"), **attributes):
-    with h5py.File(WORK / name, "w") as h:
-        h.attrs.update({"format": "stageid-frf", "format_version": 1, "sample_rate_hz": 0.0, "hold": "none",
-                        "compensated": "none", "delay_s": 0.0, **attributes})
-        h["frequency_hz"], h["response"] = f, G
-        if variance is not None:
-            h["noise_variance"] = np.broadcast_to(variance, G.shape)
-        for name, unit, n in (("inputs", units[0], G.shape[2]), ("outputs", units[1], G.shape[1])):
-            h.create_dataset(name, data=[f"{name[0]}{i}" for i in range(n)], dtype=h5py.string_dtype())
-            h[name].attrs["unit"] = unit
 
 
 def program(*arguments):
@@ -75,7 +66,7 @@ class Covariance(unittest.TestCase):
     arguments = ("--modes", "120,250", "--covariance", "c.h5")
 
     def measure(self, seed):
-        write_frf("frf.h5", F, plant(F) + self.sd * circular(np.random.default_rng(seed), self.sd.shape), self.sd**2)
+        write_frf(WORK / "frf.h5", F, plant(F) + self.sd * circular(np.random.default_rng(seed), self.sd.shape), self.sd**2)
 
     def test_names_units_and_matrices(self):
         self.measure(1)
@@ -146,7 +137,7 @@ class Covariance(unittest.TestCase):
         inputs, outputs = np.array([1.3002e-4, 0.9e-4]), np.array([2e-5, 0.0])
         for kind, delays in (("estimate", np.full((N_Y, N_U), 1.3002e-4)), ("per_channel", outputs[:, None] + inputs)):
             G = plant(F) * np.exp(-2j * np.pi * F[:, None, None] * delays)
-            write_frf("frf.h5", F, G + self.sd * circular(np.random.default_rng(8), self.sd.shape), self.sd**2)
+            write_frf(WORK / "frf.h5", F, G + self.sd * circular(np.random.default_rng(8), self.sd.shape), self.sd**2)
             shown = fit("frf.h5", "-o", "model.json", "--delay", kind, *self.arguments).stdout
             told = json.loads(program("--json", "fit", "frf.h5", "-o", "m2.json", "--delay", kind, *self.arguments).stdout)
             m = model()
@@ -167,7 +158,7 @@ class Covariance(unittest.TestCase):
                 for side, truth in (("input", inputs), ("output", outputs)):
                     error = abs(np.array(m[f"{side}_delay_s"]) - truth)
                     self.assertTrue((error <= 4 * np.array(m[f"{side}_delay_std_s"])).all(), error)
-        write_frf("frf.h5", F, plant(F))
+        write_frf(WORK / "frf.h5", F, plant(F))
         shown = fit("frf.h5", "-o", "model.json", "--modes", "120,250").stdout
         self.assertNotIn("\ndelay ", shown)
         self.assertNotIn("input_delay_std_s", model())
@@ -179,7 +170,7 @@ class Covariance(unittest.TestCase):
         self.assertFalse((WORK / "c.csv").exists())
 
     def test_without_deviations_the_model_stands_and_the_code_says_so(self):
-        write_frf("one.h5", F[:100], plant(F[:100]))
+        write_frf(WORK / "one.h5", F[:100], plant(F[:100]))
         (WORK / "c.h5").unlink(missing_ok=True)
         done = program("fit", "one.h5", "-o", "model.json", "--modes", "none", "--rigid-body", "full",
                        "--max-iterations", "1", "--covariance", "c.h5")
@@ -195,8 +186,8 @@ class LineAtZero(unittest.TestCase):
         G[1:] = plant(self.f[1:])
         G[0] = G[1].real
         self.G = G * (1 + 1e-3 * circular(random, G.shape))
-        write_frf("dc.h5", self.f, self.G)
-        write_frf("ac.h5", self.f[1:], self.G[1:])
+        write_frf(WORK / "dc.h5", self.f, self.G)
+        write_frf(WORK / "ac.h5", self.f[1:], self.G[1:])
 
     def test_it_is_left_out_and_told(self):
         for structure in ((), ("--rigid-body", "none")):
@@ -232,7 +223,7 @@ class WeightOfZero(unittest.TestCase):
     def setUp(self):
         random = np.random.default_rng(8)
         self.sd = 1e-2 * abs(plant(F))
-        write_frf("frf.h5", F, plant(F) + self.sd * circular(random, self.sd.shape), self.sd**2)
+        write_frf(WORK / "frf.h5", F, plant(F) + self.sd * circular(random, self.sd.shape), self.sd**2)
         W = 1 / self.sd**2
         W[:, 1, 0] = 0
         with h5py.File(WORK / "w.h5", "w") as h:
@@ -286,7 +277,7 @@ class CoarseLines(unittest.TestCase):
         random = np.random.default_rng(4)
         G = plant(f)
         noise = relative * np.median(abs(G), axis=0)
-        write_frf("coarse.h5", f, G + noise * circular(random, G.shape), noise**2 * np.ones_like(abs(G)), realizations=1)
+        write_frf(WORK / "coarse.h5", f, G + noise * circular(random, G.shape), noise**2 * np.ones_like(abs(G)), realizations=1)
         done = program("fit", "coarse.h5", "-o", "model.json", "--modes", "120,250")
         return model()["fit"]["weighting"], done.stderr
 
@@ -301,7 +292,7 @@ class CoarseLines(unittest.TestCase):
         f = np.linspace(20, 400, 800)
         G = plant(f)
         sd = 1e-3 * np.median(abs(G), axis=0) * np.ones_like(abs(G))
-        write_frf("fine.h5", f, G + 10 * sd * circular(random, G.shape), sd**2, realizations=1)
+        write_frf(WORK / "fine.h5", f, G + 10 * sd * circular(random, G.shape), sd**2, realizations=1)
         fit("fine.h5", "-o", "model.json", "--modes", "120,250")
         self.assertEqual(model()["fit"]["weighting"], "total_variance")
 
@@ -314,7 +305,8 @@ class FilesOfOthers(unittest.TestCase):
         random = np.random.default_rng(seed)
         f = np.arange(first_hz, last_hz, step_hz)
         true_hz, G, sd = measure(random, 2j * np.pi * f[:, None, None])
-        write_frf("others.h5", f, G + sd * circular(np.random.default_rng(seed), G.shape), sd**2, units)
+        write_frf(WORK / "others.h5", f, G + sd * circular(np.random.default_rng(seed), G.shape), sd**2,
+                  units=units)
         fit("others.h5", "-o", "model.json")
         modes = [m for m in modes_of(model()) if f[0] < m["natural_frequency_hz"] < f[-1]]
         np.testing.assert_equal(len(modes), len(true_hz))
