@@ -4,8 +4,8 @@
 #include <string>
 
 #include "excitation/plan/experiment_plan.hpp"
-#include "hal/simulator/coloured_noise.hpp"
 #include "hal/simulator/simulated_stage.hpp"
+#include "tests/support/stages/coloured_noise.hpp"
 
 /// Random stages for judgement_study: everything that a measurement needs, drawn from one seed.
 namespace stageid::test {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "hal/simulator/dahl_friction.hpp"
 #include "tests/support/judgement/judgement_stage.hpp"
 #include "tests/support/logs/memory_log.hpp"
+#include "tests/support/stages/dahl_friction.hpp"
 
 namespace stageid::test {
 

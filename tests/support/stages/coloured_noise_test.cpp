@@ -1,4 +1,4 @@
-#include "hal/simulator/coloured_noise.hpp"
+#include "tests/support/stages/coloured_noise.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "hal/simulator/dahl_friction.hpp"
+#include "tests/support/stages/dahl_friction.hpp"
 
 #include <gtest/gtest.h>
 
