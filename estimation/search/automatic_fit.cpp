@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/fit_start.hpp"
 #include "estimation/problem/search_limit.hpp"
@@ -74,7 +73,7 @@ class AutomaticFit {
   /// exchanged; 0 if that is of no use.
   int surplus() const {
     if (selection_.exactly == 0 || selection_.keep_modes || best_.status == FitStatus::singular ||
-        at_rounding() || limit_reached() || (many() && explains_data()))
+        at_rounding() || limit_reached() || !misses_a_mode())
       return 0;
     return std::min(affordable_modes() - selection_.exactly,
                     1 + selection_.exactly / static_cast<int>(kShareAtOnce));
@@ -95,6 +94,7 @@ class AutomaticFit {
       for (bool changed = restructure(); grow() || changed; changed = restructure()) reduce();
       return;
     }
+    if (!at_rounding()) hold_hidden();
     restructure();
     if (!at_rounding()) {  // else the last fit is sufficient
       FitOptions last = quick_;
@@ -119,18 +119,15 @@ class AutomaticFit {
     options_.limit->begin_completion();
     FitOptions last = options_;
     last.judge_modes = selection_.keep_modes;
-    if (many()) last.deviation_tolerance = std::max(last.deviation_tolerance, settled());
-    last.shrink_hidden = many();
+    last.shrink_hidden = hidden_ > 0;
+    if (hidden_ > 0) last.deviation_tolerance = std::max(last.deviation_tolerance, settled());
     evidence.number = mode_number();
-    FitResult result = many() ? fit_additive_model(frf_, best_.model, last)
-                              : ranked_fit(frf_, best_.model, last, evidence);
+    FitResult result = ranked_fit(frf_, best_.model, last, evidence);
     if (const std::string ranks = describe(result.residue_ranks); !ranks.empty())
       result.decisions.push_back(ranks);
     sort_modes(result);
-    if (many())
-      evidence.number = ModeNumber::given;  // the hidden ones are held
-    else if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy() &&
-             supports_all_modes(frf_, evidence, result))
+    if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy() &&
+        supports_all_modes(frf_, evidence, result))
       evidence.alike = alike_modes(frf_, last, result);
     evidence.growth_ended = watch_.finding();
     evidence.delay_explains_more = watch_.by_delay();
@@ -151,17 +148,17 @@ class AutomaticFit {
   bool at_rounding() const { return worth_.at_rounding(best_); }
   bool limit_reached() const { return options_.limit->reached(); }
 
-  bool explains_data() const {
-    return judge_residual(frf_, lines_of(best_.model, frf_), quick_.user_weights, threads_)
-        .explained;
+  /// Whether the residual contains a mode that may be worth its parameters.
+  bool misses_a_mode() const {
+    const std::vector<ResidualMode> missed =
+        residual_modes(frf_, best_.model, quick_.user_weights, 1, threads_);
+    return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
   }
 
   ModeNumber mode_number() const {
     if (selection_.keep_modes) return ModeNumber::given;
     return selection_.exactly > 0 ? ModeNumber::asked : ModeNumber::chosen;
   }
-
-  bool many() const { return selection_.exactly > kMostGrown; }
 
   /// Whether only the number of modes is requested.
   bool is_placed() const {
@@ -176,12 +173,10 @@ class AutomaticFit {
     const std::vector<ModeCandidate> modes =
         relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
     say("start: {} by pole relocation", counted(modes.size(), "mode"));
-    model = start_of(modes);
-    if (!many()) return adopt(fit_additive_model(frf_, model, quick_));
     FitOptions still = quick_;
     still.max_iterations = 0;
-    adopt(fit_additive_model(frf_, model, still));
-    if (!at_rounding()) settle_many();
+    adopt(fit_additive_model(frf_, start_of(modes), still));
+    settle();
   }
 
   /// Newton decrement at which every free pole is within kSettled of its standard deviation.
@@ -229,21 +224,23 @@ class AutomaticFit {
     return true;
   }
 
-  /// Fits with all poles free as long as that halves the cost, then holds those of modes hidden by noise.
-  void settle_many() {
+  /// Fits with all poles free as long as that halves the cost: those of modes hidden by noise never settle.
+  void settle() {
     FitOptions while_free = quick_;
-    while_free.max_iterations = std::min(kIterationsOfMany, options_.max_iterations);
-    double before = 0.0;
-    do {
+    while_free.max_iterations = std::min(kIterationsWhileFree, options_.max_iterations);
+    for (double before = HUGE_VAL; cost() < 0.5 * before && !at_rounding() && !limit_reached();) {
       before = cost();
       FitResult free = fit_additive_model(frf_, best_.model, while_free);
-      if (free.status == FitStatus::singular) break;
+      if (free.status == FitStatus::singular) return;
       adopt(std::move(free));
-    } while (cost() < 0.5 * before && !at_rounding() && !limit_reached());
-    if (at_rounding()) return;
-    const int hidden = hold_hidden_modes(frf_, quick_.user_weights, threads_, best_);
-    say("{} of them exceed the noise; the poles of the other {} are held",
-        count_modes(best_.model) - hidden, hidden);
+    }
+  }
+
+  void hold_hidden() {
+    hidden_ = hold_hidden_modes(frf_, quick_.user_weights, threads_, best_);
+    if (hidden_ > 0)
+      say("noise hides {} of {}; their poles are held", hidden_,
+          counted(count_modes(best_.model), "mode"));
   }
 
   AdditiveModel start() {
@@ -544,6 +541,7 @@ class AutomaticFit {
   ModeWorth worth_;
   int target_;  ///< number of modes to grow to, if it is requested
   int threads_ = 1;
+  int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
   GrowthWatch watch_;
   FitResult best_;
   std::vector<std::string> decisions_;

@@ -16,6 +16,8 @@
 namespace stageid {
 namespace {
 
+constexpr std::size_t kNamed = 8;  // in a message
+
 bool is_held_by_request(const Submodel& s) { return s.frequency_held || s.damping_held; }
 
 /// Standard deviation of the frequency; if unknown, a part of the half-power width.
@@ -55,6 +57,7 @@ std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) 
     return fit.model.submodels[i].damping_ratio() < kBroad
                ? "at its bound: narrower than the line spacing, undamped or unstable"
                : "at its bound";
+  if (fit.model.submodels[i].frequency_held) return "hidden by noise and held";
   return pole_doubt(fit, i) < 1.0 ? "does not justify its parameters (BIC)"
                                   : "with a standard deviation as large";
 }
@@ -70,6 +73,11 @@ void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult&
     if (is_unsupported(*s.verdict))
       places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
                                    s.damping_ratio(), reason_of(fit, i, *s.verdict)));
+  }
+  if (places.size() > kNamed) {
+    const std::size_t more = places.size() - kNamed;
+    places.resize(kNamed);
+    places.back() += fmt::format(" and {} more", more);
   }
   // Modes that were requested as a list have been judged by the fit itself.
   if (!places.empty() && evidence.number != ModeNumber::given)
@@ -117,6 +125,7 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   const bool asked = number == ModeNumber::asked;
   const bool beside = !is_between_lines(s, fit.model.fit, asked);
   if (!beside && fit.is_held(submodel) && !is_held_by_request(s)) return ModeVerdict::at_bound;
+  if (asked && s.frequency_held) return ModeVerdict::weak;  // hold_hidden_modes()
   const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
   if (!is_held_by_request(s) && (open || (asked && is_worth_nothing(frf, fit, submodel))))
     return ModeVerdict::weak;

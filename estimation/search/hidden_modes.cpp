@@ -37,9 +37,8 @@ int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, in
     const auto numbers =
         static_cast<double>(s.numerator.size() * static_cast<std::size_t>(channels));
     const double by_noise = tail_of_chi_square(fit.removal_cost[i] / noise, numbers);
-    if (by_noise * static_cast<double>(frf.lines()) < 1.0) continue;
-    s.frequency_held = s.damping_held = true;
-    ++hidden;
+    s.frequency_held = s.damping_held = by_noise * static_cast<double>(frf.lines()) >= 1.0;
+    if (s.frequency_held) ++hidden;
   }
   return hidden;
 }

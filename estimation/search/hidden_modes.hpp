@@ -7,8 +7,8 @@
 
 namespace stageid {
 
-/// Among very many requested modes, some are hidden by noise: their poles move to the largest noise peaks and do not
-/// converge. Holds the poles of the hidden modes of `fit` at their current values.
+/// Of a requested number of modes, some may be hidden by noise: their poles move to the largest noise peaks and do not
+/// converge. Holds the poles of the hidden modes of `fit` at their current values, and frees those of the others.
 ///
 /// The noise is what the residual scatters from line to line. A mode is hidden if noise alone would reach its removal
 /// cost on more than one of the lines. @param weights of the fit, n_c x N

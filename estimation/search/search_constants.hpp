@@ -41,11 +41,10 @@ inline constexpr double kNothing = 0.1;
 /// Standard deviations: more is not chance, even in the largest of a thousand channels (p = 6e-7 each).
 inline constexpr double kClearly = 5.0;
 
-// More modes than this are placed at once before growing: those hidden by noise never settle.
+// A requested number of modes, some of which noise may hide.
 
-inline constexpr int kMostGrown = 40;
-inline constexpr int kIterationsOfMany = 6;  ///< with free poles
-/// Of the standard deviation per pole, root mean square: settled, if many modes or several ways are compared.
+inline constexpr int kIterationsWhileFree = 6;  ///< of all poles, as long as they halve the cost
+/// Of the standard deviation per pole, root mean square: settled.
 inline constexpr double kSettled = 0.02;
 
 // Resonances.

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -175,21 +176,50 @@ FrfEstimate response_of(const std::vector<double>& frequency_hz, double damping_
   return frf;
 }
 
-// There is no largest number: a search that ended at 60 modes was called trustworthy.
-TEST(AutomaticFit, FindsManyModes) {
-  std::vector<double> frequency_hz(70);
-  for (std::size_t r = 0; r < frequency_hz.size(); ++r)
-    frequency_hz[r] = 20.0 * static_cast<double>(r + 1);
+/// One channel with so many modes, 20 Hz apart, and a thousandth of noise.
+FrfEstimate comb_of(int modes) {
+  std::vector<double> frequency_hz;
+  for (int r = 1; r <= modes; ++r) frequency_hz.push_back(20.0 * r);
   FrfEstimate frf = response_of(frequency_hz, 0.003, Eigen::VectorXd::LinSpaced(4000, 5.0, 1500.0));
   test::RandomNumbers random(1);
   frf.noise_variance = 1e-6 * frf.response.cwiseAbs2();
   frf.noise_dof = 1000.0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     frf.response(0, k) += std::sqrt(frf.noise_variance(0, k)) * random.circular();
-  const FitResult fit = fit_model(frf, {});
+  return frf;
+}
+
+// There is no largest number: a search that ended at 60 modes was called trustworthy.
+TEST(AutomaticFit, FindsManyModes) {
+  const FitResult fit = fit_model(comb_of(70), {});
   EXPECT_TRUE(fit.trustworthy()) << fit.message;
-  EXPECT_EQ(fit.model.submodels.size(), frequency_hz.size());
+  EXPECT_EQ(fit.model.submodels.size(), 70U);
   EXPECT_LT(fit.model.fit.cost, 0.5);
+}
+
+// More than 40 requested modes were a path of their own, on which modes hidden by noise counted as determined.
+TEST(AutomaticFit, ModesHiddenByNoiseAreHeldAndToldWhateverTheirNumber) {
+  std::ptrdiff_t held = 0;
+  for (const int modes : {3, 40}) {
+    SCOPED_TRACE(modes);
+    FitRequest request;
+    request.modes = {ModesRequest::Kind::count, modes + 2, {}};
+    const FitResult fit = fit_model(comb_of(modes), request);
+    EXPECT_EQ(fit.status, FitStatus::undetermined);
+    EXPECT_THAT(fit.message, testing::HasSubstr("the data do not support the modes at"));
+    held += std::ranges::count(fit.model.submodels, true, &Submodel::frequency_held);
+    int determined = 0;
+    for (const Submodel& s : fit.model.submodels) {
+      EXPECT_TRUE(!s.frequency_held || s.verdict == ModeVerdict::weak);
+      if (s.verdict != ModeVerdict::determined) continue;
+      ++determined;
+      const double number = s.natural_frequency_hz() / 20.0;
+      EXPECT_LT(20.0 * std::abs(number - std::round(number)), 5.0 * *s.natural_frequency_std_hz);
+    }
+    EXPECT_EQ(determined, modes);
+    EXPECT_LT(fit.model.fit.cost, 0.5);
+  }
+  EXPECT_GE(held, 2);
 }
 
 // Clusters of five in two decades, on equally spaced lines: those of the lowest clusters are few, and wider than modes.
