@@ -24,6 +24,7 @@
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
+#include "estimation/search/trial_options.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
 #include "excitation/threads/worker_pool.hpp"
@@ -40,22 +41,11 @@ class AutomaticFit {
         structure_(structure),
         selection_(selection),
         options_(options),
-        quick_(options),
-        target_(selection.exactly) {
-    quick_.user_weights = make_weights(frf, options);
-    quick_.weighting = Weighting::user;
-    // only for the final fit; the search uses their best diagonal
-    quick_.user_weight_matrices.resize(0, 0);
-    quick_.uncertainty = false;
-    quick_.max_iterations = std::min(kGrowthIterations, options.max_iterations);
-    quick_.gradient_tolerance = 1e-5;
-    quick_.step_tolerance = 1e-7;
-    // the same minimum; the refined-IV iteration is for the final fit
-    quick_.method = FitMethod::gn;
-    quick_.residue_rank = quick_.rigid_body_rank = 0;
-    worth_ = ModeWorth(frf, structure, quick_.user_weights);
+        quick_(trial_options(frf, options)),
+        worth_(frf, structure, quick_.user_weights),
+        target_(selection.exactly),
+        threads_(worker_count(options.threads)) {
     quick_.deviation_tolerance = worth_.deviation_tolerance();
-    threads_ = worker_count(options.threads);
   }
 
   /// The first fit of every search. A search for the number of modes begins on a part of the data; a requested number
@@ -540,7 +530,7 @@ class AutomaticFit {
   FitOptions quick_;
   ModeWorth worth_;
   int target_;  ///< number of modes to grow to, if it is requested
-  int threads_ = 1;
+  int threads_;
   int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
   GrowthWatch watch_;
   FitResult best_;

@@ -264,7 +264,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (low_rank && iteration.status != FitStatus::singular)
     covariance = constrain_ranks(frf, options, problem, beta, iteration, result);
-  if (options.shrink_hidden && iteration.status != FitStatus::singular)
+  if (options.shrink_hidden && !low_rank && iteration.status != FitStatus::singular)
     shrink_hidden(problem, beta, iteration, result);
   const double relative_rms = keep_finite(frf, problem, begun, beta, iteration);
   result.status = iteration.status;

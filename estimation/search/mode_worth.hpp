@@ -22,7 +22,6 @@ double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parame
 /// variance; if the model cannot be right, it does not fit its errors.
 class ModeWorth {
  public:
-  ModeWorth() = default;
   /// @param weights n_c x N, of the fits that are compared
   ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
             const Eigen::MatrixXd& weights);

@@ -9,12 +9,11 @@
 
 #include "acquisition/files/counted.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
+#include "estimation/search/trial_options.hpp"
 #include "estimation/start/residual_modes.hpp"
 
 namespace stageid {
@@ -61,20 +60,6 @@ std::string without_silent_channels(const FrfEstimate& frf) {
         fmt::join(silent, ", "), inputs ? "--inputs" : "--outputs", fmt::join(rest, ","));
   }
   return {};
-}
-
-FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
-  FitOptions trial = options;
-  trial.limit.reset();
-  trial.user_weights = make_weights(frf, options);
-  trial.weighting = Weighting::user;
-  trial.user_weight_matrices.resize(0, 0);
-  trial.method = FitMethod::gn;
-  trial.residue_rank = trial.rigid_body_rank = 0;
-  trial.mode_ranks.clear();
-  trial.uncertainty = trial.covariance = trial.judge_modes = trial.shrink_hidden = false;
-  trial.max_iterations = kGrowthIterations;
-  return trial;
 }
 
 FitOptions with_deviations(FitOptions trial) {
@@ -142,7 +127,8 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
                        bool cut_short) {
   std::string advice = without_silent_channels(frf);
   if (!advice.empty()) return advice;
-  const FitOptions trial = trial_options(frf, options);
+  FitOptions trial = trial_options(frf, options);
+  trial.limit.reset();
   // In a search that ended early, poles have not converged.
   const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
   advice = better_structure(frf, options, trial, same, cut_short);

@@ -121,6 +121,20 @@ TEST(HiddenModes, ShrinkingSavesWhatTheorySays) {
   EXPECT_NEAR(saved / kSeeds / of_a_number, 0.75 * 4.0, 0.3);  // 0.1 by chance
 }
 
+// Shrinking solves for all numerators, which would then have any rank.
+TEST(HiddenModes, ResiduesOfAGivenRankKeepIt) {
+  Placed placed(3, {500.0});
+  placed.hold_from(4);
+  placed.options.residue_rank = 1;
+  placed.options.shrink_hidden = true;
+  const FitResult fit = fit_additive_model(placed.frf, placed.model, placed.options);
+  for (const Submodel& s : fit.model.submodels) {
+    if (!s.is_mode()) continue;
+    const Eigen::VectorXd values = s.numerator[0].jacobiSvd().singularValues();
+    EXPECT_LT(values[1], 1e-12 * values[0]);
+  }
+}
+
 // A mode above the noise keeps its numerators if another one is hidden.
 TEST(HiddenModes, WithoutAHiddenModeNothingChanges) {
   Placed placed(5, {});
