@@ -1,5 +1,7 @@
 #include "acquisition/files/file_kind.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <fstream>
 #include <regex>
@@ -108,6 +110,27 @@ std::string other_kind(const std::filesystem::path& file, const std::string& wan
 
 std::string other_hdf5_kind(const std::string& format, const std::string& wanted) {
   return sentence_of_format(format + ".h5", wanted);
+}
+
+void require_format(const Hdf5File& file, const std::string& format, const std::string& wanted,
+                    const std::string& hint) {
+  if (!file.has_attribute("/", "format"))
+    throw FormatError(file.path(), "/",
+                      fmt::format("attribute format is missing; expected '{}'", format));
+  const std::string found = file.read_text_attribute("/", "format");
+  if (found == format) return;
+  const std::string other = other_hdf5_kind(found, wanted);
+  throw FormatError(
+      file.path(), "/",
+      !other.empty() ? other : fmt::format("format is '{}'; expected '{}'{}", found, format, hint));
+}
+
+void require_version(const Hdf5File& file, long long version) {
+  const long long found = file.read_integer_attribute("/", "format_version");
+  if (found != version)
+    throw FormatError(
+        file.path(), "/",
+        fmt::format("unsupported format_version {}; this program reads {}", found, version));
 }
 
 }  // namespace stageid

@@ -6,6 +6,8 @@
 
 namespace stageid {
 
+class Hdf5File;
+
 /// By the first bytes; false also if the file cannot be read.
 bool is_hdf5(const std::filesystem::path& file);
 /// Whether these are the first bytes of an HDF5 file; at least 8.
@@ -20,5 +22,12 @@ std::string other_kind(const std::filesystem::path& file, const std::string& wan
 
 /// The same for an HDF5 file with this attribute `format`; empty if it is unknown.
 std::string other_hdf5_kind(const std::string& format, const std::string& wanted);
+
+/// @param wanted  as above @param hint  ends the message if the kind is unknown
+/// @throws FormatError unless the attribute `format` of the file is this one
+void require_format(const Hdf5File& file, const std::string& format, const std::string& wanted,
+                    const std::string& hint = "");
+/// @throws FormatError unless the attribute `format_version` is this one
+void require_version(const Hdf5File& file, long long version);
 
 }  // namespace stageid

@@ -10,6 +10,17 @@
 
 namespace stageid {
 
+/// The order of HDF5; that of Eigen is by columns.
+template <typename Scalar>
+using RowMajor = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// "[4 x 2]"
+std::string join_shape(const std::vector<hsize_t>& shape);
+
+/// @throws FormatError unless `dataset` has the shape `wanted`.
+void require_shape(const Hdf5File& file, const std::string& dataset,
+                   const std::vector<hsize_t>& wanted);
+
 /// A dataset of double, std::complex<double> or long long.
 template <typename Scalar>
 void write_array(Hdf5File& file, const std::string& dataset, const std::vector<hsize_t>& shape,
@@ -20,6 +31,15 @@ void write_array(Hdf5File& file, const std::string& dataset, const std::vector<h
     file.write_complex(dataset, shape, values);
   else
     file.write_integers(dataset, shape, values);
+}
+
+/// A dataset of double or std::complex<double>.
+template <typename Scalar>
+std::vector<Scalar> read_array(const Hdf5File& file, const std::string& dataset) {
+  if constexpr (std::is_same_v<Scalar, double>)
+    return file.read_reals(dataset);
+  else
+    return file.read_complex(dataset);
 }
 
 template <typename Vector>

@@ -54,8 +54,6 @@ void read_pieces(const LogReader& reader, std::size_t run, ConvertProgress& prog
   }
 }
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 // HDF5 ---------------------------------------------------------------------------------------
 
 void write_channels(Hdf5File& file, const std::string& name, const ChannelList& channels) {
@@ -106,7 +104,7 @@ void convert_run_to_hdf5(const LogReader& reader, std::size_t run, Hdf5File& fil
     file.create_growing(group + "/sensors", info.sensors.size(), H5T_IEEE_F64LE, kPieceRows);
     file.create_growing(group + "/marked", 0, H5T_STD_U8LE, kPieceRows);
   }
-  RowMajor rows;
+  RowMajor<double> rows;
   // The reader takes the lock itself if necessary.
   read_pieces(reader, run, progress,
               [&](std::uint64_t, std::uint64_t count, const LogSamples& samples) {
@@ -215,7 +213,7 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
                         ConvertProgress& progress) {
   const LogInfo& info = reader.info();
   const LogRun& which = reader.runs()[run];
-  const RowMajor excitation = reader.excitation(run);
+  const RowMajor<double> excitation = reader.excitation(run);
   const std::string head = fmt::format("{},{},{},", run, which.realization, which.experiment);
   const auto write = [&](std::uint64_t first, std::uint64_t count, const LogSamples& samples) {
     for (Eigen::Index r = 0; r < static_cast<Eigen::Index>(count); ++r) {

@@ -74,20 +74,8 @@ std::mutex& hdf5_mutex() noexcept {
 Hdf5LogReader::Hdf5LogReader(const std::filesystem::path& file) : path_(file) {
   const std::lock_guard lock(hdf5_mutex());
   file_ = Hdf5File::open(file);
-  const std::string format = file_->read_text_attribute("/", "format");
-  if (format != "stageid-log") {
-    const std::string other = other_hdf5_kind(format, "a log");
-    throw FormatError(
-        path_, "/",
-        !other.empty() ? other
-                       : fmt::format("attribute format is '{}'; expected 'stageid-log'", format));
-  }
-  const long long version = file_->read_integer_attribute("/", "format_version");
-  if (version != 1) {
-    throw FormatError(
-        path_, "/",
-        fmt::format("has unsupported format version {}; this program reads version 1", version));
-  }
+  require_format(*file_, "stageid-log", "a log");
+  require_version(*file_, 1);
   read_channels();
   if (!file_->exists("/runs")) {
     throw FormatError(path_, "/runs", "is missing; expected groups /runs/0000, /runs/0001, ...");

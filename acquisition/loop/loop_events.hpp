@@ -19,16 +19,13 @@ struct LoopEvent {
   std::uint8_t code = 0;
 };
 
-/// Lock-free queue from the loop to one other thread. If it is full, events are dropped and counted, because
-/// the loop must not wait.
+/// Lock-free queue from the loop to one other thread. If it is full, events are dropped, because the loop must
+/// not wait.
 class LoopEvents {
  public:
   void push(const LoopEvent& event) noexcept {
     double* const row = ring_.reserve();
-    if (row == nullptr) {
-      dropped_.fetch_add(1, std::memory_order_relaxed);
-      return;
-    }
+    if (row == nullptr) return;
     row[0] = event.run;
     row[1] = static_cast<double>(event.cycle);
     row[2] = static_cast<double>(event.kind);
@@ -45,11 +42,8 @@ class LoopEvents {
     return event;
   }
 
-  std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
-
  private:
   SampleRing ring_{4, 256};
-  std::atomic<std::uint64_t> dropped_ = 0;
 };
 
 }  // namespace stageid

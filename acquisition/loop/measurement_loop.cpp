@@ -18,10 +18,6 @@ namespace {
 
 constexpr int kBadCycle = 2;  // added to the bucket by a bad cycle; a good one subtracts 1
 
-bool ends_at_once(Outcome outcome) noexcept {
-  return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
-}
-
 bool gives_measurement(Outcome outcome) noexcept {
   return outcome == Outcome::ok || outcome == Outcome::late || outcome == Outcome::bus_passive;
 }
@@ -117,7 +113,7 @@ void MeasurementLoop::start(std::uint64_t run_seed, const LoopExcitation& excita
   if (wall_clock_) awake_ns_ = monotonic_ns();
   tell_state();
   take_measurement(Outcome::ok);
-  const std::uint64_t all = ~std::uint64_t{0} >> (64 - y_.size());
+  const std::uint64_t all = all_bits(y_.size());
   status_.marked |= (inputs_.valid & all) != all;
 }
 
@@ -308,7 +304,7 @@ void MeasurementLoop::take_measurement(Outcome outcome) noexcept {
                : outcome == Outcome::incomplete ? inputs_.valid
                                                 : 0);
   health_.missing += recording() ? 1U : 0U;
-  if (ends_at_once(outcome)) {
+  if (ends_run(outcome)) {
     last_trouble_ = outcome;
     // A replay ends with link_down in the unrecorded ramp of a good run; this is not a fault.
     if (phase_ == Phase::landing && reason_ == StopReason::none && !hold_ &&

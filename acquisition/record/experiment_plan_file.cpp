@@ -22,8 +22,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
-template <typename Value>
-using RowMajor = Eigen::Matrix<Value, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr const char* kFormat = "stageid-excitation";
 constexpr long long kVersion = 1;
@@ -99,25 +97,18 @@ class PlanReader {
     }
     return static_cast<int>(value);
   }
-  void expect_shape(const std::string& dataset, const std::vector<hsize_t>& wanted) const {
-    const std::vector<hsize_t> shape = file_.shape(dataset);
-    if (shape != wanted) {
-      fail(dataset, fmt::format("has the shape {}; expected {}", fmt::join(shape, " x "),
-                                fmt::join(wanted, " x ")));
-    }
-  }
-  MatrixXd reals(const std::string& dataset, Index rows, Index columns) const {
-    expect_shape(dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
-    const std::vector<double> values = file_.read_reals(dataset);
-    return Eigen::Map<const RowMajor<double>>(values.data(), rows, columns);
-  }
-  MatrixXcd complex(const std::string& dataset, Index rows, Index columns) const {
-    expect_shape(dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
-    const std::vector<std::complex<double>> values = file_.read_complex(dataset);
-    return Eigen::Map<const RowMajor<std::complex<double>>>(values.data(), rows, columns);
+  template <typename Scalar = double>
+  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> matrix(const std::string& dataset,
+                                                               Index rows, Index columns) const {
+    require_shape(file_, dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
+    const std::vector<Scalar> values = read_array<Scalar>(file_, dataset);
+    return Eigen::Map<const RowMajor<Scalar>>(values.data(), rows, columns);
   }
 
-  void check_format() const;
+  void check_format() const {
+    require_format(file_, kFormat, "a designed excitation");
+    require_version(file_, kVersion);
+  }
   FrequencyGrid grid() const;
   ExperimentSpec spec(const FrequencyGrid& grid) const;
   std::vector<MatrixXd> phases(const ExperimentSpec& spec, const FrequencyGrid& grid) const;
@@ -132,23 +123,6 @@ class PlanReader {
   std::filesystem::path path_;
   Hdf5File file_;
 };
-
-void PlanReader::check_format() const {
-  const bool named = file_.has_attribute("/", "format");
-  const std::string format = named ? file_.read_text_attribute("/", "format") : "";
-  if (format != kFormat) {
-    const std::string other = other_hdf5_kind(format, "a designed excitation");
-    fail("/", other.empty()
-                  ? fmt::format("attribute 'format' is '{}'; expected '{}'", format, kFormat)
-                  : other);
-  }
-  const long long version = file_.read_integer_attribute("/", "format_version");
-  if (version != kVersion) {
-    fail("/", fmt::format(
-                  "attribute 'format_version' is {}, which is unsupported; this program reads {}",
-                  version, kVersion));
-  }
-}
 
 FrequencyGrid PlanReader::grid() const {
   const std::vector<double> numbers = file_.read_reals("/lines");
@@ -185,9 +159,9 @@ std::uint64_t PlanReader::seed() const {
 std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
   const std::vector<std::string> channels = file_.read_texts("/axes");
   const auto count = static_cast<Index>(channels.size());
-  expect_shape("/level", {channels.size()});
+  require_shape(file_, "/level", {channels.size()});
   const std::vector<double> levels = file_.read_reals("/level");
-  const MatrixXd shape = file_.exists("/shape") ? reals("/shape", count, grid.size())
+  const MatrixXd shape = file_.exists("/shape") ? matrix("/shape", count, grid.size())
                                                 : MatrixXd::Zero(count, grid.size());
   std::vector<ExcitationAxis> axes;
   for (Index p = 0; p < count; ++p) {
@@ -224,7 +198,7 @@ std::vector<MatrixXd> PlanReader::phases(const ExperimentSpec& spec,
   std::vector<MatrixXd> phases;
   for (int m = 0; m < spec.realizations; ++m) {
     const std::string dataset = realization_group(m) + "/phase_rad";
-    phases.push_back(reals(dataset, axes, grid.size()));
+    phases.push_back(matrix(dataset, axes, grid.size()));
     const auto values = phases.back().array();
     if (!(values >= 0.0 && values < kTurn).all()) {
       fail(dataset,
@@ -248,14 +222,15 @@ void PlanReader::check_agrees(const ExperimentPlan& plan) const {
   };
   const Index axes = plan.axes();
   const Index lines = plan.grid().size();
-  check(reals("/amplitude", axes, lines), plan.amplitude(), "/amplitude");
-  check(complex("/mixing", axes, plan.experiments()), plan.mixing(), "/mixing");
+  check(matrix("/amplitude", axes, lines), plan.amplitude(), "/amplitude");
+  check(matrix<std::complex<double>>("/mixing", axes, plan.experiments()), plan.mixing(),
+        "/mixing");
   for (int m = 0; m < plan.spec().realizations; ++m) {
     const std::string group = realization_group(m);
     const MatrixXd phase_rad = plan.phase_rad(m);
-    check(reals(group + "/phase_rad", axes, lines), phase_rad, group + "/phase_rad");
-    check(complex(group + "/spectrum", axes, lines), unmixed_spectrum(plan.amplitude(), phase_rad),
-          group + "/spectrum");
+    check(matrix(group + "/phase_rad", axes, lines), phase_rad, group + "/phase_rad");
+    check(matrix<std::complex<double>>(group + "/spectrum", axes, lines),
+          unmixed_spectrum(plan.amplitude(), phase_rad), group + "/spectrum");
   }
 }
 

@@ -23,13 +23,6 @@ class RunWriter {
   virtual void end_run(const LogRun& run) = 0;
   /// Flushes everything written to the medium, if there is one.
   virtual void synchronize() = 0;
-
- protected:
-  RunWriter() = default;
-  RunWriter(const RunWriter&) = default;
-  RunWriter& operator=(const RunWriter&) = default;
-  RunWriter(RunWriter&&) = default;
-  RunWriter& operator=(RunWriter&&) = default;
 };
 
 }  // namespace stageid

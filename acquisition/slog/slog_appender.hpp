@@ -42,7 +42,6 @@ class SlogAppender {
 
   bool is_open() const noexcept { return static_cast<bool>(file_); }
   std::uint64_t bytes() const noexcept { return bytes_; }
-  std::uint64_t blocks() const noexcept { return next_sequence_; }
   const std::filesystem::path& path() const noexcept { return path_; }
 
  private:

@@ -117,10 +117,4 @@ constexpr std::uint64_t pack_stamp(const SampleStamp& stamp) noexcept {
          (stamp.node_us ? (std::uint64_t{1} << 32) | (std::uint64_t{*stamp.node_us} << 48) : 0U);
 }
 
-constexpr SampleStamp unpack_stamp(std::uint64_t word) noexcept {
-  SampleStamp stamp{static_cast<std::uint32_t>(word), {}};
-  if (((word >> 32) & 1U) != 0) stamp.node_us = static_cast<std::uint16_t>(word >> 48);
-  return stamp;
-}
-
 }  // namespace stageid

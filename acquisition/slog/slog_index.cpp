@@ -111,10 +111,8 @@ class Indexer {
           fmt::format("is a duplicate start of run {}", slog_run_name(block.header.run)));
     }
     SlogRunIndex run;
+    run.run = begin;
     run.run.name = slog_run_name(block.header.run);
-    run.run.realization = begin.realization;
-    run.run.experiment = begin.experiment;
-    run.run.started_utc = std::move(begin.started_utc);
     run.run.complete = false;
     run.excitation_columns = std::move(begin.excitation_columns);
     index_.runs.push_back(std::move(run));
@@ -157,7 +155,7 @@ class Indexer {
 
   void end_run(const SlogBlock& block) {
     SlogRunIndex& run = open_run(block);
-    const SlogRunEnd end = parse_run_end(read_text(source_, block));
+    const LogRun end = parse_run_end(read_text(source_, block));
     if (end.samples != run.run.samples || end.realization != run.run.realization ||
         end.experiment != run.run.experiment) {
       throw std::invalid_argument(

@@ -106,7 +106,7 @@ LogInfo parse_log_info(std::string_view text) {
   return info;
 }
 
-std::string to_json(const SlogRunBegin& begin) {
+std::string run_begin_json(const SlogRunBegin& begin) {
   return text_of({{"realization", begin.realization},
                   {"experiment", begin.experiment},
                   {"started_utc", begin.started_utc},
@@ -115,18 +115,21 @@ std::string to_json(const SlogRunBegin& begin) {
 
 SlogRunBegin parse_run_begin(std::string_view text) {
   return parse(text, "start of a run", [](const Json& json) {
-    return SlogRunBegin{json.at("realization").get<int>(), json.at("experiment").get<int>(),
-                        json.at("started_utc").get<std::string>(),
-                        json.at("excitation_columns").get<std::vector<int>>()};
+    SlogRunBegin begin;
+    begin.realization = json.at("realization").get<int>();
+    begin.experiment = json.at("experiment").get<int>();
+    begin.started_utc = json.at("started_utc").get<std::string>();
+    begin.excitation_columns = json.at("excitation_columns").get<std::vector<int>>();
+    return begin;
   });
 }
 
-std::string to_json(const SlogRunEnd& end) {
-  const RunHealth& health = end.health;
-  Json json = {{"realization", end.realization},
-               {"experiment", end.experiment},
-               {"samples", end.samples},
-               {"complete", end.complete},
+std::string run_end_json(const LogRun& run) {
+  const RunHealth& health = run.health;
+  Json json = {{"realization", run.realization},
+               {"experiment", run.experiment},
+               {"samples", run.samples},
+               {"complete", run.complete},
                {"health",
                 {{"cycles", health.cycles},
                  {"late", health.late},
@@ -135,14 +138,14 @@ std::string to_json(const SlogRunEnd& end) {
                  {"largest_lateness_ns", health.largest_lateness_ns},
                  {"seconds", health.seconds}}}};
   if (health.irregular > 0) json["health"]["irregular"] = health.irregular;
-  if (!end.timing.empty()) json["timing"] = json_of(end.timing);
+  if (!run.timing.empty()) json["timing"] = json_of(run.timing);
   return text_of(json);
 }
 
-SlogRunEnd parse_run_end(std::string_view text) {
+LogRun parse_run_end(std::string_view text) {
   return parse(text, "end of a run", [](const Json& json) {
     const Json& health = json.at("health");
-    SlogRunEnd end;
+    LogRun end;
     end.realization = json.at("realization").get<int>();
     end.experiment = json.at("experiment").get<int>();
     end.samples = json.at("samples").get<std::uint64_t>();

@@ -76,11 +76,8 @@ class Recovery {
   struct Run {
     std::uint32_t number = 0;  ///< in the old log
     SlogRunBegin begin;
-    std::uint64_t rows = 0;
     bool usable = true;  ///< its start is intact
     bool excitation = false;
-    RunHealth health;
-    RunTiming timing;
   };
 
   void take(const SlogBlock& block) {
@@ -128,7 +125,7 @@ class Recovery {
     run_->number = number;
     run_->begin = std::move(begin);
     ++report_.runs;
-    append_json(SlogBlockType::run_begin, to_json(run_->begin), block.header.time_ns);
+    append_json(SlogBlockType::run_begin, run_begin_json(run_->begin), block.header.time_ns);
   }
 
   /// A run whose start is lost gets realization -1 and is incomplete.
@@ -142,7 +139,7 @@ class Recovery {
   }
 
   void copy_excitation(const SlogBlock& block) {
-    const bool fits = run_ && run_->number == block.header.run && run_->rows == 0 &&
+    const bool fits = run_ && run_->number == block.header.run && run_->begin.samples == 0 &&
                       !run_->excitation &&
                       is_slog_excitation(block.header, info_, run_->begin.excitation_columns) &&
                       are_finite(read_payload(source_, block));
@@ -155,31 +152,29 @@ class Recovery {
     if (!are_slog_samples(block.header, info_) || !are_samples(read_payload(source_, block), info_))
       return lose(block);
     open_orphan(block);
-    if (block.header.first_row < run_->rows || !fill(block.header.first_row)) return lose(block);
-    copy(block, run_->rows);
-    run_->rows += block.header.rows;
+    if (block.header.first_row < run_->begin.samples || !fill(block.header.first_row))
+      return lose(block);
+    copy(block, run_->begin.samples);
+    run_->begin.samples += block.header.rows;
     report_.rows_kept += block.header.rows;
   }
 
   void end_run(const SlogBlock& block) {
-    const SlogRunEnd end = parse_run_end(read_text(source_, block));
+    const LogRun end = parse_run_end(read_text(source_, block));
     open_orphan(block);
-    const bool whole = end.samples >= run_->rows && fill(end.samples);
-    run_->health = end.health;
-    run_->timing = end.timing;
+    const bool whole = end.samples >= run_->begin.samples && fill(end.samples);
+    run_->begin.health = end.health;
+    run_->begin.timing = end.timing;
     close_run(end.complete && whole, block.header.time_ns);
   }
 
   void close_run(bool complete = false, std::int64_t time_ns = 0) {
     if (!run_) return;
     const bool excited = run_->excitation || run_->begin.excitation_columns.empty();
-    const bool usable = complete && run_->usable && excited;
-    report_.complete_runs += usable ? 1 : 0;
-    run_->health.marked += filled_;
-    append_json(SlogBlockType::run_end,
-                to_json(SlogRunEnd{run_->begin.realization, run_->begin.experiment, run_->rows,
-                                   usable, run_->health, run_->timing}),
-                time_ns);
+    run_->begin.complete = complete && run_->usable && excited;
+    report_.complete_runs += run_->begin.complete ? 1 : 0;
+    run_->begin.health.marked += filled_;
+    append_json(SlogBlockType::run_end, run_end_json(run_->begin), time_ns);
     report_.rows_lost += filled_;
     filled_ = 0;
     run_.reset();
@@ -195,20 +190,21 @@ class Recovery {
   /// Appends marked rows of zeros up to `row`. @returns false if the number is implausible
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
-    const std::uint64_t missing = row - run_->rows;
+    const std::uint64_t missing = row - run_->begin.samples;
     if (missing > scan_.file_bytes || !may_add(missing * sizeof(double) * words)) return false;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
     for (std::size_t r = 0; r < kFillRows; ++r) {
       rows[(r + 1) * words - 1] = std::bit_cast<double>(status);
     }
-    while (run_->rows < row) {
+    while (run_->begin.samples < row) {
       SlogBlockHeader made = header(SlogBlockType::samples, 0);
       made.cols = words;
-      made.rows = static_cast<std::uint32_t>(std::min<std::uint64_t>(kFillRows, row - run_->rows));
-      made.first_row = run_->rows;
+      made.rows =
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(kFillRows, row - run_->begin.samples));
+      made.first_row = run_->begin.samples;
       out_.append(made, std::as_bytes(std::span(rows).first(std::size_t{made.rows} * words)));
-      run_->rows += made.rows;
+      run_->begin.samples += made.rows;
     }
     filled_ += missing;
     return true;

@@ -127,7 +127,7 @@ void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::Matr
         excitation.rows(), excitation.cols(), state.info.period_samples,
         state.info.excitation.size()));
   }
-  SlogRunBegin begin{run.realization, run.experiment, run.started_utc, {}};
+  SlogRunBegin begin{run, {}};
   std::vector<double> stored;
   for (Eigen::Index column = 0; column < excitation.cols(); ++column) {
     if (excitation.col(column).isZero(0.0)) continue;
@@ -138,7 +138,7 @@ void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::Matr
   state.open_run = run;
   state.open_run->samples = 0;
   ++state.runs;
-  state.appender.append(state.header(SlogBlockType::run_begin), to_json(begin));
+  state.appender.append(state.header(SlogBlockType::run_begin), run_begin_json(begin));
   if (stored.empty()) return;
   SlogBlockHeader header = state.header(SlogBlockType::excitation);
   header.rows = static_cast<std::uint32_t>(excitation.rows());
@@ -166,10 +166,11 @@ void SlogWriter::write(std::span<const double> rows) {
 
 void SlogWriter::end_run(const LogRun& run) {
   State& state = *state_;
-  const LogRun& open = state.run("end_run");
-  const SlogRunEnd end{open.realization, open.experiment, open.samples,
-                       run.complete,     run.health,      run.timing};
-  state.appender.append(state.header(SlogBlockType::run_end), to_json(end));
+  LogRun end = state.run("end_run");
+  end.complete = run.complete;
+  end.health = run.health;
+  end.timing = run.timing;
+  state.appender.append(state.header(SlogBlockType::run_end), run_end_json(end));
   state.open_run.reset();
 }
 

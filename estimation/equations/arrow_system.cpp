@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimation/products/channel_equations.hpp"
 #include "excitation/threads/worker_pool.hpp"
@@ -81,32 +82,24 @@ void ArrowSystem::add_block(const GroupProducts& products, const TileRange& bloc
   const Eigen::MatrixXd B = beta_.B(members, Eigen::all);
   const LineSums sums = line_sums(products, block, B);
   add_denominators(sums);
-  std::vector<Channel> passing;
+  std::vector<Channel> channels;
   for (Eigen::Index first = 0; first < block.members && regular_; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, block.members - first);
-    const std::vector<Channel*> channels = places(members.data() + first, count, passing);
+    channels.resize(static_cast<std::size_t>(count));
     for (Eigen::Index i = 0; i < count; ++i) {
-      Channel& channel = *channels[static_cast<std::size_t>(i)];
+      Channel& channel = channels[static_cast<std::size_t>(i)];
       set_channel(sums, B, first + i, channel);
       if (problem_.delays() > 0)
         add_delays(sums, B, first + i, members[static_cast<std::size_t>(first + i)], channel);
     }
-    eliminate(channels);
+    add_channels(members.data() + first, channels);
   }
 }
 
-std::vector<ArrowSystem::Channel*> ArrowSystem::places(const Eigen::Index* channels,
-                                                       Eigen::Index count,
-                                                       std::vector<Channel>& passing) {
-  if (!keeps()) passing.resize(static_cast<std::size_t>(count));
-  std::vector<Channel*> out;
-  for (Eigen::Index i = 0; i < count; ++i)
-    out.push_back(keeps() ? &kept(channels[i]) : &passing[static_cast<std::size_t>(i)]);
-  return out;
-}
-
-ArrowSystem::Channel& ArrowSystem::kept(Eigen::Index c) {
-  return channels_[static_cast<std::size_t>(c - range_.first)];
+void ArrowSystem::add_channels(const Eigen::Index* places, std::vector<Channel>& channels) {
+  if (use_ != ChannelEquationsUse::only_kept) eliminate(channels);
+  for (std::size_t i = 0; keeps() && i < channels.size(); ++i)
+    channels_[static_cast<std::size_t>(places[i] - range_.first)] = std::move(channels[i]);
 }
 
 void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
@@ -118,10 +111,9 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
   });
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index globals = problem_.globals();
-  std::vector<Channel> passing;
-  const std::vector<Channel*> channels = places(begin, end - begin, passing);
+  std::vector<Channel> channels(own.size());
   for (std::size_t r = 0; r < own.size(); ++r) {
-    Channel& channel = *channels[r];
+    Channel& channel = channels[r];
     const auto& [M, e] = own[r];
     channel.bb = M.topLeftCorner(n_f, n_f);
     channel.ab = M.bottomLeftCorner(globals, n_f);
@@ -130,7 +122,7 @@ void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
     M_ += M.bottomRightCorner(globals, globals);
     e_ += e.tail(globals);
   }
-  eliminate(channels);
+  add_channels(begin, channels);
 }
 
 void ArrowSystem::add_denominators(const LineSums& sums) {
@@ -191,12 +183,11 @@ void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eig
   }
 }
 
-void ArrowSystem::eliminate(const std::vector<Channel*>& channels) {
-  if (use_ == ChannelEquationsUse::only_kept) return;
+void ArrowSystem::eliminate(std::vector<Channel>& channels) {
   std::vector<char> solved(channels.size());
   const int threads = problem_.functions() < kManyFunctions ? 1 : problem_.threads;
   for_each_task(threads, static_cast<int>(channels.size()), [&](int i) {
-    Channel& channel = *channels[static_cast<std::size_t>(i)];
+    Channel& channel = channels[static_cast<std::size_t>(i)];
     Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);
     rhs << channel.ba, channel.e;
     Eigen::MatrixXd solution;
@@ -208,7 +199,7 @@ void ArrowSystem::eliminate(const std::vector<Channel*>& channels) {
   for (std::size_t i = 0; i < channels.size(); ++i) {
     regular_ = regular_ && solved[i] != 0;
     if (!regular_) return;
-    const Channel& channel = *channels[i];
+    const Channel& channel = channels[i];
     schur_.noalias() -= channel.ab * channel.Z;
     schur_e_.noalias() -= channel.ab * channel.x;
   }

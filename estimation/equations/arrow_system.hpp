@@ -69,10 +69,6 @@ class ArrowSystem {
 
  private:
   bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
-  Channel& kept(Eigen::Index c);
-  /// Destinations of the equations of these channels: storage, or `passing`.
-  std::vector<Channel*> places(const Eigen::Index* channels, Eigen::Index count,
-                               std::vector<Channel>& passing);
   void add_block(const GroupProducts& products, const TileRange& block);
   void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
   void add_denominators(const LineSums& sums);
@@ -80,7 +76,9 @@ class ArrowSystem {
                    Channel& channel) const;
   void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                   Eigen::Index index, Channel& channel);
-  void eliminate(const std::vector<Channel*>& channels);  ///< in the given order
+  /// Eliminates the channels in the given order, and stores them if they are kept.
+  void add_channels(const Eigen::Index* places, std::vector<Channel>& channels);
+  void eliminate(std::vector<Channel>& channels);
   Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
                               const std::vector<Eigen::Index>& frozen) const;
 

@@ -1,33 +1,18 @@
 #include "estimation/equations/joint_equations.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "estimation/products/weighted_products.hpp"
-#include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 namespace {
 
 constexpr int kMostIterations = 1000;
 
-/// Calls task(first line, lines) for every tile, tiles in parallel, and adds the results in order.
-template <typename Value, typename Task>
-Value tile_sum(Eigen::Index lines, int threads, Value zero, const Task& task) {
-  const auto tiles = static_cast<int>((lines + kTileLines - 1) / kTileLines);
-  std::vector<Value> parts(static_cast<std::size_t>(tiles), zero);
-  for_each_task(threads, tiles, [&](int tile) {
-    const Eigen::Index first = tile * kTileLines;
-    parts[static_cast<std::size_t>(tile)] = task(first, std::min(kTileLines, lines - first));
-  });
-  for (const Value& part : parts) zero += part;
-  return zero;
-}
-
-Eigen::MatrixXcd residual_tile(const Residual& E, Eigen::Index first, Eigen::Index lines) {
-  Eigen::MatrixXcd X(E.re.rows(), lines);
-  X.real() = E.re.middleCols(first, lines);
-  X.imag() = E.im.middleCols(first, lines);
+Eigen::MatrixXcd residual_tile(const SplitMatrix& E, IndexRange lines) {
+  Eigen::MatrixXcd X(E.re.rows(), lines.count);
+  X.real() = E.re.middleCols(lines.first, lines.count);
+  X.imag() = E.im.middleCols(lines.first, lines.count);
   return X;
 }
 
@@ -35,7 +20,7 @@ Eigen::MatrixXcd residual_tile(const Residual& E, Eigen::Index first, Eigen::Ind
 
 JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& weights,
                                const FitParameters& beta, const std::vector<BasisGroup>& groups,
-                               const Residual& E)
+                               const SplitMatrix& E)
     : problem_(problem),
       weights_(weights),
       beta_(beta),
@@ -50,8 +35,7 @@ JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& 
       T_.im(group.channels, Eigen::all) = B * group.T.im.transpose();
     }
   }
-  e_ = weighted_adjoint(
-      [&](Eigen::Index first, Eigen::Index lines) { return residual_tile(E, first, lines); });
+  e_ = weighted_adjoint([&](IndexRange lines) { return residual_tile(E, lines); });
 }
 
 Eigen::Index JointEquations::size() const noexcept { return problem_.parameters(); }
@@ -59,25 +43,23 @@ Eigen::Index JointEquations::size() const noexcept { return problem_.parameters(
 /// sum Re{J^H W X}, X given by tiles.
 template <typename Columns>
 Eigen::VectorXd JointEquations::weighted_adjoint(const Columns& columns) const {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size());
-  return tile_sum(problem_.size(), problem_.threads, zero,
-                  [&](Eigen::Index first, Eigen::Index lines) {
-                    Eigen::MatrixXcd X = columns(first, lines);
-                    weights_.apply(first, X);
-                    Eigen::VectorXd part = zero;
-                    add_adjoint(X, first, part);
-                    return part;
-                  });
+  const auto adjoint = [&](IndexRange lines) {
+    Eigen::MatrixXcd X = columns(lines);
+    weights_.apply(lines.first, X);
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
+    add_adjoint(X, lines.first, sum);
+    return sum;
+  };
+  return ordered_sum(ranges_of(problem_.size(), kTileLines), problem_.threads, adjoint);
 }
 
 Eigen::VectorXd JointEquations::product(const Eigen::VectorXd& v) const {
-  return weighted_adjoint(
-      [&](Eigen::Index first, Eigen::Index lines) { return response_change(v, first, lines); });
+  return weighted_adjoint([&](IndexRange lines) { return response_change(v, lines); });
 }
 
 /// J v on some lines, n_c x lines: dB F^T + B dF^T, and the delays.
-Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Eigen::Index first,
-                                                 Eigen::Index lines) const {
+Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, IndexRange range) const {
+  const auto [first, lines] = range;
   const Eigen::Index n_f = problem_.functions();
   const Eigen::MatrixXd dB = v.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
   Eigen::MatrixXcd change(problem_.channels(), lines);
@@ -150,19 +132,18 @@ JointEquations::Solution JointEquations::solve(const Eigen::VectorXd& right_side
     for (const Eigen::Index i : frozen) v[i] = 0.0;
     return v;
   };
-  Solution solution{Eigen::VectorXd::Zero(size()), freeze(right_side), 0, false};
+  Solution solution{Eigen::VectorXd::Zero(size()), freeze(right_side), false};
   Eigen::VectorXd& r = solution.residual;
   Eigen::VectorXd z = arrow_.solve(r, damping, frozen);
   Eigen::VectorXd direction = z;
   double rz = r.dot(z);
   const double wanted = tolerance * tolerance * rz;
-  while (rz > wanted && solution.iterations < kMostIterations) {
+  for (int i = 0; rz > wanted && i < kMostIterations; ++i) {
     Eigen::VectorXd q = product(direction);
     q.head(globals) += damped.cwiseProduct(direction.head(globals));
     q = freeze(std::move(q));
     const double curvature = direction.dot(q);
     if (!(curvature > 0.0)) break;  // singular to rounding
-    ++solution.iterations;
     solution.x += rz / curvature * direction;
     r -= rz / curvature * q;
     z = arrow_.solve(r, damping, frozen);
@@ -174,14 +155,15 @@ JointEquations::Solution JointEquations::solve(const Eigen::VectorXd& right_side
   return solution;
 }
 
-double weighted_cost(const FitProblem& problem, const WeightMatrices& weights, const Residual& E) {
-  const double sum =
-      tile_sum(problem.size(), problem.threads, 0.0, [&](Eigen::Index first, Eigen::Index lines) {
-        const Eigen::MatrixXcd X = residual_tile(E, first, lines);
-        Eigen::MatrixXcd WX = X;
-        weights.apply(first, WX);
-        return WX.cwiseProduct(X.conjugate()).real().sum();
-      });
+double weighted_cost(const FitProblem& problem, const WeightMatrices& weights,
+                     const SplitMatrix& E) {
+  const auto squares = [&](IndexRange lines) {
+    const Eigen::MatrixXcd X = residual_tile(E, lines);
+    Eigen::MatrixXcd WX = X;
+    weights.apply(lines.first, WX);
+    return WX.cwiseProduct(X.conjugate()).real().sum();
+  };
+  const double sum = ordered_sum(ranges_of(problem.size(), kTileLines), problem.threads, squares);
   return sum / (2.0 * static_cast<double>(problem.size()));
 }
 

@@ -23,7 +23,7 @@ class JointEquations {
   /// weights.marginal(). All of them must outlive the equations.
   JointEquations(const FitProblem& problem, const WeightMatrices& weights,
                  const FitParameters& beta, const std::vector<BasisGroup>& groups,
-                 const Residual& E);
+                 const SplitMatrix& E);
 
   Eigen::Index size() const noexcept;
   const Eigen::VectorXd& gradient() const noexcept { return e_; }  ///< e
@@ -36,7 +36,6 @@ class JointEquations {
   struct Solution {
     Eigen::VectorXd x;
     Eigen::VectorXd residual;  ///< right_side minus M x, on the free parameters
-    int iterations = 0;
     bool converged = false;
   };
   /// (M + damping D)^-1 right_side on the free parameters, D the diagonal of the Schur complement of the arrow;
@@ -48,8 +47,7 @@ class JointEquations {
  private:
   template <typename Columns>
   Eigen::VectorXd weighted_adjoint(const Columns& columns) const;
-  Eigen::MatrixXcd response_change(const Eigen::VectorXd& v, Eigen::Index first,
-                                   Eigen::Index lines) const;
+  Eigen::MatrixXcd response_change(const Eigen::VectorXd& v, IndexRange range) const;
   void add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first, Eigen::VectorXd& sum) const;
 
   const FitProblem& problem_;
@@ -63,6 +61,7 @@ class JointEquations {
 };
 
 /// 1/(2N) sum vec(E)^H W_k vec(E).
-double weighted_cost(const FitProblem& problem, const WeightMatrices& weights, const Residual& E);
+double weighted_cost(const FitProblem& problem, const WeightMatrices& weights,
+                     const SplitMatrix& E);
 
 }  // namespace stageid

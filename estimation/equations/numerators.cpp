@@ -37,41 +37,31 @@ struct NumeratorSums {
   }
 };
 
-/// Lower triangles of F^H W F, computed per channel; for few channels.
-class OwnGrams {
- public:
-  OwnGrams(Eigen::Index members, Eigen::Index n_f)
-      : grams_(static_cast<std::size_t>(members), Eigen::MatrixXd::Zero(n_f, n_f)) {}
-
-  void add(const BasisGroup& group, Eigen::Index first, const DataTile& data) {
-    const Eigen::Index n = data.W.cols();
-    Eigen::MatrixXd X(group.F.re.cols(), 2 * n);
-    for (std::size_t r = 0; r < grams_.size(); ++r) {
-      const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
-      X.leftCols(n) = group.F.re.middleRows(first, n).transpose() * root.asDiagonal();
-      X.rightCols(n) = group.F.im.middleRows(first, n).transpose() * root.asDiagonal();
-      grams_[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
-    }
+/// Lower triangles of F^H W F of a tile, computed per channel; for few channels.
+void add_grams(const BasisGroup& group, Eigen::Index first, const DataTile& data,
+               std::vector<Eigen::MatrixXd>& grams) {
+  const Eigen::Index n = data.W.cols();
+  Eigen::MatrixXd X(group.F.re.cols(), 2 * n);
+  for (std::size_t r = 0; r < grams.size(); ++r) {
+    const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
+    X.leftCols(n) = group.F.re.middleRows(first, n).transpose() * root.asDiagonal();
+    X.rightCols(n) = group.F.im.middleRows(first, n).transpose() * root.asDiagonal();
+    grams[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
   }
+}
 
-  /// In the order of triangular_pairs().
-  void pack(Eigen::MatrixXd& FF) const {
-    for (std::size_t r = 0; r < grams_.size(); ++r) {
-      Eigen::Index p = 0;
-      for (Eigen::Index i = 0; i < grams_[r].rows(); ++i)
-        for (Eigen::Index j = 0; j <= i; ++j)
-          FF(p++, static_cast<Eigen::Index>(r)) = grams_[r](i, j);
-    }
-  }
-
- private:
-  std::vector<Eigen::MatrixXd> grams_;
-};
+/// The lower triangle of a gram in the order of `pairs`.
+Eigen::VectorXd packed(const Eigen::MatrixXd& gram, const std::vector<ColumnPair>& pairs) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(pairs.size()));
+  Eigen::Index p = 0;
+  for (const auto& [i, j] : pairs) out[p++] = gram(i, j);
+  return out;
+}
 
 /// The sums without FF and S. @param B numerators, members x n_f
 NumeratorSums residual_sums(const FitProblem& problem, const BasisGroup& group,
                             const TileRange& block, const Eigen::MatrixXd& B) {
-  return sum_over_shares<NumeratorSums>(block, problem.threads, [&](const TileRange& share) {
+  return ordered_sum(line_shares(block), problem.threads, [&](const TileRange& share) {
     NumeratorSums sums;
     sums.FE.setZero(problem.functions(), share.members);
     DataTile data;
@@ -95,22 +85,25 @@ NumeratorSums gram_sums(const FitProblem& problem, const BasisGroup& group,
                     share.members);
     sums.FE.setZero(problem.functions(), share.members);
     sums.S.setZero(share.members, base);
-    OwnGrams own(few ? share.members : 0, problem.functions());
+    std::vector<Eigen::MatrixXd> own(
+        static_cast<std::size_t>(few ? share.members : 0),
+        Eigen::MatrixXd::Zero(problem.functions(), problem.functions()));
     DataTile data;
     for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
       data.load(problem, group, share, {}, first, n);
       if (few) {
-        own.add(group, first, data);
+        add_grams(group, first, data, own);
       } else {
         add_pair_sums(data.W, group.F, group.F, pairs.direct(), first, sums.FF);
         add_fraction_sums(data.W, group.fractions, first, sums.S);
       }
       add_weighted_gradient(group, first, data, sums.FE);
     });
-    if (few) own.pack(sums.FF);
+    for (std::size_t r = 0; r < own.size(); ++r)
+      sums.FF.col(static_cast<Eigen::Index>(r)) = packed(own[r], pairs.pairs());
     return sums;
   };
-  NumeratorSums all = sum_over_shares<NumeratorSums>(block, problem.threads, add);
+  NumeratorSums all = ordered_sum(line_shares(block), problem.threads, add);
   if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
   return all;
 }

@@ -56,20 +56,6 @@ double relative_step(const FitProblem& problem, const FitParameters& beta,
   return largest;
 }
 
-/// max_i |e_i| / sqrt(M_ii 2 N cost), 0 to 1: the cosine between the residual and the effect of a parameter.
-double scaled_gradient(const FitProblem& problem, const ArrowSystem& system,
-                       const std::vector<Eigen::Index>& frozen, double cost) {
-  const double total = 2.0 * static_cast<double>(problem.size()) * cost;
-  double largest = 0.0;
-  for (Eigen::Index i = 0; i < system.schur_gradient().size(); ++i) {
-    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
-    largest =
-        std::max(largest, std::abs(system.schur_gradient()[i]) /
-                              std::sqrt(std::max(std::abs(system.schur()(i, i)) * total, 1e-300)));
-  }
-  return largest;
-}
-
 class Iteration {
  public:
   Iteration(const FitProblem& problem, FitParameters& beta, const FitOptions& options)
@@ -135,42 +121,39 @@ class Iteration {
     if (options_.progress) options_.progress(result_.iterations, cost_);
   }
 
-  /// True if the equations show convergence; `result_` is then complete.
-  bool at_optimum(const ArrowSystem& system) {
+  double squares() const { return 2.0 * static_cast<double>(problem_.size()) * cost_; }
+
+  void read_gradient(const ArrowSystem& system) {
     result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(problem_, system, result_.frozen, cost_);
-    if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance) {
-      result_.end(
+    gradient_ = scaled_gradient(system.schur(), system.schur_gradient(), result_.frozen, squares());
+  }
+
+  /// @returns false if the equations show convergence; `result_` is then complete.
+  bool may_continue(const ArrowSystem& system) {
+    read_gradient(system);
+    if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance)
+      return result_.end(
           FitStatus::gradient_small,
           fmt::format("converged: the first-order condition is satisfied, scaled gradient {:.2g}",
                       gradient_));
-      return true;
-    }
     // Newton decrement: the distance to the stationary point in standard deviations of the noise estimated from the
     // residual.
     const double data = static_cast<double>(problem_.size() * problem_.channels());
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
     const double decrement =
         std::abs(system.solve_globals(0.0, result_.frozen).dot(system.schur_gradient()));
-    result_.deviations = std::sqrt(decrement * data / squares);
-    if (result_.deviations < options_.deviation_tolerance) {
-      result_.end(
+    result_.deviations = std::sqrt(decrement * data / squares());
+    if (result_.deviations < options_.deviation_tolerance)
+      return result_.end(
           FitStatus::gradient_small,
           fmt::format("converged: within {:.1g} standard deviations of the first-order condition, "
                       "scaled gradient {:.2g}",
                       result_.deviations, gradient_));
-      return true;
-    }
-    if (cost_ < 1e-28 * signal_cost_) {
-      result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
-      return true;
-    }
+    if (cost_ < 1e-28 * signal_cost_)
+      return result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
     // A quadratic cost falls by the decrement.
-    if (cost_ * decrement / squares < kWorthwhilePart * (cost_ - options_.worthwhile_cost)) {
-      result_.end(FitStatus::iteration_limit, "given up: the cost does not fall far enough");
-      return true;
-    }
-    return false;
+    if (cost_ * decrement / squares() < kWorthwhilePart * (cost_ - options_.worthwhile_cost))
+      return result_.end(FitStatus::iteration_limit, "given up: the cost does not fall far enough");
+    return true;
   }
 
   bool nearly_exact() const { return cost_ < kNearlyExact * signal_cost_; }
@@ -185,7 +168,7 @@ class Iteration {
     if (!system.regular())
       return all_digits() ||
              result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
-    if (at_optimum(system)) return false;
+    if (!may_continue(system)) return false;
     const double before = cost_;
     const int tries = at_rounding() ? kTriesAtRounding : kTries;
     if (attempt(system, method == FitMethod::riv ? kTriesOfRiv : tries)) {
@@ -243,8 +226,7 @@ class Iteration {
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
       return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
-    result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(problem_, system, result_.frozen, cost_);
+    read_gradient(system);
     Eigen::VectorXd step = system.solve_globals(0.0, result_.frozen);
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
@@ -301,6 +283,16 @@ bool IterationResult::end_without_step(const std::string& detail) {
              fmt::format("no step lowers the cost, {:.1g} standard deviations from the first-order "
                          "condition{}",
                          deviations, detail));
+}
+
+double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,
+                       const std::vector<Eigen::Index>& frozen, double squares) {
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < e.size(); ++i)
+    if (std::find(frozen.begin(), frozen.end(), i) == frozen.end())
+      largest = std::max(largest,
+                         std::abs(e[i]) / std::sqrt(std::max(std::abs(M(i, i)) * squares, 1e-300)));
+  return largest;
 }
 
 double signal_cost(const FitProblem& problem) {

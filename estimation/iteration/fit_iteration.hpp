@@ -9,6 +9,8 @@
 
 namespace stageid {
 
+class ResidueFactors;
+
 struct IterationResult {
   FitStatus status = FitStatus::iteration_limit;
   std::string message;
@@ -36,6 +38,15 @@ IterationResult iterate(const FitProblem& problem, FitParameters& beta, const Fi
 IterationResult iterate(const FitProblem& problem, const WeightMatrices& weights,
                         FitParameters& beta, const FitOptions& options);
 
+/// Minimizes the cost over numerators of given ranks (FitOptions::residue_rank and rigid_body_rank), starting from an
+/// unconstrained fit `beta`, which is updated with its `factors`. Modes outside the lines represent several modes and
+/// remain free.
+/// Method: damped Gauss-Newton on denominators, delays and residue factors together. The unconstrained normal matrix
+/// is multiplied by the derivatives of the factors from both sides, so an iteration costs as much as an unconstrained
+/// one. See docs/theory.md, section 5.
+IterationResult iterate_low_rank(const FitProblem& problem, FitParameters& beta,
+                                 ResidueFactors& factors, const FitOptions& options);
+
 /// If no step lowers the cost, the cost is at rounding level if the stationary point is at most this many standard
 /// deviations away.
 inline constexpr double kRoundingDeviations = 0.05;
@@ -43,6 +54,11 @@ inline constexpr double kRoundingDeviations = 0.05;
 /// Part of the weighted power of the data: if no step lowers a residual below it, the residual is rounding, not a
 /// stalled fit. 1e-10 of the amplitude, the accuracy of coinciding poles in double precision.
 inline constexpr double kNothingLeft = 1e-20;
+
+/// max_i |e_i| / sqrt(M_ii squares), 0 to 1: the cosine between the residual and the effect of a parameter.
+/// @param squares sum W |E|^2
+double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,
+                       const std::vector<Eigen::Index>& frozen, double squares);
 
 /// sum W |G|^2 / (2N): the cost without a model.
 double signal_cost(const FitProblem& problem);

@@ -30,18 +30,17 @@ class JointIteration {
 
   IterationResult run() {
     E_ = residual_at(beta_);
-    result_.cost.push_back(E_.cost);
+    cost_ = weighted_cost(problem_, weights_, E_);
+    result_.cost.push_back(cost_);
     while (iterate_once()) {
     }
-    result_.end_cost = E_.cost;
+    result_.end_cost = cost_;
     return std::move(result_);
   }
 
  private:
-  Residual residual_at(const FitParameters& beta) const {
-    Residual E = residual(problem_, evaluate_groups(problem_, beta, false), beta.B);
-    E.cost = weighted_cost(problem_, weights_, E);
-    return E;
+  SplitMatrix residual_at(const FitParameters& beta) const {
+    return residual(problem_, evaluate_groups(problem_, beta, false), beta.B);
   }
 
   /// @returns false at the end; `result_` then has the reason.
@@ -53,7 +52,7 @@ class JointIteration {
     if (!equations.regular())
       return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
     const Eigen::VectorXd step = free_step(equations);
-    if (at_optimum(equations.gradient().dot(step))) return false;
+    if (!may_continue(equations.gradient().dot(step))) return false;
     if (result_.iterations >= options_.max_iterations)
       return result_.end(
           FitStatus::iteration_limit,
@@ -61,7 +60,7 @@ class JointIteration {
                       "first-order condition",
                       result_.iterations, result_.deviations));
     if (descend(equations, step)) return true;
-    if (E_.cost < kNothingLeft * signal_cost_)
+    if (cost_ < kNothingLeft * signal_cost_)
       return result_.end(
           FitStatus::step_small,
           "converged: the residual is at rounding level and no step lowers the cost");
@@ -79,23 +78,20 @@ class JointIteration {
 
   /// By the Newton decrement over all parameters: the length of the step in standard deviations of the noise estimated
   /// from the residual, and as a part of that residual.
-  bool at_optimum(double decrement) {
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * E_.cost;
+  bool may_continue(double decrement) {
+    const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
     const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
     result_.deviations =
         gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
-    if (E_.cost < 1e-28 * signal_cost_) {
-      result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
-      return true;
-    }
+    if (cost_ < 1e-28 * signal_cost_)
+      return result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
     if (gradient >= options_.gradient_tolerance &&
         result_.deviations >= options_.deviation_tolerance)
-      return false;
-    result_.end(
+      return true;
+    return result_.end(
         FitStatus::gradient_small,
         fmt::format("converged: within {:.1g} standard deviations of the first-order condition",
                     result_.deviations));
-    return true;
   }
 
   /// Tries steps with increasing damping, starting with `step`; accepts the first that lowers the cost.
@@ -118,13 +114,15 @@ class JointIteration {
     FitParameters trial = stepped(problem_, beta_, step.head(globals));
     trial.B += step.tail(step.size() - globals).reshaped(trial.B.rows(), trial.B.cols());
     if (!bounds_.stabilize(beta_, trial)) return false;
-    Residual E = residual_at(trial);
-    if (!(E.cost < E_.cost)) return false;
+    SplitMatrix E = residual_at(trial);
+    const double cost = weighted_cost(problem_, weights_, E);
+    if (!(cost < cost_)) return false;
     beta_ = std::move(trial);
     E_ = std::move(E);
-    result_.cost.push_back(E_.cost);
+    cost_ = cost;
+    result_.cost.push_back(cost_);
     ++result_.iterations;
-    if (options_.progress) options_.progress(result_.iterations, E_.cost);
+    if (options_.progress) options_.progress(result_.iterations, cost_);
     return true;
   }
 
@@ -133,7 +131,8 @@ class JointIteration {
   FitParameters& beta_;
   const FitOptions& options_;
   PoleBounds bounds_;
-  Residual E_;  // at beta_
+  SplitMatrix E_;      // at beta_
+  double cost_ = 0.0;  // at beta_
   IterationResult result_;
   double signal_cost_ = 0.0;
   double levenberg_ = 0.0;

@@ -1,11 +1,11 @@
-#include "estimation/iteration/low_rank_iteration.hpp"
-
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/equations/residue_factors.hpp"
+#include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/problem/pole_bounds.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/problem/search_limit.hpp"
@@ -80,11 +80,7 @@ class LowRankIteration {
       return result_.end(FitStatus::singular, "the residue factors are singular");
     result_.frozen = bounds_.leaning(beta_, g_.head(problem_.globals()));
     const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
-    gradient_ = 0.0;
-    for (Eigen::Index i = 0; i < g_.size(); ++i)
-      if (std::find(result_.frozen.begin(), result_.frozen.end(), i) == result_.frozen.end())
-        gradient_ =
-            std::max(gradient_, std::abs(g_[i]) / std::sqrt(std::max(N_(i, i) * squares, 1e-300)));
+    gradient_ = scaled_gradient(N_, g_, result_.frozen, squares);
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     result_.deviations = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
     if (gradient_ < options_.gradient_tolerance ||

@@ -7,6 +7,9 @@
 namespace stageid {
 namespace {
 
+constexpr double kMostDifference = 0.05;  // of the frequency; modes farther apart are not paired
+constexpr double kLeastMac = 0.1;  // of the residues; modes with less similar shapes are not paired
+
 struct Candidate {
   ModePair pair;
   double worth = 0.0;
@@ -21,11 +24,8 @@ Eigen::MatrixXcd as_columns(const std::vector<ModeShape>& modes,
   return out;
 }
 
-bool is_share(double value) { return value > 0.0 && value <= 1.0; }
-
 std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
-                                  const std::vector<ModeShape>& second,
-                                  const PairingOptions& options) {
+                                  const std::vector<ModeShape>& second) {
   const Eigen::MatrixXd output_mac = modal_assurance(output_shapes(first), output_shapes(second));
   const Eigen::MatrixXd input_mac = modal_assurance(input_shapes(first), input_shapes(second));
   std::vector<Candidate> out;
@@ -37,8 +37,8 @@ std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
           second[b].natural_frequency_hz / first[a].natural_frequency_hz - 1.0;
       const ModePair pair{a, b, difference, output_mac(row, column), input_mac(row, column)};
       const double mac = pair.output_mac * pair.input_mac;
-      const double nearness = 1.0 - std::abs(difference) / options.most_frequency_difference;
-      if (nearness >= 0.0 && mac >= options.least_mac) out.push_back({pair, mac * nearness});
+      const double nearness = 1.0 - std::abs(difference) / kMostDifference;
+      if (nearness >= 0.0 && mac >= kLeastMac) out.push_back({pair, mac * nearness});
     }
   return out;
 }
@@ -64,12 +64,9 @@ Eigen::MatrixXcd input_shapes(const std::vector<ModeShape>& modes) {
 }
 
 std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
-                                 const std::vector<ModeShape>& second,
-                                 const PairingOptions& options) {
-  if (!is_share(options.most_frequency_difference) || !is_share(options.least_mac))
-    throw std::invalid_argument("pairing of modes: the limits must be above 0 and at most 1");
+                                 const std::vector<ModeShape>& second) {
   if (first.empty() || second.empty()) return {};
-  std::vector<Candidate> sorted = candidates(first, second, options);
+  std::vector<Candidate> sorted = candidates(first, second);
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Candidate& a, const Candidate& b) { return a.worth > b.worth; });
   std::vector<bool> first_taken(first.size(), false);

@@ -29,20 +29,15 @@ struct ModePair {
   double input_mac = 0.0;
 };
 
-struct PairingOptions {
-  double most_frequency_difference = 0.05;  ///< relative; modes farther apart are not paired
-  double least_mac = 0.1;  ///< of the residues; modes with less similar shapes are not paired
-};
-
 /// Pairs modes of two models with the same channels by frequency and shape, each at most once.
 ///
-/// The score of a pair is  MAC_output MAC_input (1 - |frequency difference| / most),  where the product of the
+/// The score of a pair is  MAC_output MAC_input (1 - |frequency difference| / 5 %),  where the product of the
 /// two MACs is the MAC of the residues phi psi^T. The best pair is chosen first, then the best of the rest.
-/// Close modes are thus distinguished by their shapes, and similar shapes by their frequencies.
+/// Close modes are thus distinguished by their shapes, and similar shapes by their frequencies. Modes more than 5 %
+/// apart, or whose residues have a MAC below 0.1, are not paired.
 /// @return in the order of `first`
-/// @throws std::invalid_argument if the numbers of channels differ, or an option is not in (0, 1].
+/// @throws std::invalid_argument if the numbers of channels differ.
 std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
-                                 const std::vector<ModeShape>& second,
-                                 const PairingOptions& options = {});
+                                 const std::vector<ModeShape>& second);
 
 }  // namespace stageid

@@ -176,12 +176,6 @@ ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse
 
 }  // namespace
 
-ModelLinesResponse lines_of(const AdditiveModel& model, const FrfEstimate& frf) {
-  return [&model, &frf](Eigen::Index first, Eigen::Index count) {
-    return response(model, frf.frequency_hz.segment(first, count), model.hold);
-  };
-}
-
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
                                const Eigen::MatrixXd& weights, int threads,
                                const Distortion& known) {

@@ -40,9 +40,6 @@ struct ResidualVerdict {
 /// The response of a model on the lines [first, first + count), (n_y n_u) x count, as measured.
 using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Eigen::Index count)>;
 
-/// The response of a model through its own hold on the lines of `frf`; both must outlive it.
-ModelLinesResponse lines_of(const AdditiveModel& model, const FrfEstimate& frf);
-
 /// Compares the residual of a model with the variances of the data, one tile of lines after another.
 ///
 /// A residual whose power is a times the variance has r/a ~ F(2, 2 nu), so that

@@ -87,44 +87,33 @@ Eigen::MatrixXd held(const StateBlock& block, double t) {
 }
 
 /// One block of the continuous system, sampled, and its share of h[0] and h[1].
-class BlockSampler {
- public:
-  BlockSampler(const StateSpace& continuous, const DividedDelays& delays, double period_s)
-      : continuous_(continuous), delays_(delays), period_s_(period_s) {}
-
-  void add(const StateBlock& block, StateSpace& out, Eigen::MatrixXd& late) const {
-    const auto B = continuous_.B.middleRows(block.first, block.size);
-    const auto C = continuous_.C.middleCols(block.first, block.size);
-    out.A.block(block.first, block.first, block.size, block.size) = transition(block, period_s_);
-    const Eigen::MatrixXd whole = held(block, period_s_);
-    for (Eigen::Index j = 0; j < B.cols(); ++j)
-      out.B.block(block.first, j, block.size, 1) =
-          transition(block, -delays_.part_input[j] * period_s_) * whole * B.col(j);
-    for (Eigen::Index i = 0; i < C.rows(); ++i)
-      out.C.block(i, block.first, 1, block.size) =
-          C.row(i) * transition(block, -delays_.part_output[i] * period_s_);
-    for (Eigen::Index j = 0; j < B.cols(); ++j)
-      for (Eigen::Index i = 0; i < C.rows(); ++i) {
-        const double rest = delays_.rest(i, j);
-        const double since = (rest > 0.0 ? 1.0 - rest : -rest) * period_s_;
-        const double seen = (C.row(i) * held(block, since) * B.col(j)).value();
-        if (rest > 0.0) {
-          late(i, j) += seen - (out.C.block(i, block.first, 1, block.size) *
-                                out.B.block(block.first, j, block.size, 1))
-                                   .value();
-        } else {
-          out.D(i, j) += seen;
-        }
+void add_sampled(const StateSpace& continuous, const StateBlock& block, const DividedDelays& delays,
+                 double period_s, StateSpace& out, Eigen::MatrixXd& late) {
+  const auto B = continuous.B.middleRows(block.first, block.size);
+  const auto C = continuous.C.middleCols(block.first, block.size);
+  out.A.block(block.first, block.first, block.size, block.size) = transition(block, period_s);
+  const Eigen::MatrixXd whole = held(block, period_s);
+  for (Eigen::Index j = 0; j < B.cols(); ++j)
+    out.B.block(block.first, j, block.size, 1) =
+        transition(block, -delays.part_input[j] * period_s) * whole * B.col(j);
+  for (Eigen::Index i = 0; i < C.rows(); ++i)
+    out.C.block(i, block.first, 1, block.size) =
+        C.row(i) * transition(block, -delays.part_output[i] * period_s);
+  for (Eigen::Index j = 0; j < B.cols(); ++j)
+    for (Eigen::Index i = 0; i < C.rows(); ++i) {
+      const double rest = delays.rest(i, j);
+      const double since = (rest > 0.0 ? 1.0 - rest : -rest) * period_s;
+      const double seen = (C.row(i) * held(block, since) * B.col(j)).value();
+      if (rest > 0.0) {
+        late(i, j) += seen - (out.C.block(i, block.first, 1, block.size) *
+                              out.B.block(block.first, j, block.size, 1))
+                                 .value();
+      } else {
+        out.D(i, j) += seen;
       }
-    out.blocks.push_back(
-        {block.first, block.size, std::exp(block.pole * period_s_), block.submodel});
-  }
-
- private:
-  const StateSpace& continuous_;
-  const DividedDelays& delays_;
-  double period_s_;
-};
+    }
+  out.blocks.push_back({block.first, block.size, std::exp(block.pole * period_s), block.submodel});
+}
 
 /// States v[n+1] = Psi^T u[n] for late = Phi Psi^T, y = ... + Phi v.
 void append_delay_states(const Eigen::MatrixXd& late, StateSpace& system) {
@@ -162,8 +151,8 @@ SampledStateSpace sampled_state_space(const AdditiveModel& model) {
   system.C.resizeLike(continuous.C);
   system.D = (delays.rest.array() > 0.0).select(0.0, continuous.D);
   Eigen::MatrixXd late = continuous.D - system.D;
-  const BlockSampler sampler(continuous, delays, period_s);
-  for (const StateBlock& block : continuous.blocks) sampler.add(block, system, late);
+  for (const StateBlock& block : continuous.blocks)
+    add_sampled(continuous, block, delays, period_s, system, late);
   if (delays.late_channels() > 0) append_delay_states(late, system);
   return out;
 }

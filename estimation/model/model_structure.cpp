@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimation/model/basis.hpp"
+#include "frf/response/channel_positions.hpp"
 
 namespace stageid {
 namespace {
@@ -62,6 +63,17 @@ std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candi
         const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
         return pole.imag() != 0.0 && std::abs(std::abs(pole) - omega) < kTaken * omega;
       });
+  return out;
+}
+
+AdditiveModel of_inputs(const FrfEstimate& frf, const AdditiveModel& model,
+                        const std::vector<Eigen::Index>& at) {
+  AdditiveModel out = model;
+  if (std::ssize(at) == model.n_inputs()) return out;
+  out.inputs = pick(frf.inputs, at);
+  if (model.input_delay_s.size() > 0) out.input_delay_s = model.input_delay_s(at);
+  for (Submodel& s : out.submodels)
+    for (Eigen::MatrixXd& B : s.numerator) B = B(Eigen::all, at).eval();
   return out;
 }
 

@@ -1,10 +1,8 @@
 #include "estimation/problem/fit_problem.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "estimation/problem/search_limit.hpp"
-#include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 
@@ -137,22 +135,6 @@ void resize(const FitProblem& problem, WantedBasis wanted, BasisGroup& group) {
   if (wanted.delay) group.T.resize(problem.size(), problem.functions());
 }
 
-void evaluate_fractions(const FitProblem& problem, const HoldEquivalent& through,
-                        const FitParameters& beta, bool derivatives, FractionColumns& out) {
-  out = fraction_columns(through, problem.lines.omega_rad_s.maxCoeff(), problem.shapes, beta.a,
-                         derivatives);
-  if (!derivatives) return;
-  const std::vector<FractionColumn> all = std::exchange(out.D, {});
-  std::size_t column = 0;
-  Eigen::Index parameter = 0;
-  for (const SubmodelShape& shape : problem.shapes) {
-    for (int m = 0; m < shape.functions(); ++m)
-      for (int q = 0; q < shape.order; ++q, ++column)
-        if (!problem.is_held(parameter + q)) out.D.push_back(all[column]);
-    parameter += shape.order;
-  }
-}
-
 void evaluate_submodel(const FitProblem& problem, const HoldEquivalent& through,
                        const FitParameters& beta, std::size_t i, const SubmodelPlace& place,
                        WantedBasis wanted, SubmodelBasis& basis, BasisGroup& group) {
@@ -200,7 +182,8 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     group.few = is_few(problem, group.channels.size());
     resize(problem, wanted, group);
     if (!group.few)
-      evaluate_fractions(problem, *through[at], beta, with_derivatives, group.fractions);
+      group.fractions = fraction_columns(*through[at], problem.lines.omega_rad_s.maxCoeff(),
+                                         problem.shapes, beta.a, with_derivatives, problem.held);
   });
   const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
   for_each_task(problem.threads, static_cast<int>(groups.size() * parts), [&](int task) {

@@ -3,12 +3,14 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimation/model/basis.hpp"
 #include "estimation/problem/fit_options.hpp"
 #include "estimation/problem/fraction_columns.hpp"
 #include "estimation/problem/shared_matrix.hpp"
+#include "excitation/threads/worker_pool.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -26,6 +28,18 @@ struct IndexRange {
 };
 /// 0 to count - 1 in ranges of at most `most`.
 std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most);
+
+/// The sum of task(range), the tasks in parallel. It is added in order, so it does not depend on the number of threads.
+/// @pre there are ranges
+template <typename Range, typename Task>
+auto ordered_sum(const std::vector<Range>& ranges, int threads, const Task& task) {
+  std::vector<decltype(task(ranges[0]))> parts(ranges.size());
+  for_each_task(threads, static_cast<int>(ranges.size()), [&](int i) {
+    parts[static_cast<std::size_t>(i)] = task(ranges[static_cast<std::size_t>(i)]);
+  });
+  for (std::size_t i = 1; i < parts.size(); ++i) parts[0] += parts[i];
+  return std::move(parts[0]);
+}
 
 /// A variance of the data whose lines are divided by one number each, without copying it.
 struct LineVariance {

@@ -1,6 +1,8 @@
 #include "estimation/problem/fraction_columns.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "estimation/model/partial_fractions.hpp"
 
@@ -94,33 +96,31 @@ std::complex<double> equation_error_residue(const HoldEquivalent& through,
 
 FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,
-                                 const std::vector<Eigen::VectorXd>& a, bool derivatives) {
+                                 const std::vector<Eigen::VectorXd>& a, bool derivatives,
+                                 const std::vector<Eigen::Index>& held) {
   FractionColumns out;
   out.exact = through.exact();
   out.highest_rad_s = highest_rad_s;
   out.first = through.first();
+  Eigen::Index before = 0;  // coefficients of the submodels before
   for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const int functions = shapes[i].functions();
-    const int order = shapes[i].order;
-    const auto add = [](auto& columns, int count) {
-      columns.resize(columns.size() + static_cast<std::size_t>(count));
-    };
-    if (!is_one_pair(shapes[i], a[i])) {
-      add(out.F, functions);
-      if (derivatives) add(out.D, functions * order);
-      if (derivatives) add(out.Y, order);
-      continue;
+    const int order = derivatives ? shapes[i].order : 0;
+    std::optional<PairColumns> pair;
+    if (is_one_pair(shapes[i], a[i])) {
+      const Complex lambda = roots(a[i])[0];
+      pair.emplace(through, a[i], lambda, out.pairs());
+      out.lambda.push_back(lambda);
+      out.place.push_back(through.place(lambda));
     }
-    const Complex lambda = roots(a[i])[0];
-    const PairColumns columns(through, a[i], lambda, out.pairs());
-    out.lambda.push_back(lambda);
-    out.place.push_back(through.place(lambda));
-    for (int m = 0; m < functions; ++m) {
-      out.F.push_back(columns.column(m, 1, 1.0));
-      for (int q = 1; derivatives && q <= order; ++q)  // d/da_q = -s^(m+q) / A^2
-        out.D.push_back(columns.column(m + q, 2, -1.0));
+    for (int m = 0; m < shapes[i].functions(); ++m) {
+      out.F.push_back(pair ? pair->column(m, 1, 1.0) : FractionColumn{});
+      for (int q = 1; q <= order; ++q)  // d/da_q = -s^(m+q) / A^2
+        if (std::find(held.begin(), held.end(), before + q - 1) == held.end())
+          out.D.push_back(pair ? pair->column(m + q, 2, -1.0) : FractionColumn{});
     }
-    for (int q = 1; derivatives && q <= order; ++q) out.Y.push_back(columns.equation_error(q));
+    for (int q = 1; q <= order; ++q)
+      out.Y.push_back(pair ? pair->equation_error(q) : FractionColumn{});
+    before += shapes[i].order;
   }
   fill_base(through, derivatives, out);
   return out;

@@ -38,9 +38,11 @@ struct FractionColumns {
 
 /// @param a denominator coefficients, one vector per submodel
 /// @param derivatives whether squares, D and Y are computed
+/// @param held coefficients without columns of D, counted over all submodels
 FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,
-                                 const std::vector<Eigen::VectorXd>& a, bool derivatives);
+                                 const std::vector<Eigen::VectorXd>& a, bool derivatives,
+                                 const std::vector<Eigen::Index>& held = {});
 
 /// Coefficient c of the equation-error column s^q / A at a root. It is taken through the image of the pole, so that it
 /// is d log(x - x_lambda) / d a_q up to sign, and a fraction in x for the exact hold too.

@@ -59,32 +59,23 @@ int order(const FractionColumn& column) { return column.squared == 0.0 ? 1 : 2; 
 
 /// Largest order(left) + order(right) for which products of the fractions of two pairs of poles are expanded into
 /// sums. The ratio of the terms to the product at the highest line grows with that order.
-class LargestOrders {
- public:
-  explicit LargestOrders(const FractionColumns& columns)
-      : orders_(columns.pairs(), columns.pairs()) {
-    const double highest = columns.highest_rad_s * columns.highest_rad_s;
-    const auto beyond = [&](Complex rad_s) { return std::max(1.0, highest / std::norm(rad_s)); };
-    for (Eigen::Index i = 0; i < orders_.rows(); ++i)
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        const Complex l = columns.lambda[static_cast<std::size_t>(i)];
-        const Complex r = columns.lambda[static_cast<std::size_t>(j)];
-        const double nearest = std::max(beyond(l + r), beyond(l + std::conj(r)));
-        double squared_loss = beyond(l) * beyond(r);
-        int order = 1;
-        for (; order < 4 && squared_loss * nearest <= kLargestLoss * kLargestLoss; ++order)
-          squared_loss *= nearest;
-        orders_(i, j) = orders_(j, i) = order;
-      }
-  }
-
-  bool allow(const FractionColumn& left, const FractionColumn& right) const {
-    return order(left) + order(right) <= orders_(left.pair, right.pair);
-  }
-
- private:
-  Eigen::MatrixXi orders_;
-};
+Eigen::MatrixXi largest_orders(const FractionColumns& columns) {
+  Eigen::MatrixXi orders(columns.pairs(), columns.pairs());
+  const double highest = columns.highest_rad_s * columns.highest_rad_s;
+  const auto beyond = [&](Complex rad_s) { return std::max(1.0, highest / std::norm(rad_s)); };
+  for (Eigen::Index i = 0; i < orders.rows(); ++i)
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const Complex l = columns.lambda[static_cast<std::size_t>(i)];
+      const Complex r = columns.lambda[static_cast<std::size_t>(j)];
+      const double nearest = std::max(beyond(l + r), beyond(l + std::conj(r)));
+      double squared_loss = beyond(l) * beyond(r);
+      int order = 1;
+      for (; order < 4 && squared_loss * nearest <= kLargestLoss * kLargestLoss; ++order)
+        squared_loss *= nearest;
+      orders(i, j) = orders(j, i) = order;
+    }
+  return orders;
+}
 
 }  // namespace
 
@@ -108,12 +99,12 @@ PairReduction::PairReduction(const FractionColumns& columns,
                              std::vector<ColumnPair> pairs)
     : columns_(&columns), left_(&left), right_(&right), pairs_(std::move(pairs)) {
   place_.assign(pairs_.size(), -1);
-  const LargestOrders orders(columns);
+  const Eigen::MatrixXi largest = largest_orders(columns);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (columns.pairs() > 0) {
       const FractionColumn& X = left[static_cast<std::size_t>(pairs_[p].left)];
       const FractionColumn& Y = right[static_cast<std::size_t>(pairs_[p].right)];
-      if (X.pair >= 0 && Y.pair >= 0 && orders.allow(X, Y)) continue;
+      if (X.pair >= 0 && Y.pair >= 0 && order(X) + order(Y) <= largest(X.pair, Y.pair)) continue;
     }
     place_[p] = static_cast<Eigen::Index>(direct_.size());
     direct_.push_back(pairs_[p]);

@@ -5,18 +5,11 @@
 
 namespace stageid {
 
-/// E = G - P of all channels, and its cost.
-struct Residual {
-  Eigen::MatrixXd re;  ///< n_c x N
-  Eigen::MatrixXd im;
-  double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
-};
+/// E = G - P of all channels, n_c x N; without groups, the data.
+SplitMatrix residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                     const Eigen::MatrixXd& B);
 
-/// Without groups, the residual is the data.
-Residual residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                  const Eigen::MatrixXd& B);
-
-/// The cost alone, tile by tile: no residual is stored.
+/// 1/(2N) sum vec(E)^H W vec(E), tile by tile: no residual is stored.
 double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B);
 

@@ -26,32 +26,6 @@ SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
   return out;
 }
 
-namespace {
-
-/// The globals that are not held, in their order.
-std::vector<Eigen::Index> free_globals(const FitProblem& problem) {
-  std::vector<Eigen::Index> out;
-  for (Eigen::Index i = 0; i < problem.globals(); ++i)
-    if (!problem.is_held(i)) out.push_back(i);
-  return out;
-}
-
-/// Expands equations of numerators and free globals to all globals, with zeros for the others.
-ChannelEquations scattered(const ChannelEquations& of_free, Eigen::Index functions,
-                           Eigen::Index globals, const std::vector<Eigen::Index>& free) {
-  if (static_cast<Eigen::Index>(free.size()) == globals) return of_free;
-  Eigen::Array<Eigen::Index, Eigen::Dynamic, 1> to(of_free.e.size());
-  for (Eigen::Index i = 0; i < to.size(); ++i)
-    to[i] = i < functions ? i : functions + free[static_cast<std::size_t>(i - functions)];
-  ChannelEquations out{Eigen::MatrixXd::Zero(functions + globals, functions + globals),
-                       Eigen::VectorXd::Zero(functions + globals)};
-  out.M(to, to) = of_free.M;
-  out.e(to) = of_free.e;
-  return out;
-}
-
-}  // namespace
-
 EquationMethod::EquationMethod(const FitProblem& of, const FitParameters& beta, FitMethod of_method)
     : problem(of), method(of_method), columns(derivative_columns(of)) {
   if (method == FitMethod::gn) return;
@@ -79,7 +53,6 @@ ChannelEquations channel_equations(const EquationMethod& shared, const FitParame
   const FitProblem& problem = shared.problem;
   const Eigen::Index N = problem.size();
   const Eigen::Index n_f = problem.functions();
-  const Eigen::Index n_a = problem.denominators();
   const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
   const Eigen::VectorXd E_re =
       problem.G->row(c).real().transpose() - group.F.re * beta.B.row(c).transpose();
@@ -90,17 +63,13 @@ ChannelEquations channel_equations(const EquationMethod& shared, const FitParame
 
   // Real and imaginary parts stacked, weighted: J of the instrument, Phi of the regressor.
   const SplitMatrix of_globals = global_columns(problem, beta, group, c, {0, N});
-  const std::vector<Eigen::Index> free = free_globals(problem);
-  const auto n_free = static_cast<Eigen::Index>(free.size());
-  Eigen::MatrixXd J(2 * N, n_f + n_free);
-  J.topLeftCorner(N, n_f) = root.asDiagonal() * group.F.re;
-  J.bottomLeftCorner(N, n_f) = root.asDiagonal() * group.F.im;
-  for (Eigen::Index i = 0; i < n_free; ++i) {
-    J.col(n_f + i).head(N) =
-        root.cwiseProduct(of_globals.re.col(free[static_cast<std::size_t>(i)]));
-    J.col(n_f + i).tail(N) =
-        root.cwiseProduct(of_globals.im.col(free[static_cast<std::size_t>(i)]));
-  }
+  Eigen::MatrixXd whole(2 * N, n_f + problem.globals());
+  whole << root.asDiagonal() * group.F.re, root.asDiagonal() * of_globals.re,
+      root.asDiagonal() * group.F.im, root.asDiagonal() * of_globals.im;
+  std::vector<Eigen::Index> places = indices(0, n_f);  // of the functions and the free globals
+  for (Eigen::Index i = 0; i < problem.globals(); ++i)
+    if (!problem.is_held(i)) places.push_back(n_f + i);
+  const Eigen::MatrixXd J = whole(Eigen::all, places);
 
   const auto symmetric = [&](const Eigen::MatrixXd& X) -> ChannelEquations {
     Eigen::MatrixXd lower = Eigen::MatrixXd::Zero(X.cols(), X.cols());
@@ -108,13 +77,17 @@ ChannelEquations channel_equations(const EquationMethod& shared, const FitParame
     return {lower.selfadjointView<Eigen::Lower>(), X.transpose() * E};
   };
   const auto full = [&](const ChannelEquations& of_free) {
-    return scattered(of_free, n_f, problem.globals(), free);
+    ChannelEquations out{Eigen::MatrixXd::Zero(whole.cols(), whole.cols()),
+                         Eigen::VectorXd::Zero(whole.cols())};
+    out.M(places, places) = of_free.M;
+    out.e(places) = of_free.e;
+    return out;
   };
   if (shared.method == FitMethod::gn) return full(symmetric(J));
   Eigen::MatrixXd Phi = J;
-  for (Eigen::Index i = 0; i < n_free; ++i) {
-    const Eigen::Index p = free[static_cast<std::size_t>(i)];
-    if (p >= n_a) break;
+  for (Eigen::Index i = 0; n_f + i < Phi.cols(); ++i) {
+    const Eigen::Index p = places[static_cast<std::size_t>(n_f + i)] - n_f;
+    if (p >= problem.denominators()) break;
     const auto y_re = shared.Y.re.col(p);
     const auto y_im = shared.Y.im.col(p);
     Phi.col(n_f + i).head(N) -= y_re.cwiseProduct(E.head(N)) - y_im.cwiseProduct(E.tail(N));

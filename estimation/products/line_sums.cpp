@@ -232,8 +232,9 @@ GroupProducts::GroupProducts(const EquationMethod& of_method, const BasisGroup& 
 LineSums line_sums(const GroupProducts& products, const TileRange& block,
                    const Eigen::MatrixXd& B) {
   const int threads = products.method.problem.threads;
-  LineSums sums = sum_over_shares<LineSums>(
-      block, threads, [&](const TileRange& share) { return Share(products, B, share).run(); });
+  LineSums sums = ordered_sum(line_shares(block), threads, [&](const TileRange& share) {
+    return Share(products, B, share).run();
+  });
   expand(products, B, threads, sums);
   return sums;
 }

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "estimation/problem/fit_problem.hpp"
@@ -33,18 +32,6 @@ std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, E
 /// Divides the lines of a block between the threads. Shares depend on sizes only, never on the number of threads, so
 /// the sums and their order are always the same.
 std::vector<TileRange> line_shares(const TileRange& block);
-
-/// The sum of task(share) over the shares of a block, in their order.
-template <typename Sums, typename Task>
-Sums sum_over_shares(const TileRange& block, int threads, Task&& task) {
-  const std::vector<TileRange> shares = line_shares(block);
-  std::vector<Sums> parts(shares.size());
-  for_each_task(threads, static_cast<int>(shares.size()), [&](int i) {
-    parts[static_cast<std::size_t>(i)] = task(shares[static_cast<std::size_t>(i)]);
-  });
-  for (std::size_t i = 1; i < parts.size(); ++i) parts[0] += parts[i];
-  return std::move(parts[0]);
-}
 
 /// Calls task(first line, lines) for the tiles of a share, in order.
 template <typename Task>

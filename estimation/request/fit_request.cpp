@@ -248,13 +248,11 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
                              request.submodels.empty() && any_rank;
   const bool silent = !request.general_damping && !request.direct_term &&
                       request.rigid_body.kind == RigidBodyRequest::Kind::by_submodels;
-  const bool chosen = accelerations && silent;
-  if (chosen)
-    notes.push_back(
-        fmt::format("structure: numerators B_0 + B_1 s, a direct term and no rigid body, because "
-                    "the outputs are accelerations [{}]",
-                    units.front()));
-  if (!chosen) return request;
+  if (!accelerations || !silent) return request;
+  notes.push_back(
+      fmt::format("structure: numerators B_0 + B_1 s, a direct term and no rigid body, because the "
+                  "outputs are accelerations [{}]",
+                  units.front()));
   request.general_damping = request.direct_term = true;
   request.rigid_body.kind = RigidBodyRequest::Kind::none;
   return request;

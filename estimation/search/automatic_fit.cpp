@@ -27,7 +27,6 @@
 #include "estimation/search/trial_options.hpp"
 #include "estimation/start/pole_relocation.hpp"
 #include "estimation/start/residual_modes.hpp"
-#include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 namespace {
@@ -43,8 +42,7 @@ class AutomaticFit {
         options_(options),
         quick_(trial_options(frf, options)),
         worth_(frf, structure, quick_.user_weights),
-        target_(selection.exactly),
-        threads_(worker_count(options.threads)) {
+        target_(selection.exactly) {
     quick_.deviation_tolerance = worth_.deviation_tolerance();
   }
 
@@ -141,7 +139,7 @@ class AutomaticFit {
   /// Whether the residual contains a mode that may be worth its parameters.
   bool misses_a_mode() const {
     const std::vector<ResidualMode> missed =
-        residual_modes(frf_, best_.model, quick_.user_weights, 1, threads_);
+        residual_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
     return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
   }
 
@@ -161,7 +159,7 @@ class AutomaticFit {
     AdditiveModel model = start_of({});
     const auto wanted = static_cast<std::size_t>(selection_.exactly);
     const std::vector<ModeCandidate> modes =
-        relocate_poles(frf_, model, quick_.user_weights, wanted, threads_);
+        relocate_poles(frf_, model, quick_.user_weights, wanted, quick_.threads);
     say("start: {} by pole relocation", counted(modes.size(), "mode"));
     FitOptions still = quick_;
     still.max_iterations = 0;
@@ -181,11 +179,10 @@ class AutomaticFit {
   void begin_relocated_from(const AdditiveModel& model) {
     adopt(fit_additive_model(frf_, model, quick_));
     if (limit_reached()) return;
-    FitResult fit = fit_additive_model(
-        frf_,
-        start_of(relocate_poles(frf_, best_.model, quick_.user_weights,
-                                static_cast<std::size_t>(count_modes(best_.model)), threads_)),
-        quick_);
+    const auto modes = static_cast<std::size_t>(count_modes(best_.model));
+    const AdditiveModel relocated =
+        start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.threads));
+    FitResult fit = fit_additive_model(frf_, relocated, quick_);
     if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
       return;
     say("pole relocation: cost {:.6g} -> {:.6g}", best_.model.fit.cost, fit.model.fit.cost);
@@ -227,7 +224,7 @@ class AutomaticFit {
   }
 
   void hold_hidden() {
-    hidden_ = hold_hidden_modes(frf_, quick_.user_weights, threads_, best_);
+    hidden_ = hold_hidden_modes(frf_, quick_.user_weights, quick_.threads, best_);
     if (hidden_ > 0)
       say("noise hides {} of {}; their poles are held", hidden_,
           counted(count_modes(best_.model), "mode"));
@@ -399,7 +396,7 @@ class AutomaticFit {
       const std::size_t most =
           std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
-          residual_modes(frf_, best_.model, quick_.user_weights, most, threads_);
+          residual_modes(frf_, best_.model, quick_.user_weights, most, quick_.threads);
       FitResult before = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
@@ -529,8 +526,7 @@ class AutomaticFit {
   FitOptions options_;
   FitOptions quick_;
   ModeWorth worth_;
-  int target_;  ///< number of modes to grow to, if it is requested
-  int threads_;
+  int target_;      ///< number of modes to grow to, if it is requested
   int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
   GrowthWatch watch_;
   FitResult best_;

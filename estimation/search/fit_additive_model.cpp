@@ -10,7 +10,6 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/numerators.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
-#include "estimation/iteration/low_rank_iteration.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/model/poles.hpp"
 #include "estimation/problem/fit_start.hpp"

@@ -1,11 +1,11 @@
 #include "estimation/search/fit_verdict.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "acquisition/files/counted.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
@@ -74,17 +74,12 @@ void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult&
       places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
                                    s.damping_ratio(), reason_of(fit, i, *s.verdict)));
   }
-  if (places.size() > kNamed) {
-    const std::size_t more = places.size() - kNamed;
-    places.resize(kNamed);
-    places.back() += fmt::format(" and {} more", more);
-  }
   // Modes that were requested as a list have been judged by the fit itself.
   if (!places.empty() && evidence.number != ModeNumber::given)
     reasons.push_back(
         fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
                     "the cost as much; do not interpret them as resonances",
-                    fmt::join(places, ", ")));
+                    listed(places, kNamed)));
   for (const AlikeModes& pair : evidence.alike) {
     Submodel& one = fit.model.submodels[pair.first];
     Submodel& other = fit.model.submodels[pair.second];

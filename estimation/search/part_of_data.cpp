@@ -5,6 +5,7 @@
 
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/search_constants.hpp"
+#include "frf/response/channel_positions.hpp"
 
 namespace stageid {
 
@@ -16,28 +17,25 @@ PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
   const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
   const Eigen::Index count =
       std::clamp<Eigen::Index>(kPartChannels / frf.n_outputs(), 1, frf.n_inputs());
-  const auto inputs = Eigen::seqN(0, count, frf.n_inputs() / count);
+  std::vector<Eigen::Index> inputs;
   std::vector<Eigen::Index> channels;
-  PartOfData out;
   for (Eigen::Index u = 0; u < count; ++u) {
+    inputs.push_back(u * (frf.n_inputs() / count));
     for (Eigen::Index y = 0; y < frf.n_outputs(); ++y)
-      channels.push_back(inputs[u] * frf.n_outputs() + y);
-    out.frf.inputs.names.push_back(frf.inputs.names[static_cast<std::size_t>(inputs[u])]);
-    out.frf.inputs.units.push_back(frf.inputs.units[static_cast<std::size_t>(inputs[u])]);
+      channels.push_back(inputs.back() * frf.n_outputs() + y);
   }
+  PartOfData out;
   out.all = step == 1 && count == frf.n_inputs();
   out.options = options;
   out.options.user_weights = Eigen::MatrixXd((*options.user_weights)(channels, lines));
   out.frf.frequency_hz = frf.frequency_hz(lines);
   out.frf.response = frf.response(channels, lines);
+  out.frf.correlated_lines = frf.correlated_lines;
+  out.frf.inputs = pick(frf.inputs, inputs);
   out.frf.outputs = frf.outputs;
   out.frf.sample_rate_hz = frf.sample_rate_hz;
   out.frf.hold = frf.hold;
-  out.model = model;
-  out.model.inputs = out.frf.inputs;
-  if (model.input_delay_s.size() > 0) out.model.input_delay_s = model.input_delay_s(inputs).eval();
-  for (Submodel& s : out.model.submodels)
-    for (Eigen::MatrixXd& B : s.numerator) B = B(Eigen::all, inputs).eval();
+  out.model = of_inputs(frf, model, inputs);
   return out;
 }
 

@@ -62,12 +62,6 @@ std::string without_silent_channels(const FrfEstimate& frf) {
   return {};
 }
 
-FitOptions with_deviations(FitOptions trial) {
-  trial.uncertainty = true;
-  trial.response_variance = false;
-  return trial;
-}
-
 std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
                              const FitOptions& trial, const FitResult& same, bool cut_short) {
   double least = information_criterion(frf, same);
@@ -130,7 +124,10 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
   FitOptions trial = trial_options(frf, options);
   trial.limit.reset();
   // In a search that ended early, poles have not converged.
-  const FitResult same = fit_additive_model(frf, fit.model, with_deviations(trial));
+  FitOptions with_deviations = trial;
+  with_deviations.uncertainty = true;
+  with_deviations.response_variance = false;
+  const FitResult same = fit_additive_model(frf, fit.model, with_deviations);
   advice = better_structure(frf, options, trial, same, cut_short);
   if (advice.empty()) advice = better_band(frf, trial, same);
   if (!advice.empty()) return advice;

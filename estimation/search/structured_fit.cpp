@@ -193,8 +193,11 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
 /// Why the residual is clearly larger than noise and known distortion, with advice; else empty.
 std::string why_unexplained(const FrfEstimate& frf, const FitOptions& options, bool cut_short,
                             const FitResult& result) {
+  const auto lines = [&](Eigen::Index first, Eigen::Index count) {
+    return response(result.model, frf.frequency_hz.segment(first, count), result.model.hold);
+  };
   const ResidualVerdict verdict =
-      judge_residual(frf, lines_of(result.model, frf), *options.user_weights, options.threads);
+      judge_residual(frf, lines, *options.user_weights, options.threads);
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);

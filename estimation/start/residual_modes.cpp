@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "estimation/model/basis.hpp"
+#include "estimation/model/model_structure.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
@@ -102,28 +104,16 @@ std::vector<IndexRange> input_ranges(const FrfEstimate& frf) {
   return ranges_of(frf.n_inputs(), std::max<Eigen::Index>(1, kChannels / frf.n_outputs()));
 }
 
-AdditiveModel of_inputs(const AdditiveModel& model, const IndexRange& inputs) {
-  if (inputs.count == model.n_inputs()) return model;
-  AdditiveModel out = model;
-  const auto first = model.inputs.names.begin() + inputs.first;
-  out.inputs.names.assign(first, first + inputs.count);
-  out.inputs.units.assign(out.inputs.names.size(), {});
-  if (model.input_delay_s.size() > 0)
-    out.input_delay_s = model.input_delay_s.segment(inputs.first, inputs.count);
-  for (Submodel& s : out.submodels)
-    for (Eigen::MatrixXd& B : s.numerator)
-      B = Eigen::MatrixXd(B.middleCols(inputs.first, inputs.count));
-  return out;
-}
-
 /// W E; real parts of all lines, then imaginary parts.
 Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
                                   const Eigen::MatrixXd& weights, const IndexRange& inputs) {
   const Eigen::Index N = frf.lines();
   const Eigen::Index first = inputs.first * frf.n_outputs();
   const Eigen::Index rows = inputs.count * frf.n_outputs();
+  std::vector<Eigen::Index> at(static_cast<std::size_t>(inputs.count));
+  std::iota(at.begin(), at.end(), inputs.first);
   const Eigen::MatrixXcd E = frf.response.middleRows(first, rows) -
-                             response(of_inputs(model, inputs), frf.frequency_hz, model.hold);
+                             response(of_inputs(frf, model, at), frf.frequency_hz, model.hold);
   Eigen::MatrixXd WE(rows, 2 * N);
   WE << weights.middleRows(first, rows).cwiseProduct(E.real()),
       weights.middleRows(first, rows).cwiseProduct(E.imag());

@@ -17,6 +17,9 @@ using Complex = std::complex<double>;
 
 // keeps the Toeplitz matrix definite if there are gaps between the lines
 constexpr double kShift = 1e-12;
+constexpr double kMostDamping = 0.2;
+constexpr double kFrequencyTolerance = 0.01;  // relative to the previous order
+constexpr double kDampingTolerance = 0.05;
 
 /// Sums over the lines by lag l = row - column of powers of z^-1, from which the equations are composed.
 class NormalMatrix {
@@ -88,17 +91,16 @@ Eigen::VectorXcd zeros(const Eigen::VectorXd& d) {
   return Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
 }
 
-void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& before,
-             const StabilizationOptions& options) {
+void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& before) {
   const auto apart = [&](const StabilizationPole& other) {
     return std::abs(other.frequency_hz / pole.frequency_hz - 1.0);
   };
   const auto nearest = std::ranges::min_element(before, {}, apart);
   if (nearest == before.end()) return;
-  pole.stable_frequency = apart(*nearest) <= options.frequency_tolerance;
+  pole.stable_frequency = apart(*nearest) <= kFrequencyTolerance;
   pole.stable_damping =
       pole.stable_frequency &&
-      std::abs(nearest->damping_ratio / pole.damping_ratio - 1.0) <= options.damping_tolerance;
+      std::abs(nearest->damping_ratio / pole.damping_ratio - 1.0) <= kDampingTolerance;
 }
 
 }  // namespace
@@ -119,10 +121,10 @@ std::vector<StabilizationPole> stabilization(const FrfEstimate& frf,
       const Complex s = std::log(z) / normal.step_s();
       const double f = std::abs(s) / (2.0 * std::numbers::pi);
       const double damping = -s.real() / std::abs(s);
-      if (!(s.imag() > 0.0) || !(damping > 0.0) || damping > options.most_damping) continue;
+      if (!(s.imag() > 0.0) || !(damping > 0.0) || damping > kMostDamping) continue;
       if (f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1]) continue;
       found.push_back({.order = order, .frequency_hz = f, .damping_ratio = damping});
-      compare(found.back(), before, options);
+      compare(found.back(), before);
     }
     std::ranges::sort(found, {}, &StabilizationPole::frequency_hz);
     all.insert(all.end(), found.begin(), found.end());

@@ -18,9 +18,6 @@ struct StabilizationPole {
 struct StabilizationOptions {
   int most_order = 80;   ///< even orders from 2 on
   double delay_s = 0.0;  ///< removed from the response first, including that of the hold
-  double most_damping = 0.2;
-  double frequency_tolerance = 0.01;  ///< relative to the previous order
-  double damping_tolerance = 0.05;
 };
 
 /// Poles over orders by the least-squares complex frequency domain method, with one denominator for all channels:
@@ -33,7 +30,7 @@ struct StabilizationOptions {
 ///
 /// An independent check of the modes of a fit, not a start for one: damping is biased if noise is large, as in every
 /// linear least squares.
-/// @return by order, then by frequency; only decaying poles within the lines, damped at most by most_damping
+/// @return by order, then by frequency; only decaying poles within the lines, with a damping ratio of at most 0.2
 /// @throws std::invalid_argument if most_order < 2, or 2 most_order >= the number of lines.
 /// Source: P. Guillaume et al., Proc. 21st IMAC (2003) 183; B. Cauberghe et al., Mech. Syst. Signal Process. 19
 /// (2005) 1080.

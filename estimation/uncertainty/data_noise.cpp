@@ -52,10 +52,6 @@ double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index 
          std::max(data - 0.5 * static_cast<double>(parameters - without), 1.0);
 }
 
-double residual_scale(double per_degree, bool likelihood) {
-  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
-}
-
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
                          IndexRange lines, SplitMatrix columns) {
   Eigen::ArrayXd scale = problem.W->row(c).segment(lines.first, lines.count).transpose();
@@ -78,10 +74,11 @@ FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise) {
 }
 
 double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,
-                        const DataNoise& noise) {
-  if (noise.knowledge == VarianceKnowledge::given) return 1.0;
-  return residual_scale(residual_per_degree(problem, cost, parameters),
-                        noise.knowledge == VarianceKnowledge::weights);
+                        VarianceKnowledge knowledge) {
+  if (knowledge == VarianceKnowledge::given) return 1.0;
+  const double per_degree = residual_per_degree(problem, cost, parameters);
+  const bool likelihood = knowledge == VarianceKnowledge::weights;
+  return likelihood && per_degree < kClearlyTooLarge ? 1.0 : per_degree;
 }
 
 }  // namespace stageid

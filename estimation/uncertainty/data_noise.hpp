@@ -1,9 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <functional>
 #include <optional>
+#include <vector>
 
-#include "estimation/uncertainty/noise_correlation.hpp"
+#include "estimation/products/channel_equations.hpp"
+#include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
 
@@ -12,6 +16,40 @@ enum class VarianceKnowledge : std::uint8_t {
   weights,  ///< W is its inverse, known or estimated: maximum likelihood
   given,    ///< another variance than that of the weights: sandwich form
   none      ///< proportional to 1/W, scaled by the residual
+};
+
+/// Columns of all outputs of one input on some lines: lines x n each.
+using OutputColumns = std::vector<SplitMatrix>;
+
+/// Correlation of the noise of a response, S_k kron R_k on line k: that of the outputs from the residual covariance of
+/// the FRF, that of the inputs from its input factor, both over the deviations. A disturbance force moves several
+/// outputs at once, and in closed loop the controller repeats its effect on one input with the others. The numbers are
+/// computed where they are used, since per line they are as many as the data or more.
+/// Source: docs/theory.md, section 3, Cov(vec G) = S kron C_E.
+class NoiseCorrelation {
+ public:
+  NoiseCorrelation() = default;  ///< unknown
+  /// Correlations that the FRF does not contain are taken as zero. `frf` must outlive it.
+  explicit NoiseCorrelation(const FrfEstimate& frf) : frf_(&frf) {}
+
+  bool known() const noexcept { return frf_ != nullptr && frf_->residual_covariance_re.size() > 0; }
+  bool between_inputs() const noexcept {
+    return known() && frf_->input_factor.size() > 0 && frf_->n_inputs() > 1;
+  }
+
+  /// Y_y = sum_z R(y, z) X_z of one input. @pre known()
+  OutputColumns of_outputs(const OutputColumns& X, IndexRange lines) const;
+  /// Z += S(u, v) Y, adding the n columns of Y to the columns `at` of Z. @pre between_inputs()
+  void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
+                 const std::vector<Eigen::Index>& at, IndexRange lines, OutputColumns& Z) const;
+  /// (S kron R)(c, d) of two channels on some lines, lines x 1; empty: zero. @pre known()
+  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const;
+
+ private:
+  SplitMatrix R(Eigen::Index y, Eigen::Index z, IndexRange lines) const;
+  SplitMatrix S(Eigen::Index u, Eigen::Index v, IndexRange lines) const;
+
+  const FrfEstimate* frf_ = nullptr;
 };
 
 /// The noise of the data, as far as known.
@@ -38,13 +76,10 @@ bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
 /// sum W |E|^2 per complex degree of freedom; 1 if W is the inverse variance and the model is right.
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters);
 
-/// Factor of the variances: 1 if the weights are inverse variances (`likelihood`) and the residual is not clearly
-/// larger than predicted, else the residual per degree of freedom.
-double residual_scale(double per_degree, bool likelihood);
-
-/// That factor for the given noise: 1 if its variance is given separately from the weights.
+/// Factor of the variances: 1 if the variance is given separately from the weights, or if the weights are inverse
+/// variances and the residual is not clearly larger than predicted, else the residual per degree of freedom.
 double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,
-                        const DataNoise& noise);
+                        VarianceKnowledge knowledge);
 
 /// The problem whose Gauss-Newton matrix is K for uncorrelated noise, with weights W C W.
 /// @pre noise.variance is known
@@ -53,5 +88,22 @@ FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 /// Columns of one channel on some lines, times W C^1/2; for correlated_gram().
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
                          IndexRange lines, SplitMatrix columns);
+
+/// Columns X = C_diag^1/2 W J of channels, as required by correlated_gram().
+struct CorrelatedColumns {
+  Eigen::Index first_input = 0;
+  /// Per input: the parameters of its columns, in order.
+  std::vector<std::vector<Eigen::Index>> parameters;
+  /// Columns of an output (0-based) of the input first_input + u, lines x parameters[u].
+  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, IndexRange lines)> columns;
+  /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
+  /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.
+  std::function<void(Eigen::Index u, IndexRange lines, const OutputColumns& Z)> use = {};
+};
+
+/// J^H W C W J = sum_k Re{X^H (S kron R) X}, n x n parameters, in tiles of lines.
+/// @pre all inputs are included if they are correlated
+Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelation& correlation,
+                                Eigen::Index n, const CorrelatedColumns& inputs);
 
 }  // namespace stageid

@@ -150,7 +150,7 @@ std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& f
 }
 
 /// M of all parameters under weight matrices: globals by products, numerators by pairs of channels.
-Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
+Eigen::MatrixXd joint_matrix(const Ended& fit) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   const JointEquations equations(problem, *fit.matrices, fit.beta, fit.groups,
@@ -172,7 +172,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit, const AdditiveModel& model) {
     M.row(i) = M.col(i).transpose();
   }
   M.bottomRightCorner(M.rows() - globals, M.cols() - globals) =
-      pair_grams(pairs, {all_functions(model)}).front();
+      pair_grams(pairs, {{0, problem.functions()}}).front();
   return M;
 }
 
@@ -180,10 +180,11 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
                                               const FitOptions& options,
                                               const std::vector<IndexRange>& ranges) {
   const FitProblem& problem = fit.problem;
-  const double per_degree =
-      residual_per_degree(problem, result.model.fit.cost, problem.parameters());
-  const double half = 0.5 * residual_scale(per_degree, weighs_by_variance(options.weighting));
-  const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit, result.model), result.frozen);
+  const double half =
+      0.5 * covariance_scale(problem, result.model.fit.cost, problem.parameters(),
+                             weighs_by_variance(options.weighting) ? VarianceKnowledge::weights
+                                                                   : VarianceKnowledge::none);
+  const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit), result.frozen);
   if (!inverse.allFinite()) return {};
   std::vector<FitCovariance> out;
   for (const IndexRange& range : ranges) {
@@ -304,7 +305,7 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
 
 bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel& model) {
   return are_affordable(problem, functions_of_submodels(model)) ||
-         are_affordable(problem, {all_functions(model)});
+         are_affordable(problem, {{0, problem.functions()}});
 }
 
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
@@ -321,7 +322,7 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
   }
   const Ended fit = ended_fit(frf, result, options);
   std::vector<FitCovariance> all =
-      covariances_of(frf, fit, result, options, {all_functions(result.model)});
+      covariances_of(frf, fit, result, options, {{0, fit.problem.functions()}});
   if (all.empty()) {
     result.decisions.push_back(
         fmt::format("no covariance: the fit has more than {} parameters, or they are not "
@@ -350,12 +351,6 @@ std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model) {
     out.push_back({next, static_cast<Eigen::Index>(s.numerator.size())});
     next += out.back().count;
   }
-  return out;
-}
-
-IndexRange all_functions(const AdditiveModel& model) {
-  IndexRange out;
-  for (const IndexRange& range : functions_of_submodels(model)) out.count += range.count;
   return out;
 }
 

@@ -36,6 +36,5 @@ double error_quantile_95(double relation);
 
 /// The functions of every submodel among those of a channel.
 std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model);
-IndexRange all_functions(const AdditiveModel& model);
 
 }  // namespace stageid

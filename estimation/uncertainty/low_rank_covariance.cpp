@@ -84,7 +84,7 @@ FitCovariance low_rank_parameters(const FitProblem& problem, const FitParameters
   } else if (noise.variance) {
     K = reduced(middle_problem(problem, noise));
   }
-  const double half = 0.5 * covariance_scale(problem, cost, factors.size(), noise);
+  const double half = 0.5 * covariance_scale(problem, cost, factors.size(), noise.knowledge);
   const Eigen::MatrixXd inverse = free_inverse(N, frozen);
   FitCovariance out{half * inverse * K * inverse.transpose(), half * inverse};
   return out.sandwich.allFinite() ? out : FitCovariance{};
@@ -100,7 +100,7 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
       low_rank_parameters(problem, beta, groups, cost, factors, noise, frozen).sandwich;
   if (C.size() == 0) return {};
   ParameterCovariance out;
-  out.residual_scale = covariance_scale(problem, cost, factors.size(), noise);
+  out.residual_scale = covariance_scale(problem, cost, factors.size(), noise.knowledge);
   out.globals = C.topLeftCorner(problem.globals(), problem.globals());
   out.numerator_variance.resize(problem.channels(), problem.functions());
   if (with_response) out.response_variance.resize(problem.channels(), problem.size());

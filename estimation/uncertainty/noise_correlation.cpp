@@ -1,9 +1,8 @@
-#include "estimation/uncertainty/noise_correlation.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
 
+#include "estimation/uncertainty/data_noise.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -86,20 +85,17 @@ class GramOfTiles {
 
   void multiply(int u, IndexRange lines) {
     const auto input = static_cast<std::size_t>(u);
-    if (correlation_.between_inputs())
-      multiply(input, with_other_inputs(u, lines), lines);
-    else
-      multiply(input, Y_[input], lines);
-  }
-
-  void multiply(std::size_t u, const OutputColumns& Z, IndexRange lines) {
-    Eigen::MatrixXd& K = K_[u];
-    if (K.size() == 0) K.setZero(X_[u].front().cols(), Z.front().cols());
+    const OutputColumns& X = X_[input];
+    OutputColumns together;
+    if (correlation_.between_inputs()) together = with_other_inputs(u, lines);
+    const OutputColumns& Z = together.empty() ? Y_[input] : together;
+    Eigen::MatrixXd& K = K_[input];
+    if (K.size() == 0) K.setZero(X.front().cols(), Z.front().cols());
     for (std::size_t y = 0; y < Z.size(); ++y) {
-      K.noalias() += X_[u][y].re.transpose() * Z[y].re;
-      K.noalias() += X_[u][y].im.transpose() * Z[y].im;
+      K.noalias() += X[y].re.transpose() * Z[y].re;
+      K.noalias() += X[y].im.transpose() * Z[y].im;
     }
-    if (inputs_.use) inputs_.use(static_cast<Eigen::Index>(u), lines, Z);
+    if (inputs_.use) inputs_.use(u, lines, Z);
   }
 
   const FitProblem& problem_;

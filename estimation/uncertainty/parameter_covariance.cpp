@@ -246,7 +246,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                          const std::vector<Eigen::Index>& frozen,
                                          WantedCovariance wanted) {
   ParameterCovariance out;
-  out.residual_scale = covariance_scale(problem, cost, problem.parameters(), noise);
+  out.residual_scale = covariance_scale(problem, cost, problem.parameters(), noise.knowledge);
   const double half = 0.5 * out.residual_scale;
   const bool correlate = problem.globals() > 0 && noise.correlation.known();
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
@@ -316,8 +316,7 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
                                      bool with_response) {
   ParameterCovariance out;
   if (!equations.regular()) return out;
-  out.residual_scale = residual_scale(residual_per_degree(problem, cost, problem.parameters()),
-                                      knowledge == VarianceKnowledge::weights);
+  out.residual_scale = covariance_scale(problem, cost, problem.parameters(), knowledge);
   const double half = 0.5 * scatter_factor * out.residual_scale;
 
   // Columns of M^-1 for the globals: X_a of the globals themselves, X_b of the numerators. With X = M^-1

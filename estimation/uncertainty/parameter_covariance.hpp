@@ -48,7 +48,7 @@ struct WantedCovariance {
 /// the channel and nu its numerators for given globals a,
 ///   b_c = nu_c - Z a,   dP_c = (J_a - F Z) a + F nu_c.
 /// The noise of the outputs is correlated by disturbance forces, that of the inputs by the controller. Diagonal
-/// weights ignore that, the covariance does not (noise_correlation.hpp). If W is the inverse variance but the residual
+/// weights ignore that, the covariance does not (NoiseCorrelation). If W is the inverse variance but the residual
 /// is clearly larger than it predicts, the covariance is raised by that ratio (`residual_scale`). Empty if numerators
 /// are not determined; entries of a channel without weight are NaN.
 /// To save memory, the equations are computed per part of the channels, once for the globals and once for the rest.

@@ -104,30 +104,6 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
 
 // Reading -----------------------------------------------------------------------------------------
 
-void require_format(const Hdf5File& file) {
-  if (!file.has_attribute("/", "format")) {
-    throw FormatError(file.path(), "/",
-                      fmt::format("attribute format is missing; expected '{}'", kFormat));
-  }
-  const std::string format = file.read_text_attribute("/", "format");
-  if (format != kFormat) {
-    const std::string other = other_hdf5_kind(format, "a frequency response");
-    throw FormatError(file.path(), "/",
-                      !other.empty()
-                          ? other
-                          : fmt::format("format is '{}'; expected '{}'. Convert files of other "
-                                        "programs with 'stageid import'",
-                                        format, kFormat));
-  }
-  if (!file.has_attribute("/", "format_version")) return;
-  const long long version = file.read_integer_attribute("/", "format_version");
-  if (version != kFormatVersion) {
-    throw FormatError(file.path(), "/",
-                      fmt::format("unsupported format_version {}; this program reads {}", version,
-                                  kFormatVersion));
-  }
-}
-
 /// Leaves values without an attribute as they are.
 struct AttributeReader {
   const Hdf5File& file;
@@ -233,7 +209,9 @@ void write_frf(const std::filesystem::path& path, const FrfEstimate& frf) {
 
 FrfEstimate read_frf(const std::filesystem::path& path) {
   const Hdf5File file = Hdf5File::open(path);
-  require_format(file);
+  require_format(file, kFormat, "a frequency response",
+                 ". Convert files of other programs with 'stageid import'");
+  if (file.has_attribute("/", "format_version")) require_version(file, kFormatVersion);
   FrfEstimate frf;
   for_each_attribute(frf, AttributeReader{file});
   frf.covariance_lines = std::max(1, frf.covariance_lines);

@@ -1,25 +1,10 @@
 #include "frf/file/line_datasets.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "acquisition/files/file_error.hpp"
 
 namespace stageid {
-
-std::string join_shape(const std::vector<hsize_t>& shape) {
-  return fmt::format("[{}]", fmt::join(shape, " x "));
-}
-
-void require_shape(const Hdf5File& file, const std::string& dataset,
-                   const std::vector<hsize_t>& wanted) {
-  const std::vector<hsize_t> shape = file.shape(dataset);
-  if (shape != wanted) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("shape is {}; expected {}", join_shape(shape), join_shape(wanted)));
-  }
-}
 
 void write_known(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
   if (values.size() > 0) file.write_reals(dataset, {size_of(values.size())}, values.data());

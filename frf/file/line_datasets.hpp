@@ -2,19 +2,15 @@
 
 #include <Eigen/Core>
 #include <string>
-#include <type_traits>
 #include <vector>
 
-#include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 
 /// Conversion between columns vec(matrix), one per line, and datasets [lines x rows x columns].
 namespace stageid {
 
 template <typename Scalar>
 using VecColumns = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-
-template <typename Scalar>
-using RowMajor = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 template <typename Scalar>
 std::vector<Scalar> to_c_order(const VecColumns<Scalar>& columns, Eigen::Index rows) {
@@ -40,13 +36,6 @@ VecColumns<Scalar> from_c_order(const std::vector<Scalar>& data, Eigen::Index ro
   return result;
 }
 
-/// "[4 x 2]"
-std::string join_shape(const std::vector<hsize_t>& shape);
-
-/// @throws FormatError unless `dataset` has the shape `wanted`.
-void require_shape(const Hdf5File& file, const std::string& dataset,
-                   const std::vector<hsize_t>& wanted);
-
 inline hsize_t size_of(Eigen::Index n) { return static_cast<hsize_t>(n); }
 
 /// Writes columns vec(matrix), `rows` rows each; nothing if there are none.
@@ -55,12 +44,9 @@ void write_columns(Hdf5File& file, const std::string& dataset, const VecColumns<
                    Eigen::Index rows) {
   if (columns.size() == 0) return;
   const std::vector<Scalar> data = to_c_order(columns, rows);
-  const std::vector<hsize_t> shape = {size_of(columns.cols()), size_of(rows),
-                                      size_of(columns.rows() / rows)};
-  if constexpr (std::is_same_v<Scalar, double>)
-    file.write_reals(dataset, shape, data.data());
-  else
-    file.write_complex(dataset, shape, data.data());
+  write_array(file, dataset,
+              {size_of(columns.cols()), size_of(rows), size_of(columns.rows() / rows)},
+              data.data());
 }
 
 /// The inverse; empty if the dataset is missing. @throws FormatError unless it is [lines x rows x columns]
@@ -69,10 +55,7 @@ VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset
                                 Eigen::Index lines, Eigen::Index rows, Eigen::Index columns) {
   if (!file.exists(dataset)) return {};
   require_shape(file, dataset, {size_of(lines), size_of(rows), size_of(columns)});
-  if constexpr (std::is_same_v<Scalar, double>)
-    return from_c_order(file.read_reals(dataset), rows, columns);
-  else
-    return from_c_order(file.read_complex(dataset), rows, columns);
+  return from_c_order(read_array<Scalar>(file, dataset), rows, columns);
 }
 
 /// Writes a list of numbers; nothing if it is empty, which means unknown here.

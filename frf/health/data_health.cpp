@@ -86,10 +86,9 @@ void Examination::check_samples() {
     // A channel that is not driven may be constant, and a constant run is not clipped.
     if (stuck > std::max({kStuckShare * run_samples, 2.0, expected}) &&
         !(piles_up && scan.returns())) {
-      bool known = false;
       const auto excited = excited_actuators();
       const bool driven =
-          sensor ? expected_to_respond(c, known) || !known
+          sensor ? expected_to_respond(c).value_or(true)
                  : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
       if (!driven) continue;
       const std::string figure = fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz);
@@ -142,11 +141,9 @@ bool Examination::find_suspected(Index first, Index count) {
 
 /// Whether the motion of the nominal rigid body under the recorded inputs is above the noise of this sensor.
 bool Examination::expected_above_noise(Index sensor) const {
-  bool known = false;
-  if (!expected_to_respond(sensor, known)) return false;
-  std::string missing;
-  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
-  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
+  if (!expected_to_respond(sensor).value_or(false)) return false;
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names);
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names);
   return above_noise(record_, sensor, [&](Index k) -> Eigen::RowVectorXcd {
     const Eigen::MatrixXcd G = nominal_->rigid_body(record_.frequency_hz[k])(y, u);
     const LineRecord& line = record_.lines[static_cast<std::size_t>(k)];
@@ -193,30 +190,30 @@ void Examination::check_responses() {
   std::vector<Index> drowned;
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
-    bool known = false;
-    const bool expected = expected_to_respond(s, known);
+    const std::optional<bool> expected = expected_to_respond(s);
     if (!responding[static_cast<std::size_t>(s)]) {
       if (none && spoilt_.empty()) {
         drowned.push_back(s);
-      } else if (known && !expected) {
+      } else if (expected == false) {
         continue;
-      } else if (moves(s) || (expected && !expected_above_noise(s))) {
+      } else if (moves(s) || (expected == true && !expected_above_noise(s))) {
         drowned.push_back(s);
       } else {
-        find(known ? Severity::fault : Severity::doubt, Cause::dead, name(s),
-             known ? "dead: only noise, although the rigid body moves it"
-                   : "no response to the excitation: the sensor is dead, or these axes do not move "
-                     "it",
+        find(expected ? Severity::fault : Severity::doubt, Cause::dead, name(s),
+             expected
+                 ? "dead: only noise, although the rigid body moves it"
+                 : "no response to the excitation: the sensor is dead, or these axes do not move "
+                   "it",
              "no line above the noise",
-             known ? "check its cable and power supply, then measure again"
-                   : "exclude it with --outputs, or check its cable");
+             expected ? "check its cable and power supply, then measure again"
+                      : "exclude it with --outputs, or check its cable");
         spoilt_.push_back(s);
       }
       continue;
     }
     const double coherence = median_coherence(record_, s);
     // A dead sensor in the loop disturbs the others.
-    if (expected && spoilt_.empty() && coherence < kLeastCoherence)
+    if (expected == true && spoilt_.empty() && coherence < kLeastCoherence)
       find(Severity::doubt, Cause::incoherent, name(s),
            "most of its signal does not repeat from period to period",
            fmt::format("median coherence {:.2f}", coherence),

@@ -14,7 +14,6 @@ namespace stageid {
 namespace {
 
 constexpr double kByChance = 1e-4;
-constexpr std::size_t kMostBands = 4;
 constexpr double kEverywhere = 0.2;  // of the lines: then the cause is distortion, not resonances
 
 struct Band {
@@ -130,11 +129,11 @@ std::vector<Finding> check_interpolation(const FrfEstimate& frf) {
   std::stable_sort(bands.begin(), bands.end(),
                    [](const Band& a, const Band& b) { return a.largest > b.largest; });
   std::string figure;
-  for (std::size_t i = 0; i < std::min(bands.size(), kMostBands); ++i)
+  for (std::size_t i = 0; i < std::min(bands.size(), kMostNamed); ++i)
     figure += fmt::format("{}{:.2g} times the noise at {:.4g} ... {:.4g} Hz", i == 0 ? "" : ", ",
                           bands[i].largest, bands[i].low_hz, bands[i].high_hz);
-  if (bands.size() > kMostBands)
-    figure += fmt::format(" and in {} more bands", bands.size() - kMostBands);
+  if (bands.size() > kMostNamed)
+    figure += fmt::format(" and in {} more bands", bands.size() - kMostNamed);
   const bool everywhere =
       static_cast<double>(lines) > kEverywhere * static_cast<double>(frf.lines());
   return {{Severity::doubt, Cause::interpolation, "",

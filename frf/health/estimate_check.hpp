@@ -3,8 +3,8 @@
 #include <string_view>
 #include <vector>
 
+#include "frf/periods/estimate_results.hpp"
 #include "frf/periods/health_finding.hpp"
-#include "frf/periods/noisy_run.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {

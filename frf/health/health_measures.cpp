@@ -15,8 +15,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-constexpr double kRounding = 1e-24;  // of a line's power: rounding errors without noise
-
 }  // namespace
 
 bool above_noise(const HealthRecord& record, Index channel,
@@ -27,7 +25,7 @@ bool above_noise(const HealthRecord& record, Index channel,
     const double variance = record.variance_of_mean(record.lines[k].Z.row(channel))[0];
     const double mean_square =
         response(static_cast<Index>(k)).squaredNorm() / static_cast<double>(record.experiments());
-    if (variance > kRounding * mean_square)
+    if (variance > kPowerRounding * mean_square)
       evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record.experiments()),
                                 record.scatter_dof());
     else if (mean_square > 0.0)

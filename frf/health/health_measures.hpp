@@ -7,9 +7,6 @@
 
 namespace stageid {
 
-/// Significance of a check over all channels.
-inline constexpr double kSignificance = 1e-4;
-
 inline constexpr const char* kRemedyOfLimitCycle =
     "raise the level, excite all axes in every experiment, or use a finer converter";
 

@@ -61,6 +61,9 @@ inline constexpr std::array kWords<Cause> = {
     "uneven_noise", "limit_cycle",   "lost_samples", "excitation_timing",
     "drift",        "actuator_step", "resolution"};
 
+/// Significance of a check over all channels.
+inline constexpr double kSignificance = 1e-4;
+
 /// Runs, frequencies or channels that a finding lists by name; it counts the rest.
 inline constexpr std::size_t kMostNamed = 4;
 

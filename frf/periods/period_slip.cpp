@@ -6,6 +6,8 @@
 #include <complex>
 #include <vector>
 
+#include "frf/statistics/distributions.hpp"
+
 namespace stageid {
 namespace {
 
@@ -23,7 +25,6 @@ constexpr double kLeastRatioOfOne = 30.0;
 constexpr double kWorthTrying = 4.0;  // ratio of the block powers of a channel
 constexpr double kClearlyMore = 1.2;
 constexpr double kDeviations = 8.0;
-constexpr double kSlipRounding = 1e-24;  // of a channel's power
 
 /// x[n] - r[(n + shift) mod N]
 ArrayXd difference(const MatrixXd& later, const MatrixXd& earlier, Index channel, Index shift) {
@@ -49,7 +50,7 @@ ArrayXd block_power(const ArrayXd& difference, Index blocks) {
 Index blocks_of(Index N) { return std::clamp<Index>(N / kShortestBlock, 1, kBlocks); }
 
 double floor_of(const MatrixXd& samples, Index channel) {
-  return kSlipRounding * samples.col(channel).squaredNorm() + 1e-300;
+  return kPowerRounding * samples.col(channel).squaredNorm() + 1e-300;
 }
 
 /// Whether a shift of 2 ... 4 samples fits some block of a channel clearly better.

@@ -8,7 +8,6 @@ namespace stageid {
 namespace {
 
 constexpr double kDeadGain = 0.05;
-constexpr double kMicroseconds = 1e6;
 
 }  // namespace
 

@@ -8,6 +8,15 @@
 
 namespace stageid {
 
+/// A change of a channel is larger than this, and explains at least this share of a misfit. Smaller ones are noise, or
+/// do no harm.
+inline constexpr double kChangeDeviations = 6.0;
+inline constexpr double kLeastGainChange = 0.02;
+inline constexpr double kLeastSkewChange_s = 2e-6;
+inline constexpr double kLeastChangeShare = 0.3;
+
+inline constexpr double kMicroseconds = 1e6;
+
 /// What one realization has different from the others: one channel of its response, two, or all.
 struct RealizationChange {
   enum class Kind : std::uint8_t { gain, skew, swap };

@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
-namespace {
-
-constexpr double kTransientRounding = 1e-24;  // of a sensor's power, without noise
-
-}  // namespace
 
 StartRecorder::StartRecorder(Eigen::MatrixXcd start)
     : on_(true), start_used_(start.size() == 0), start_(std::move(start)) {}
@@ -60,7 +56,7 @@ RunStart StartRecorder::finish() {
     for (Eigen::Index k = 0; k < noise.cols(); ++k)
       values[static_cast<std::size_t>(k)] = noise(c, k);
     const double power = mean.row(c).squaredNorm() / static_cast<double>(mean.cols());
-    const double level = std::max(order_statistic(values, 0.5), kTransientRounding * power);
+    const double level = std::max(order_statistic(values, 0.5), kPowerRounding * power);
     const double weight = level > 0.0 ? 1.0 / level : 0.0;
     if (c == 0) {
       run.along = run.bend = Eigen::VectorXcd::Zero(noise.cols());
@@ -75,7 +71,7 @@ RunStart StartRecorder::finish() {
     run.last += weight * last.row(c).cwiseAbs2().transpose();
     // Rounding errors count as noise, so that it is not zero.
     run.noise.array() +=
-        weight * noise.row(c).transpose().array() + weight * kTransientRounding * power;
+        weight * noise.row(c).transpose().array() + weight * kPowerRounding * power;
   }
   run.periods = count_;
   run.start_used = start_used_;

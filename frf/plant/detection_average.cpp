@@ -43,35 +43,33 @@ Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line
 DetectionAverage::DetectionAverage(const std::vector<int>& lines,
                                    const std::vector<std::string>& axes, bool single_axis,
                                    Eigen::Index outputs)
-    : excited_(lines),
-      detection_(detection_lines(lines)),
-      outputs_(outputs),
-      groups_(single_axis ? axes : std::vector<std::string>{"all"}) {
+    : excited_(lines), detection_(detection_lines(lines)), outputs_(outputs) {
+  sum_.groups = single_axis ? axes : std::vector<std::string>{"all"};
   const auto D = std::ssize(detection_);
-  const auto rows = outputs * std::ssize(groups_);
-  runs_.setZero(std::ssize(groups_));
-  power_.setZero(rows, D);
-  noise_.setZero(outputs, D);
-  linear_power_.setZero(rows, std::ssize(lines));
+  const auto rows = outputs * std::ssize(sum_.groups);
+  sum_.runs.setZero(std::ssize(sum_.groups));
+  sum_.power.setZero(rows, D);
+  sum_.noise.setZero(outputs, D);
+  sum_.linear_power.setZero(rows, std::ssize(lines));
 }
 
 void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
                            const std::vector<std::size_t>& axis, int workers) {
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
   if (!noise_known_ || detection_.empty()) return;
-  noise_dof_ += spectra.scatter_dof();
+  sum_.noise_dof += spectra.scatter_dof();
   std::vector<Eigen::Index> groups;
   for (std::size_t e = 0; e < axis.size(); ++e) {
-    groups.push_back(groups_.size() == 1 ? 0 : static_cast<Eigen::Index>(axis[e]));
-    runs_[groups.back()] += 1.0;
+    groups.push_back(sum_.groups.size() == 1 ? 0 : static_cast<Eigen::Index>(axis[e]));
+    sum_.runs[groups.back()] += 1.0;
     periods_ += spectra.periods(e);
   }
   for_each_line(workers, std::ssize(detection_),
                 [&](Eigen::Index d) { add_line(spectra, G, groups, d); });
-  for_each_line(workers, linear_power_.cols(), [&](Eigen::Index k) {
+  for_each_line(workers, sum_.linear_power.cols(), [&](Eigen::Index k) {
     const Eigen::MatrixXcd Z = spectra.response(k);
     for (Eigen::Index e = 0; e < Z.cols(); ++e)
-      linear_power_.col(k).segment(outputs_ * groups[static_cast<std::size_t>(e)], outputs_) +=
+      sum_.linear_power.col(k).segment(outputs_ * groups[static_cast<std::size_t>(e)], outputs_) +=
           Z.col(e).head(outputs_).cwiseAbs2();
   });
 }
@@ -86,31 +84,27 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
   const Eigen::MatrixXcd E = factor * Z;
   for (Eigen::Index e = 0; e < E.cols(); ++e) {
     const auto run = static_cast<std::size_t>(e);
-    power_.col(d).segment(outputs_ * groups[run], outputs_) +=
+    sum_.power.col(d).segment(outputs_ * groups[run], outputs_) +=
         spectra.periods(run) * E.col(e).cwiseAbs2();
   }
   const Eigen::MatrixXcd scatter = factor * spectra.scatter(column);
   // The scatter is a sum of squares, but rounding may make it negative.
-  noise_.col(d) +=
+  sum_.noise.col(d) +=
       (scatter.array() * factor.conjugate().array()).rowwise().sum().real().max(0.0).matrix();
 }
 
 DetectionLines DetectionAverage::finish(double resolution_hz) const {
-  DetectionLines found;
-  if (!noise_known_ || detection_.empty() || runs_.size() == 0) return found;
-  if (!(runs_.minCoeff() > 0.0) || !(noise_dof_ > 0.0)) return found;
+  if (!noise_known_ || detection_.empty() || sum_.runs.size() == 0) return {};
+  if (!(sum_.runs.minCoeff() > 0.0) || !(sum_.noise_dof > 0.0)) return {};
+  DetectionLines found = sum_;
   found.line = Eigen::Map<const Eigen::VectorXi>(detection_.data(), std::ssize(detection_));
   found.frequency_hz = resolution_hz * found.line.cast<double>();
-  found.groups = groups_;
-  found.runs = runs_;
-  found.noise_dof = noise_dof_;
-  const double mean_periods = periods_ / runs_.sum();
-  found.noise = noise_ / (noise_dof_ * mean_periods);
-  found.power = power_ / mean_periods;
-  found.linear_power = linear_power_;
-  for (Eigen::Index g = 0; g < runs_.size(); ++g) {
-    found.power.middleRows(outputs_ * g, outputs_) /= runs_[g];
-    found.linear_power.middleRows(outputs_ * g, outputs_) /= runs_[g];
+  const double mean_periods = periods_ / found.runs.sum();
+  found.noise /= found.noise_dof * mean_periods;
+  found.power /= mean_periods;
+  for (Eigen::Index g = 0; g < found.runs.size(); ++g) {
+    found.power.middleRows(outputs_ * g, outputs_) /= found.runs[g];
+    found.linear_power.middleRows(outputs_ * g, outputs_) /= found.runs[g];
   }
   return found;
 }

@@ -42,14 +42,10 @@ class DetectionAverage {
   std::vector<int> excited_;
   std::vector<int> detection_;
   Eigen::Index outputs_;
-  std::vector<std::string> groups_;
   bool noise_known_ = true;
   double periods_ = 0.0;  // of all runs
-  Eigen::VectorXd runs_;  // one value per group
-  double noise_dof_ = 0.0;
-  Eigen::MatrixXd power_;  // sum of P |E|^2, whose expectation under noise is that of one period
-  Eigen::MatrixXd noise_;  // sum of |E_p - E|^2
-  Eigen::MatrixXd linear_power_;
+  // `power`: sum of P |E|^2, whose expectation under noise is that of one period; `noise`: sum of |E_p - E|^2.
+  DetectionLines sum_;
 };
 
 }  // namespace stageid

@@ -8,14 +8,9 @@
 
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
+#include "frf/statistics/distributions.hpp"
 
 namespace stageid {
-namespace {
-
-constexpr double kAlignmentRounding =
-    1e-24;  // of the largest line's power: what double precision leaves
-
-}  // namespace
 
 AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<int>& detection,
                                    Eigen::Index outputs)
@@ -28,8 +23,8 @@ AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<i
   std::ranges::sort(column_, {}, line_of);
   std::ranges::transform(column_, std::back_inserter(lines_), line_of);
   const auto L = std::ssize(lines_);
-  cosine_.setZero(outputs, L);
-  pairs_.setZero(outputs, L);
+  sum_.cosine.setZero(outputs, L);
+  sum_.pairs.setZero(outputs, L);
 }
 
 void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G_before,
@@ -50,11 +45,11 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
     residual.col(l) = (Z.topRows(outputs_) - at * Z.bottomRows(at.cols())).reshaped();
   });
   for (Eigen::Index e = 0; e < E; ++e) {
-    const Eigen::VectorXd smallest = kAlignmentRounding * spectra.run(static_cast<std::size_t>(e))
-                                                              .mean.topLeftCorner(outputs_, N)
-                                                              .cwiseAbs2()
-                                                              .rowwise()
-                                                              .maxCoeff();
+    const Eigen::VectorXd smallest = kPowerRounding * spectra.run(static_cast<std::size_t>(e))
+                                                          .mean.topLeftCorner(outputs_, N)
+                                                          .cwiseAbs2()
+                                                          .rowwise()
+                                                          .maxCoeff();
     add_run(residual.middleRows(outputs_ * e, outputs_), smallest);
   }
   first_ = false;
@@ -67,8 +62,8 @@ void AlignmentAverage::add_run(const Eigen::MatrixXcd& residual, const Eigen::Ve
       if (!(std::norm(residual(i, l)) > smallest[i])) continue;
       if (before >= 0) {
         const std::complex<double> turn = residual(i, l) * std::conj(residual(i, before));
-        cosine_(i, l) += turn.real() / std::abs(turn);
-        pairs_(i, l) += 1.0;
+        sum_.cosine(i, l) += turn.real() / std::abs(turn);
+        sum_.pairs(i, l) += 1.0;
       }
       before = l;
     }
@@ -76,12 +71,10 @@ void AlignmentAverage::add_run(const Eigen::MatrixXcd& residual, const Eigen::Ve
 }
 
 LineAlignment AlignmentAverage::finish(double resolution_hz) const {
-  LineAlignment found;
+  LineAlignment found = sum_;
   found.frequency_hz =
       resolution_hz *
       Eigen::Map<const Eigen::VectorXi>(lines_.data(), std::ssize(lines_)).cast<double>();
-  found.cosine = cosine_;
-  found.pairs = pairs_;
   return found;
 }
 

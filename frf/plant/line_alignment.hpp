@@ -32,8 +32,7 @@ class AlignmentAverage {
   std::vector<Eigen::Index> column_;  // index into the spectra for each of lines_
   Eigen::Index outputs_;
   bool first_ = true;
-  Eigen::MatrixXd cosine_;
-  Eigen::MatrixXd pairs_;
+  LineAlignment sum_;
 };
 
 }  // namespace stageid

@@ -226,13 +226,9 @@ class PlantEstimation {
 
   void note_spoilt(const RealizationRuns& realization, const RealizationSpectra& spectra) {
     for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-      const auto note = [&](auto of_run, auto& all) {
-        of_run.realization = realization.realization;
-        of_run.experiment = realization.runs[e].run().experiment;
-        all.push_back(std::move(of_run));
-      };
-      for (const DroppedPeriod& one : spectra.run(e).dropped) note(one, dropped_);
-      for (const ReplacedSamples& one : spectra.run(e).replaced) note(one, replaced_);
+      const RunSpectra& run = spectra.run(e);
+      dropped_.insert(dropped_.end(), run.dropped.begin(), run.dropped.end());
+      replaced_.insert(replaced_.end(), run.replaced.begin(), run.replaced.end());
     }
   }
 
@@ -299,22 +295,21 @@ class PlantEstimation {
 
   /// Records drift and noise differences, which only the finished response shows.
   void note_change(const FrfEstimate& frf, HealthGathering& health) const {
-    std::vector<NoisyRun> noisy;
+    EstimateResults results;
     for (const OddRun& odd : average_->odd_runs()) {
       const auto of =
           std::find_if(realizations_.begin(), realizations_.end(),
                        [&odd](const auto& r) { return r.realization == odd.realization; });
-      noisy.push_back({odd.realization,
-                       of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
-                       frf.outputs.name(odd.output), odd.ratio});
+      results.noisy_runs.push_back(
+          {odd.realization, of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
+           frf.outputs.name(odd.output), odd.ratio});
     }
     const UsedRun& run = realizations_.front().runs.front();
-    RealizationDifferences differences = average_->differences(frf);
+    results.differences = average_->differences(frf);
     // A channel that one realization records differently has a slope over the realizations, too.
-    std::optional<ModeDrift> drift;
-    if (differences.changes.empty())
-      drift = average_->drift(frf, run.transient_periods + run.periods);
-    health.note(drift, std::move(noisy), std::move(differences));
+    if (results.differences.changes.empty())
+      results.drift = average_->drift(frf, run.transient_periods + run.periods);
+    health.note(std::move(results));
   }
 
   std::vector<RealizationRuns> realizations_;
@@ -427,7 +422,7 @@ FrfAndHealth estimate(const std::vector<const LogReader*>& logs, const FrfOption
   again.frf.provenance_json =
       with_steps(done.frf.provenance_json, earlier.steps, logs.front()->info().actuators);
   done.frf = std::move(again.frf);
-  done.health.take_results_of_estimate(std::move(again.health));
+  static_cast<EstimateResults&>(done.health) = std::move(again.health);
   done.health.steps = earlier.steps;
   return done;
 }

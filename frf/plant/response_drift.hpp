@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "frf/periods/mode_drift.hpp"
+#include "frf/periods/estimate_results.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "frf/response/line_estimate.hpp"
 #include "frf/runs/realization_spectra.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <memory>
 #include <numbers>
 #include <string>
 
@@ -257,16 +256,13 @@ void StepSearch::collect(const UsedRun& run, RunWorkspace& w, std::vector<Comman
 
 /// In batches, whose sums do not depend on the number of threads.
 void StepSearch::collect() {
-  MatrixPool pool;
-  std::vector<std::unique_ptr<RunWorkspace>> workspaces;
-  for (int w = 0; w < workers_; ++w)
-    workspaces.push_back(std::make_unique<RunWorkspace>(info_.period_samples, pool));
+  RunWorkers workers(workers_, runs_.size(), info_.period_samples);
   const auto batch = static_cast<std::size_t>(workers_);
   for (std::size_t first = 0; first < runs_.size(); first += batch) {
     std::vector<std::vector<CommandHistogram>> own(std::min(batch, runs_.size() - first));
-    for_each_task(workers_, own.size(), [&](int worker, std::size_t r) {
+    workers.for_each(own.size(), [&](RunWorkspace& workspace, std::size_t r) {
       own[r].resize(tested_.size());
-      collect(*runs_[first + r], *workspaces[static_cast<std::size_t>(worker)], own[r]);
+      collect(*runs_[first + r], workspace, own[r]);
     });
     for (const auto& of_run : own)
       for (std::size_t a = 0; a < tested_.size(); ++a) tested_[a].histogram.add(of_run[a]);

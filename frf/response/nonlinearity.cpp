@@ -14,11 +14,9 @@ namespace {
 
 constexpr double kCertain = 1e3;  // -ln p of scatter if there is no noise at all
 
-constexpr double kRounding = 1e-24;  // of the linear power: rounding errors
-
 /// -ln p of one line. Without noise, any scatter above the rounding of the `linear` power is certain.
 double evidence(double power, double noise, double linear, int power_dof, double noise_dof) {
-  if (power <= kRounding * linear) return 0.0;
+  if (power <= kPowerRounding * linear) return 0.0;
   if (noise > 0.0) return -log_tail_of_f(power / noise, power_dof, noise_dof);
   return kCertain;
 }

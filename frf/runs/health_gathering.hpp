@@ -96,11 +96,8 @@ class HealthGathering {
   HealthPart& part(std::size_t realization, std::size_t experiment);
 
   /// Adds results that only the estimate provides.
-  void note(const std::optional<ModeDrift>& drift, std::vector<NoisyRun> noisy_runs,
-            RealizationDifferences differences) {
-    record_.drift = drift;
-    record_.noisy_runs = std::move(noisy_runs);
-    record_.differences = std::move(differences);
+  void note(EstimateResults results) {
+    static_cast<EstimateResults&>(record_) = std::move(results);
   }
 
   /// Call once, after all parts are filled. @pre complete()

@@ -1,15 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
 #include "frf/periods/actuator_step.hpp"
-#include "frf/periods/mode_drift.hpp"
-#include "frf/periods/noisy_run.hpp"
-#include "frf/periods/realization_change.hpp"
+#include "frf/periods/estimate_results.hpp"
 #include "frf/periods/sample_slip.hpp"
 #include "frf/periods/start_transient.hpp"
 #include "frf/response/frf_options.hpp"
@@ -46,25 +42,15 @@ struct RealizationRecord {
 };
 
 /// Input of the checks of a log's health. The spectra are those of the first complete realization.
-struct HealthRecord : RealizationRecord {
+struct HealthRecord : RealizationRecord, EstimateResults {
   LogInfo info;
   /// The other complete realizations, with at most kPeriodsOfOthers periods per run.
   std::vector<RealizationRecord> others;
-  std::vector<ChannelScan> scan;       ///< [sensors; actuators], over all used runs
-  RunHealth health;                    ///< over all used runs
-  std::vector<SampleSlip> slips;       ///< of the same runs
-  std::vector<ActuatorStep> steps;     ///< of the converters behind the records of the actuators
-  std::optional<ModeDrift> drift;      ///< of the response, if there was an estimate
-  std::vector<NoisyRun> noisy_runs;    ///< the same
-  RealizationDifferences differences;  ///< the same
-  StartEvidence start;                 ///< of the start of the runs; empty if there is no evidence
-
-  /// Takes what only an estimate provides from the record of another one of the same logs.
-  void take_results_of_estimate(HealthRecord&& other) {
-    drift = other.drift;
-    noisy_runs = std::move(other.noisy_runs);
-    differences = std::move(other.differences);
-  }
+  std::vector<ChannelScan> scan;    ///< [sensors; actuators], over all used runs
+  RunHealth health;                 ///< over all used runs
+  std::vector<SampleSlip> slips;    ///< of the same runs
+  std::vector<ActuatorStep> steps;  ///< of the converters behind the records of the actuators
+  StartEvidence start;              ///< of the start of the runs; empty if there is no evidence
 
   Eigen::Index n_y() const noexcept { return std::ssize(info.sensors); }
   Eigen::Index n_u() const noexcept { return std::ssize(info.actuators); }

@@ -36,7 +36,7 @@ void PeriodComparison::keep_samples(std::size_t place) {
 }
 
 // Each replacement makes the others more visible, and may not be enough.
-PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& numbers) {
+std::vector<char> PeriodComparison::settle(const std::vector<int>& numbers, RunSpectra& run) {
   const std::size_t P = numbers.size();
   const ComparedPeriods compared{std::span<const Eigen::MatrixXcd>(w_.spectra).first(P),
                                  std::span<const Eigen::MatrixXf>(w_.record).first(P), numbers,
@@ -59,17 +59,21 @@ PeriodComparison::Result PeriodComparison::settle(const std::vector<int>& number
         changed |= replace(outlier, outliers.consistent, replaced[p]);
     }
   }
-  Result result;
-  result.use.assign(P, 1);
+  const LogRun& of = used_.run();
+  std::vector<char> use(P, 1);
   for (const PeriodOutlier& outlier : outliers.found) {
-    result.use[outlier.period] = 0;
-    result.dropped.push_back({0, 0, numbers[outlier.period], reasons[outlier.period]});
+    use[outlier.period] = 0;
+    run.deviating.push_back(numbers[outlier.period]);
+    run.drop(of, numbers[outlier.period], reasons[outlier.period]);
   }
-  for (std::size_t p = 0; p < P; ++p)
-    if (result.use[p] != 0 && !replaced[p].empty())
-      result.replaced.push_back({0, 0, numbers[p], static_cast<int>(replaced[p].first),
-                                 static_cast<int>(replaced[p].count()), reasons[p]});
-  return result;
+  for (std::size_t p = 0; p < P; ++p) {
+    if (use[p] == 0 || replaced[p].empty()) continue;
+    run.deviating.push_back(numbers[p]);
+    run.replaced.push_back({of.realization, of.experiment, numbers[p],
+                            static_cast<int>(replaced[p].first),
+                            static_cast<int>(replaced[p].count()), reasons[p]});
+  }
+  return use;
 }
 
 /// Replaces the samples that deviate. If this is not enough, the next call replaces at least twice as many.

@@ -23,13 +23,9 @@ class PeriodComparison {
   /// which has the same excitation: the difference is noise, for which a float is accurate enough.
   void keep_samples(std::size_t place);
 
-  struct Result {
-    std::vector<char> use;                  ///< of each period of the group
-    std::vector<DroppedPeriod> dropped;     ///< without realization and experiment
-    std::vector<ReplacedSamples> replaced;  ///< the same
-  };
-  /// @param numbers  of the group's periods in the run, ascending
-  Result settle(const std::vector<int>& numbers);
+  /// Notes in `run` what is dropped or replaced. @param numbers  of the group's periods in the run, ascending
+  /// @returns for each of them whether it is used
+  std::vector<char> settle(const std::vector<int>& numbers, RunSpectra& run);
 
  private:
   bool replace(const PeriodOutlier& outlier, const std::vector<std::size_t>& reference,

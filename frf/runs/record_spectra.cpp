@@ -63,7 +63,7 @@ class RecordMeasurement {
 
   void leave_out(int period, const std::string& why) {
     close_segment();
-    run_.drop(period, why);
+    run_.drop(used_.run(), period, why);
   }
 
   RunSpectra finish() {
@@ -105,7 +105,7 @@ class RecordMeasurement {
       for (const Glitch& glitch : glitches) {
         settle(part(begin, glitch.period));
         run_.deviating.push_back(segment_.first + glitch.period);
-        run_.drop(segment_.first + glitch.period,
+        run_.drop(used_.run(), segment_.first + glitch.period,
                   fmt::format("a glitch: {} deviates by {:.3g} times the surrounding noise",
                               channels_.name(used_.log->info(), glitch.channel), glitch.ratio));
         begin = glitch.period + 1;
@@ -121,7 +121,7 @@ class RecordMeasurement {
   }
 
   void drop_alone(const Segment& segment) {
-    run_.drop(segment.first, "too short for a record between marked periods");
+    run_.drop(used_.run(), segment.first, "too short for a record between marked periods");
   }
 
   void include(const Segment& segment) {

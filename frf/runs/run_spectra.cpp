@@ -62,7 +62,7 @@ class RunMeasurement {
     if (static_cast<int>(waiting_.size()) == together_) include_waiting();
     return spectra;
   }
-  void leave_out(int period, const std::string& why) { run_.drop(period, why); }
+  void leave_out(int period, const std::string& why) { run_.drop(used_.run(), period, why); }
 
   RunSpectra finish() {
     include_waiting();
@@ -75,16 +75,8 @@ class RunMeasurement {
 
  private:
   void include_waiting() {
-    std::vector<char> in(waiting_.size(), 1);
-    if (compare_) {
-      PeriodComparison::Result compared = comparison_.settle(waiting_);
-      in = std::move(compared.use);
-      for (const DroppedPeriod& one : compared.dropped) run_.deviating.push_back(one.period);
-      for (const ReplacedSamples& one : compared.replaced) run_.deviating.push_back(one.period);
-      for (DroppedPeriod& one : compared.dropped) run_.drop(one.period, std::move(one.reason));
-      std::move(compared.replaced.begin(), compared.replaced.end(),
-                std::back_inserter(run_.replaced));
-    }
+    const std::vector<char> in =
+        compare_ ? comparison_.settle(waiting_, run_) : std::vector<char>(waiting_.size(), 1);
     std::vector<const Eigen::MatrixXcd*> periods;
     std::vector<double> numbers;
     for (std::size_t i = 0; i < waiting_.size(); ++i) {
@@ -212,13 +204,11 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   return run;
 }
 
-void RunSpectra::drop(int period, std::string reason) {
+void RunSpectra::drop(const LogRun& of, int period, std::string reason) {
   const auto at =
       std::upper_bound(dropped.begin(), dropped.end(), period,
                        [](int p, const DroppedPeriod& other) { return p < other.period; });
-  DroppedPeriod& one = *dropped.emplace(at);
-  one.period = period;
-  one.reason = std::move(reason);
+  dropped.insert(at, {of.realization, of.experiment, period, std::move(reason)});
 }
 
 Eigen::Index noise_blocks(Eigen::Index lines) {

@@ -39,12 +39,12 @@ struct RunSpectra {
   int periods = 0;                 ///< number of those used
   Eigen::VectorXd excluded_power;  ///< sum over the lines of |U|^2 of the excluded actuators
   std::string fingerprint;         ///< of the excitation and of every unmarked sample
-  /// In order of the periods. The caller sets realization and experiment.
+  /// In order of the periods.
   std::vector<DroppedPeriod> dropped;
   std::vector<ReplacedSamples> replaced;
   /// Periods that differ from the others by more than noise: dropped, or with replaced samples.
   std::vector<int> deviating;
-  void drop(int period, std::string reason);
+  void drop(const LogRun& of, int period, std::string reason);
   double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }
 };
 

@@ -4,6 +4,9 @@
 
 namespace stageid {
 
+/// What rounding errors leave of a power in double precision, if there is no noise.
+inline constexpr double kPowerRounding = 1e-24;
+
 /// ln P(F > x) of a ratio of mean powers of complex Gaussian noise: F(2 a, 2 b), a a whole and b any positive number of
 /// complex degrees of freedom.
 double log_tail_of_f(double x, int a, double b);

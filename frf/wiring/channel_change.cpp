@@ -10,8 +10,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kMicroseconds = 1e6;
-
 Finding swap_finding(bool in_recording, bool of_sensors) {
   if (in_recording)
     return {Severity::fault,

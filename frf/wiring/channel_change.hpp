@@ -1,10 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <string>
 
-#include "frf/periods/health_finding.hpp"
+#include "frf/periods/realization_change.hpp"
 #include "frf/runs/health_record.hpp"
 
 namespace stageid {
@@ -13,7 +12,7 @@ namespace stageid {
 ///   gain: recorded = value * true;   skew: recorded(t) = true(t - value);
 ///   swap: the names of a and b are exchanged.
 struct ChannelChange {
-  enum class Kind : std::uint8_t { gain, swap, skew };
+  using Kind = RealizationChange::Kind;
   Kind kind = Kind::gain;
   bool of_sensors = true;  ///< otherwise of actuators
   Eigen::Index a = -1;     ///< -1: all channels

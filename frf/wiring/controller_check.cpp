@@ -15,10 +15,6 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kEpsilonOnePeriod = 5e-2;  // the noise is unknown
-constexpr double kDeviations = 6.0;
-constexpr double kLeastGain = 0.02;
-constexpr double kLeastControllerSkew_s = 2e-6;
-constexpr double kLeastShare = 0.3;
 constexpr int kMostChanges = 40;
 constexpr double kOfAnother = 0.05;  // of a row's misfit, after an exchange
 constexpr double kHardlyWorse = 4.0;
@@ -76,9 +72,8 @@ class Search {
         noise_known_(record.scatter_dof() > 0),
         epsilon_(noise_known_ ? nominal.controller_error
                               : std::max(kEpsilonOnePeriod, nominal.controller_error)) {
-    std::string missing;
-    const auto u = positions_in(nominal.actuators, record.info.actuators.names, missing);
-    const auto y = positions_in(nominal.sensors, record.info.sensors.names, missing);
+    const auto u = positions_in(nominal.actuators, record.info.actuators.names);
+    const auto y = positions_in(nominal.sensors, record.info.sensors.names);
     const std::vector<Index> excited = excited_actuators(record.info, record.axes);
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
@@ -130,7 +125,7 @@ class Search {
                                   std::max(1, record_.scatter_dof()));
       }
       if (tail_of_evidence(evidence, std::ssize(lines_)) <
-          kFeedbackSignificance / static_cast<double>(record_.n_u()))
+          kSignificance / static_cast<double>(record_.n_u()))
         return false;
     }
     return true;
@@ -179,7 +174,7 @@ class Search {
   std::optional<Candidate> best() const {
     const Candidate* most = nullptr;
     for (const Candidate& candidate : candidates_)
-      if (candidate.share >= kLeastShare &&
+      if (candidate.share >= kLeastChangeShare &&
           (most == nullptr || candidate.explained > most->explained))
         most = &candidate;
     return most != nullptr ? std::optional<Candidate>(*most) : std::nullopt;
@@ -239,22 +234,22 @@ class Search {
     if (!(length > 0.0)) return;
     const double d = along / length;
     const double deviation = 1.0 / std::sqrt(2.0 * length);
-    if (std::abs(d) < kDeviations * deviation) return;
+    if (std::abs(d) < kChangeDeviations * deviation) return;
     if (change.kind == ChannelChange::Kind::gain) {
       // The true signal is (1 + d) times the recorded one.
       change.value = 1.0 / (1.0 + d);
       change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
-      if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGain) return;
+      if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGainChange) return;
     } else {
       change.value = d;
       change.deviation = deviation;
-      if (!noise_known_ || std::abs(d) < kLeastControllerSkew_s) return;
+      if (!noise_known_ || std::abs(d) < kLeastSkewChange_s) return;
     }
     candidates_.push_back({change, along * d, along * d / cost});
   }
 
   void try_swap(ChannelChange change, double cost, double after) {
-    if (cost - after > kDeviations * kDeviations)
+    if (cost - after > kChangeDeviations * kChangeDeviations)
       candidates_.push_back({change, cost - after, (cost - after) / cost});
   }
 
@@ -270,7 +265,7 @@ class Search {
             line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
         return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
       });
-      if (after > (1.0 - kLeastShare) * cost || !(length > 0.0)) continue;
+      if (after > (1.0 - kLeastChangeShare) * cost || !(length > 0.0)) continue;
       ChannelChange change{ChannelChange::Kind::skew, false, a};
       change.value = skew_s;
       change.deviation = 1.0 / std::sqrt(2.0 * length);
@@ -382,7 +377,7 @@ class Search {
         evidence += 1e3;
     }
     return tail_of_evidence(evidence, std::ssize(lines_)) <
-           kFeedbackSignificance / static_cast<double>(record_.n_u());
+           kSignificance / static_cast<double>(record_.n_u());
   }
 
   HealthRecord& record_;

@@ -59,9 +59,9 @@ class Examination {
   std::vector<Eigen::Index> excited_actuators() const {
     return stageid::excited_actuators(record_.info, record_.axes);
   }
-  bool expected_to_respond(Eigen::Index sensor, bool& known) const;
+  std::optional<bool> expected_to_respond(Eigen::Index sensor) const;
   bool expected_above_noise(Eigen::Index sensor) const;
-  bool controlled(Eigen::Index actuator, bool& known) const;
+  std::optional<bool> controlled(Eigen::Index actuator) const;
   std::string why_no_nominal(bool all_sensors) const;
 
   HealthRecord record_;

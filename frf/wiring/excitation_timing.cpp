@@ -34,9 +34,8 @@ struct Entry {
 bool knows_all(const HealthRecord& record, const std::optional<NominalStage>& nominal,
                std::vector<Index>& u, std::vector<Index>& y) {
   if (!nominal || !nominal->controller) return false;
-  std::string missing;
-  u = positions_in(nominal->actuators, record.info.actuators.names, missing);
-  y = positions_in(nominal->sensors, record.info.sensors.names, missing);
+  u = positions_in(nominal->actuators, record.info.actuators.names);
+  y = positions_in(nominal->sensors, record.info.sensors.names);
   return !u.empty() && !y.empty() && y.size() == nominal->sensors.size();
 }
 

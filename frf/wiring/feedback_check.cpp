@@ -95,7 +95,7 @@ FeedbackCheck check_feedback(const HealthRecord& record) {
   for (Index a = 0; a < n_u; ++a) {
     const double relative = fed_back[a] > 0.0 ? std::sqrt(misfit[a] / fed_back[a]) : 0.0;
     if (relative < kLeastMisfit || tail_of_evidence(evidence[a], std::ssize(record.lines)) >
-                                       kFeedbackSignificance / static_cast<double>(n_u))
+                                       kSignificance / static_cast<double>(n_u))
       continue;
     check.inconsistent.push_back(a);
     check.worst = std::max(check.worst, relative);

@@ -9,9 +9,8 @@
 namespace stageid {
 
 /// Of the checks of u against r and y, with or without a known controller: the misfit of an actuator relative to its
-/// feedback, its significance over all actuators, and what float32 records and the difference u - r leave of u.
+/// feedback, and what float32 records and the difference u - r leave of u.
 inline constexpr double kLeastMisfit = 0.05;
-inline constexpr double kFeedbackSignificance = 1e-4;
 inline constexpr double kFeedbackRounding = 1e-9;
 
 /// What these checks need.

@@ -6,12 +6,12 @@ namespace stageid {
 
 std::vector<Eigen::Index> positions_in(const std::vector<std::string>& nominal,
                                        const std::vector<std::string>& names,
-                                       std::string& missing) {
+                                       std::string* missing) {
   std::vector<Eigen::Index> found;
   for (const std::string& name : names) {
     const auto at = std::find(nominal.begin(), nominal.end(), name);
     if (at == nominal.end()) {
-      missing = name;
+      if (missing != nullptr) *missing = name;
       return {};
     }
     found.push_back(at - nominal.begin());

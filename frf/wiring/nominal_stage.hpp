@@ -22,8 +22,9 @@ struct NominalStage {
   double free_from_hz = 0.0;  ///< above it the suspension is negligible
 };
 
-/// Index of each of `names` in `nominal`. @returns empty if one is missing; `missing` names it.
+/// Index of each of `names` in `nominal`. @returns empty if one is missing; `missing`, if given, names it.
 std::vector<Eigen::Index> positions_in(const std::vector<std::string>& nominal,
-                                       const std::vector<std::string>& names, std::string& missing);
+                                       const std::vector<std::string>& names,
+                                       std::string* missing = nullptr);
 
 }  // namespace stageid

@@ -35,10 +35,8 @@ std::complex<double> nominal_turn(const Eigen::MatrixXcd& G0) {
 std::vector<PlantLine> plant_lines(const HealthRecord& record, const NominalStage& nominal,
                                    const std::vector<Index>& outputs,
                                    const std::vector<Index>& inputs) {
-  std::string missing;
-  const auto y = picked(positions_in(nominal.sensors, record.info.sensors.names, missing), outputs);
-  const auto u =
-      picked(positions_in(nominal.actuators, record.info.actuators.names, missing), inputs);
+  const auto y = picked(positions_in(nominal.sensors, record.info.sensors.names), outputs);
+  const auto u = picked(positions_in(nominal.actuators, record.info.actuators.names), inputs);
   std::vector<Index> rows = outputs;
   for (const Index a : inputs) rows.push_back(record.n_y() + a);
   const Eigen::VectorXd periods =

@@ -20,7 +20,6 @@ using Index = Eigen::Index;
 constexpr double kTolerance = 0.1;       // of the rms of a row
 constexpr double kLeastLogGain = 0.262;  // ln 1.3
 constexpr double kLeastExplained = 20.0;
-constexpr double kLeastBodyShare = 0.3;
 constexpr double kDead = 0.05;
 
 /// The lines up to where flexible modes begin.
@@ -165,7 +164,7 @@ std::optional<ChannelChange> best_change(const Body& body) {
       for (Index b = 0; b < a; ++b) candidates.push_back({Kind::swap, of_sensors, b, a});
     }
   }
-  double most = std::max(kLeastExplained, kLeastBodyShare * cost(body.all));
+  double most = std::max(kLeastExplained, kLeastChangeShare * cost(body.all));
   std::optional<ChannelChange> best;
   for (const ChannelChange& candidate : candidates) {
     const double gain = explained(candidate, body.all);

@@ -19,16 +19,13 @@ constexpr double kFedBack = 1e-4;   // of an actuator: ten times the limit of eq
 
 }  // namespace
 
-/// Whether the excited actuators move this sensor through the rigid body.
-bool Examination::expected_to_respond(Index sensor, bool& known) const {
-  std::string missing;
-  known = false;
-  if (!nominal_ || !nominal_->rigid_body || record_.frequency_hz.size() == 0) return false;
-  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
-  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
+/// Whether the excited actuators move this sensor through the rigid body; none if this is unknown.
+std::optional<bool> Examination::expected_to_respond(Index sensor) const {
+  if (!nominal_ || !nominal_->rigid_body || record_.frequency_hz.size() == 0) return std::nullopt;
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names);
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names);
   const std::vector<Index> excited = excited_actuators();
-  if (y.empty() || u.empty() || excited.empty()) return false;
-  known = true;
+  if (y.empty() || u.empty() || excited.empty()) return std::nullopt;
   const Eigen::MatrixXcd G =
       nominal_->rigid_body(record_.frequency_hz[record_.frequency_hz.size() / 2]);
   double here = 0.0;
@@ -41,10 +38,10 @@ bool Examination::expected_to_respond(Index sensor, bool& known) const {
 std::string Examination::why_no_nominal(bool all_sensors) const {
   if (excited_actuators().empty()) return kNamedExcitation;
   std::string missing;
-  if (positions_in(nominal_->actuators, record_.info.actuators.names, missing).empty() ||
-      positions_in(nominal_->sensors, record_.info.sensors.names, missing).empty())
+  if (positions_in(nominal_->actuators, record_.info.actuators.names, &missing).empty() ||
+      positions_in(nominal_->sensors, record_.info.sensors.names, &missing).empty())
     return fmt::format("a stage file that contains channel {}", missing);
-  if (all_sensors && positions_in(record_.info.sensors.names, nominal_->sensors, missing).empty())
+  if (all_sensors && positions_in(record_.info.sensors.names, nominal_->sensors, &missing).empty())
     return fmt::format("the record of sensor {}, which the controller uses", missing);
   return "";
 }
@@ -57,14 +54,13 @@ void Examination::check_injection() {
       std::count_if(record_.scan.begin() + record_.n_y(), record_.scan.end(),
                     [](const ChannelScan& scan) { return scan.high().value != scan.low().value; }));
   for (const MappedExcitation& m : mapped) {
-    bool known = false;
-    const bool fed_back = controlled(m.actuator, known);
-    if (known && !fed_back) continue;  // its loop is open
+    const std::optional<bool> fed_back = controlled(m.actuator);
+    if (fed_back == false) continue;  // its loop is open
     const std::string& excitation = record_.info.excitation.name(m.excitation);
     const std::string figure = std::abs(m.factor - 1.0) < 1e-5
                                    ? std::string("identical")
                                    : fmt::format("factor {:.6g}", m.factor);
-    const bool may_be_open = !known && mapped.size() >= all;
+    const bool may_be_open = !fed_back && mapped.size() >= all;
     find(Severity::fault, Cause::injection, name(record_.n_y() + m.actuator),
          fmt::format("equals the excitation {}: it contains no feedback", excitation), figure,
          may_be_open ? "in a closed loop, map the plant input (after the summation point); if the "
@@ -74,13 +70,11 @@ void Examination::check_injection() {
   }
 }
 
-/// Whether the controller's contribution to this actuator is measurable beside the excitation.
-bool Examination::controlled(Index actuator, bool& known) const {
-  known = nominal_ && nominal_->controller && why_no_nominal(false).empty();
-  if (!known) return false;
-  std::string missing;
-  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names, missing);
-  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names, missing);
+/// Whether the controller's contribution to this actuator is measurable beside the excitation; none if this is unknown.
+std::optional<bool> Examination::controlled(Index actuator) const {
+  if (!nominal_ || !nominal_->controller || !why_no_nominal(false).empty()) return std::nullopt;
+  const auto u = positions_in(nominal_->actuators, record_.info.actuators.names);
+  const auto y = positions_in(nominal_->sensors, record_.info.sensors.names);
   double fed_back = 0.0;
   double moved = 0.0;
   for (std::size_t k = 0; k < record_.lines.size(); ++k) {
@@ -174,10 +168,8 @@ void Examination::check_stage() {
   if (!nominal_->rigid_body)
     return needs("geometry and mass: a stage file, or 'stage: FILE' in the controller file");
   std::vector<Index> outputs;
-  for (Index s = 0; s < record_.n_y(); ++s) {
-    bool known = false;
-    if (!spoilt(s) && expected_to_respond(s, known)) outputs.push_back(s);
-  }
+  for (Index s = 0; s < record_.n_y(); ++s)
+    if (!spoilt(s) && expected_to_respond(s).value_or(false)) outputs.push_back(s);
   if (outputs.empty()) return needs("a sensor that responds to the excited axes");
   const std::vector<Index> inputs = excited_actuators();
   for (const Index a : inputs)

@@ -18,18 +18,18 @@ namespace stageid {
 /// up to 16 bytes, 21 with 7 above. Source: ISO 11898-1:2015, frame format.
 double can_fd_frame_time_s(std::size_t bytes, double nominal_bit_rate_hz, double data_bit_rate_hz);
 
-/// Traffic of one bus.
-struct CanBusLoad {
-  std::string interface;
-  double cycle_s = 0.0;          ///< frames of one sample
-  double load = 0.0;             ///< at the stage's rate, including state frames
-  double highest_rate_hz = 0.0;  ///< at the largest permitted load
+/// Load of a connection of a stage that is measured sample by sample.
+struct LinkLoad {
+  std::string link;      ///< interface or address
+  double load = 0.0;     ///< share of the available time, including state frames
+  double cycle_s = 0.0;  ///< on the wire, per sample
+  double most_hz = 0.0;  ///< the highest sample rate, at the largest permitted load
 };
 
 /// Load of the cyclic exchange at `sample_rate_hz`: every frame of the layout once per sample. The first
 /// bus also carries the node's state ten times per second.
-std::vector<CanBusLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
-                                     double sample_rate_hz);
+std::vector<LinkLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
+                                   double sample_rate_hz);
 
 /// @throws std::invalid_argument with the computed loads if a bus would carry more than
 /// spec.largest_load.

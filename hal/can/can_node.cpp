@@ -99,7 +99,7 @@ void CanNode::take_setpoint(const CanFrame& frame, std::size_t number) {
   pending_sequence_ = header.sequence;
   if (!decode_can_values(layout, layout_.actuator_scale, frame, header, command_)) return;
   pending_frames_ |= std::uint64_t{1} << number;
-  if (pending_frames_ == ~std::uint64_t{0} >> (64 - layout_.setpoints.size()))
+  if (pending_frames_ == all_bits(layout_.setpoints.size()))
     take_complete_setpoint(header.sequence);
 }
 

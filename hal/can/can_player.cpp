@@ -180,7 +180,7 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
   if (!gives_measurement(next)) {
     finish(CanResident::failed);
   } else if (played_ >= samples_ + ramp_samples_) {
-    stage_.end_run_and_reserve();
+    stage_.end_run(true);
     finish(CanResident::done);
   }
 }

@@ -96,7 +96,6 @@ void CanResidentStage::send_missing(const std::vector<std::uint32_t>& chunks) {
 
 void CanResidentStage::send_all() {
   const auto total = static_cast<std::uint32_t>(can_chunks(waveform_.size()));
-  std::uint32_t highest = 0;  // lower chunks have been sent at least once
   std::uint32_t first = 0;
   for (int tries = 0; tries < kLargestTries;) {
     CanMissing missing;
@@ -112,8 +111,6 @@ void CanResidentStage::send_all() {
     for (std::uint32_t i = 0;
          i < kCanMissingBits && first + i < total && chunks.size() < kUploadWindow; ++i)
       if ((missing.received[i / 8] >> (i % 8) & 1U) == 0) chunks.push_back(first + i);
-    for (const std::uint32_t chunk : chunks) repeated_chunks_ += chunk < highest ? 1U : 0U;
-    if (!chunks.empty()) highest = std::max(highest, chunks.back() + 1);
     send_missing(chunks);
   }
   throw StageError(fmt::format(
@@ -188,7 +185,6 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
     if (frame.id != kCanDownloadId || !decode_can_chunk(frame, chunk) || chunk.token != token_ ||
         !take_can_part(chunk, bytes))
       return;
-    repeated_chunks_ += have[chunk.index] ? 1U : 0U;
     if (!have[chunk.index]) heard_ns = transport_->now_ns();  // duplicates are not progress
     have[chunk.index] = true;
   };

@@ -34,9 +34,6 @@ class CanResidentStage final : public ResidentStage {
   JobProgress download(TraceSink& sink) override;
   void stop() noexcept override;
 
-  /// Number of chunks sent or requested more than once.
-  std::uint64_t repeated_chunks() const noexcept { return repeated_chunks_; }
-
  private:
   void pack(const Waveforms& waveforms);
   void send_missing(const std::vector<std::uint32_t>& chunks);
@@ -62,7 +59,6 @@ class CanResidentStage final : public ResidentStage {
   std::vector<std::uint8_t> trace_;
   std::size_t trace_chunks_ = 0;  // received chunks
   std::uint64_t rows_given_ = 0;
-  std::uint64_t repeated_chunks_ = 0;
 };
 
 }  // namespace stageid

@@ -78,7 +78,7 @@ class CanStage final : public CyclicStage {
   PeerStatus judge(const Inputs& inputs) noexcept;
   PeerStatus bus_status() const noexcept;
   PeerStatus node_status() const noexcept;
-  std::uint64_t all_sensors() const noexcept { return ~std::uint64_t{0} >> (64 - fresh_.size()); }
+  std::uint64_t all_sensors() const noexcept { return all_bits(fresh_.size()); }
   void give(Inputs& inputs) const noexcept;
 
   StageInfo info_;

@@ -27,9 +27,8 @@ std::size_t rtu_request_bytes(std::span<const std::uint8_t> bytes) {
 /// Bytes of an RTU reply of another unit; 0: not a known reply.
 std::size_t rtu_reply_bytes(std::span<const std::uint8_t> bytes) {
   if ((bytes[1] & 0x80U) != 0) return kExceptionReply;
-  if (bytes[1] >= 1 && bytes[1] <= 4)
+  if ((bytes[1] >= 1 && bytes[1] <= 4) || bytes[1] == 23)
     return bytes.size() < 3 ? 3 : kReplyHeader + bytes[2] + kCrcBytes;
-  if (bytes[1] == 23) return bytes.size() < 3 ? 3 : kReplyHeader + bytes[2] + kCrcBytes;
   return bytes[1] == 5 || bytes[1] == 6 || bytes[1] == 15 || bytes[1] == 16 ? kShortRequest : 0;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <iterator>
+#include <stdexcept>
 
 namespace stageid::modbus_map {
 namespace {
@@ -84,6 +85,13 @@ std::string markdown_table() {
                    e.access == Access::read ? "read" : "read, write", e.meaning);
   }
   return table;
+}
+
+void require_channels(const StageInfo& info) {
+  if (info.actuators.size() > kMostChannels || info.sensors.size() > kMostChannels)
+    throw std::invalid_argument(fmt::format(
+        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
+        info.actuators.size(), info.sensors.size(), kMostChannels));
 }
 
 std::uint32_t channel_hash(const StageInfo& info) {

@@ -100,6 +100,9 @@ std::span<const Entry> entries() noexcept;
 /// The entries as the Markdown table of docs/modbus-map.md.
 std::string markdown_table();
 
+/// @throws std::invalid_argument if there are more channels than one transaction carries.
+void require_channels(const StageInfo& info);
+
 /// FNV-1a over "NAME UNIT\n" of all actuators, then sensors. It detects hosts with other channels or another
 /// order.
 std::uint32_t channel_hash(const StageInfo& info);

@@ -25,11 +25,7 @@ bool touches(int first, std::size_t count, int address) {
 }
 
 void check_sizes(const StageNode& node) {
-  const StageInfo& info = node.info();
-  if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
-    throw std::invalid_argument(fmt::format(
-        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
-        info.actuators.size(), info.sensors.size(), map::kMostChannels));
+  map::require_channels(node.info());
   const NodePanel panel = node.panel();
   if (panel.gravity_compensator_n.size() > map::kMostPanelValues ||
       panel.temperature_k.size() > map::kMostPanelValues)

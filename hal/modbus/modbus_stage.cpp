@@ -38,10 +38,7 @@ Exchange exchange_of(const StageInfo& info) {
 
 double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
                        const ModbusTiming& timing) {
-  if (info.actuators.size() > map::kMostChannels || info.sensors.size() > map::kMostChannels)
-    throw std::invalid_argument(fmt::format(
-        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
-        info.actuators.size(), info.sensors.size(), map::kMostChannels));
+  map::require_channels(info);
   const double longest_hz = 1.0 / modbus_exchange_s(address, timing, info);
   const auto [written, read] = exchange_of(info);
   if (info.sample_rate_hz > longest_hz)
@@ -208,7 +205,7 @@ PeerStatus ModbusStage::take_measurement(Inputs& inputs) noexcept {
   report.state = inputs.node_state;
   report.cause = cause_of(node_status_);
   report.valid = inputs.valid;
-  report.all = ~std::uint64_t{0} >> (64 - inputs.y.size());
+  report.all = all_bits(inputs.y.size());
   report.setpoints_missed = node_status_ >> 24 > std::exchange(missed_, node_status_ >> 24);
   for (std::size_t i = 0; i < inputs.y.size(); ++i) {
     const std::int32_t count = measured().i32(map::kMeasurement + 2 * static_cast<int>(i));

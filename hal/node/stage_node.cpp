@@ -234,27 +234,19 @@ Outcome StageNode::exchange(std::int64_t now_ns, std::span<const double> u, Inpu
     const bool no_number = stage_.violation().kind == LimitKind::not_finite;
     machine_.fail(no_number ? FaultCause::not_finite : FaultCause::limit);
     reason_ = describe(stage_.violation(), stage_.info());
-  } else if (outcome == Outcome::fault || outcome == Outcome::bus_off ||
-             outcome == Outcome::link_down) {
+  } else if (ends_run(outcome)) {
     machine_.fail(FaultCause::amplifier);
   }
   inputs.node_state = machine_.state();
   return outcome;
 }
 
-void StageNode::end_run() {
+void StageNode::end_run(bool keep_reserved) {
   const std::lock_guard lock(mutex_);
   if (machine_.state() != NodeState::measuring) return;  // a safe stop ends by itself
   come_to_rest();
   machine_.end_measuring();
-}
-
-void StageNode::end_run_and_reserve() {
-  const std::lock_guard lock(mutex_);
-  if (machine_.state() != NodeState::measuring) return;
-  come_to_rest();
-  machine_.end_measuring();
-  reserved_ = true;
+  reserved_ = keep_reserved;
 }
 
 void StageNode::fail(FaultCause cause) {

@@ -91,10 +91,9 @@ class StageNode {
   /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; writes u[n] to `u`.
   [[nodiscard]] Outcome advance_excited(std::int64_t now_ns, std::span<const double> r,
                                         std::span<double> u, Inputs& inputs);
-  /// measuring -> operation_enabled, forces zero.
-  void end_run();
-  /// The same, but the stage remains reserved for the host of the run, with the same key.
-  void end_run_and_reserve();
+  /// measuring -> operation_enabled, forces zero. The stage may remain reserved for the host of the run, with the same
+  /// key.
+  void end_run(bool keep_reserved = false);
 
   /// Reports a failure outside of the stage (bus, heartbeat): safe stop, then fault.
   void fail(FaultCause cause);

@@ -83,35 +83,7 @@ ModalResponse sampled_mode(const PlantMode& mode, const Sampling& at) {
   return {position, force - 2.0 * zeta * omega * speed - omega * omega * position};
 }
 
-template <typename Response>
-Eigen::MatrixXcd sum_of_modes(const std::vector<PlantMode>& modes, Response response) {
-  if (modes.empty()) throw std::invalid_argument("plant response: at least one mode is needed");
-  Eigen::MatrixXcd sum =
-      Eigen::MatrixXcd::Zero(modes[0].sensor_shape.size(), modes[0].actuator_shape.size());
-  for (const PlantMode& mode : modes) {
-    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
-      throw std::invalid_argument(fmt::format(
-          "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio));
-    }
-    const ModalResponse of_mode = response(mode);
-    sum += of_mode.position * (mode.sensor_shape * mode.actuator_shape.transpose());
-    if (mode.acceleration_shape.size() > 0)
-      sum += of_mode.acceleration * (mode.acceleration_shape * mode.actuator_shape.transpose());
-  }
-  return sum;
-}
-
 }  // namespace
-
-Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double frequency_hz) {
-  const double omega = kTwoPi * frequency_hz;
-  return sum_of_modes(modes, [omega](const PlantMode& mode) {
-    const double omega_0 = kTwoPi * mode.natural_frequency_hz;
-    const Complex position = 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
-                                           2.0 * mode.damping_ratio * omega_0 * omega);
-    return ModalResponse{position, -omega * omega * position};
-  });
-}
 
 Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
                                   double sample_rate_hz, double frequency_hz) {
@@ -122,7 +94,20 @@ Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double de
                     sample_rate_hz, delay_s));
   }
   const Sampling at = sampling(delay_s, sample_rate_hz, frequency_hz);
-  return sum_of_modes(modes, [&at](const PlantMode& mode) { return sampled_mode(mode, at); });
+  if (modes.empty()) throw std::invalid_argument("plant response: at least one mode is needed");
+  Eigen::MatrixXcd sum =
+      Eigen::MatrixXcd::Zero(modes[0].sensor_shape.size(), modes[0].actuator_shape.size());
+  for (const PlantMode& mode : modes) {
+    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
+      throw std::invalid_argument(fmt::format(
+          "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio));
+    }
+    const ModalResponse of_mode = sampled_mode(mode, at);
+    sum += of_mode.position * (mode.sensor_shape * mode.actuator_shape.transpose());
+    if (mode.acceleration_shape.size() > 0)
+      sum += of_mode.acceleration * (mode.acceleration_shape * mode.actuator_shape.transpose());
+  }
+  return sum;
 }
 
 }  // namespace stageid

@@ -25,10 +25,6 @@ NoiseSpec noise_of(const WaferStageSpec& spec) {
           spec.sensor_noise_corner_hz};
 }
 
-std::uint64_t all_bits(std::size_t count) {
-  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
-}
-
 StageInfo info_of(const WaferStageSpec& spec) {
   StageInfo info = spec.info;
   if (info.backend.empty()) info.backend = "sim";
@@ -49,8 +45,7 @@ struct SimulatedStage::State {
   explicit State(const WaferStageSpec& checked)
       : spec(checked),
         info(info_of(checked)),
-        modes(wafer_stage_modes(checked)),
-        plant(modes, checked.delay_s, checked.info.sample_rate_hz),
+        plant(wafer_stage_modes(checked), checked.delay_s, checked.info.sample_rate_hz),
         noise(noise_of(checked)),
         pacer(checked.info.sample_rate_hz, checked.pace),
         faults(checked.faults, checked.info),
@@ -63,7 +58,6 @@ struct SimulatedStage::State {
 
   WaferStageSpec spec;
   StageInfo info;
-  std::vector<PlantMode> modes;
   ModalPlant plant;
   StageNoise noise;
   Pacer pacer;
@@ -126,8 +120,6 @@ SimulatedStage::SimulatedStage(const WaferStageSpec& spec) {
 SimulatedStage::~SimulatedStage() = default;
 
 const StageInfo& SimulatedStage::info() const noexcept { return state_->info; }
-
-const std::vector<PlantMode>& SimulatedStage::modes() const noexcept { return state_->modes; }
 
 void SimulatedStage::displacement(std::span<double> y_m) const noexcept {
   if (y_m.size() == state_->info.sensors.size()) state_->plant.output(y_m.data());

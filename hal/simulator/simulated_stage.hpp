@@ -96,9 +96,8 @@ inline constexpr std::array kWords<WaferStageSpec::Fault::Kind> = {
 /// frequency, then in plane.
 std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec);
 
-/// The exact frequency response of the plant without controller, sensors x actuators.
-/// Sampled: through zero-order hold, delay and sampler, G_d(e^{j omega T}).
-Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double frequency_hz);
+/// The exact frequency response of the plant without controller, sensors x actuators, through zero-order hold, delay
+/// and sampler: G_d(e^{j omega T}).
 Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
                                   double sample_rate_hz, double frequency_hz);
 
@@ -116,7 +115,6 @@ class SimulatedStage final : public CyclicStage {
                                  Deadline deadline) noexcept override;
   void stop() noexcept override;
 
-  const std::vector<PlantMode>& modes() const noexcept;
   /// True position of the stage at its sensors, without noise and faults (size sensors, m).
   void displacement(std::span<double> y_m) const noexcept;
 

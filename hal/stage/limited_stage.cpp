@@ -10,28 +10,11 @@
 namespace stageid {
 namespace {
 
-Eigen::ArrayXd limit_vector(const Eigen::VectorXd& given, std::size_t channels, const char* name) {
-  const auto size = static_cast<Eigen::Index>(channels);
-  if (given.size() == 0) return Eigen::ArrayXd::Constant(size, kUnlimited);
-  if (given.size() != size)
-    throw std::invalid_argument(
-        fmt::format("limits: {} has {} entries for {} channels", name, given.size(), channels));
-  for (Eigen::Index i = 0; i < size; ++i)
-    if (!(given[i] > 0.0))
-      throw std::invalid_argument(
-          fmt::format("limits: {}, entry {}: {} is not positive", name, i + 1, given[i]));
-  return given.array();
-}
-
 std::unique_ptr<CyclicStage> checked(std::unique_ptr<CyclicStage> stage) {
   if (!stage) throw std::invalid_argument("limits: a stage is required");
   if (!(stage->info().sample_rate_hz > 0.0))
     throw std::invalid_argument("limits: the stage has no sample rate; set sample_rate_hz");
   return stage;
-}
-
-bool worse_than_limit(Outcome outcome) {
-  return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
 }
 
 }  // namespace
@@ -41,10 +24,11 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
       limits_(std::move(limits)),
       guard_(limits_, stage_->info()) {
   const StageInfo& info = stage_->info();
-  const std::size_t actuators = info.actuators.size();
-  largest_n_ = limit_vector(limits_.actuator_n, actuators, "actuator_n");
-  step_n_ = limit_vector(limits_.slew_n_s, actuators, "slew_n_s") / info.sample_rate_hz;
-  mean_square_limit_n2_ = limit_vector(limits_.thermal_rms_n, actuators, "thermal_rms_n").square();
+  const Eigen::ArrayXd unlimited =
+      Eigen::ArrayXd::Constant(static_cast<Eigen::Index>(info.actuators.size()), kUnlimited);
+  largest_n_ = positive_or(limits_.actuator_n, unlimited, "actuator_n");
+  step_n_ = positive_or(limits_.slew_n_s, unlimited, "slew_n_s") / info.sample_rate_hz;
+  mean_square_limit_n2_ = positive_or(limits_.thermal_rms_n, unlimited, "thermal_rms_n").square();
   if (!(limits_.thermal_time_constant_s > 0.0) || !std::isfinite(limits_.thermal_time_constant_s))
     throw std::invalid_argument(
         fmt::format("limits: thermal_time_constant_s must be positive; got {}",
@@ -95,7 +79,7 @@ Outcome LimitedStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline 
   inputs.applied = {};
   if (limited_) inputs.applied = limited.u;
   inspect(inputs);
-  if (!limited_ || worse_than_limit(outcome)) return outcome;
+  if (!limited_ || ends_run(outcome)) return outcome;
   return loop_ == Loop::closed    ? Outcome::limit
          : loop_ == Loop::braking ? Outcome::braking
                                   : Outcome::opened;

@@ -1,11 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <limits>
-
-#include "excitation/words/words.hpp"
 
 namespace stageid {
 
@@ -50,13 +47,6 @@ enum class LimitKind : std::uint8_t {
   stopping_distance,
   hard_position
 };
-template <>
-inline constexpr std::array kWords<LimitKind> = {
-    "none",       "actuator",          "slew",         "thermal rms", "position",
-    "not finite", "stuck sensor",      "sensor jump",  "deviation",   "contradiction",
-    "speed",      "stopping distance", "hard position"};
-
-const char* to_string(LimitKind kind) noexcept;
 
 /// The first limit that was exceeded in a run.
 struct LimitViolation {

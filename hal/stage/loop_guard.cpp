@@ -26,6 +26,8 @@ void require_size(Eigen::Index size, std::size_t channels, const char* name) {
       fmt::format("limits: {} has {} entries for {} channels", name, size, channels));
 }
 
+}  // namespace
+
 Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& otherwise,
                            const char* name) {
   if (given.size() == 0) return otherwise;
@@ -36,8 +38,6 @@ Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& o
           fmt::format("limits: {}, entry {}: {} is not positive", name, i + 1, given[i]));
   return given.array();
 }
-
-}  // namespace
 
 LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
     : period_s_(1.0 / info.sample_rate_hz), stuck_sensor_s_(limits.stuck_sensor_s) {
@@ -240,7 +240,7 @@ void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
 
 /// Checks whether all sensors measure one rigid motion.
 void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept {
-  const std::uint64_t all = ~std::uint64_t{0} >> (64 - p_.size());
+  const std::uint64_t all = all_bits(static_cast<std::size_t>(p_.size()));
   if ((inputs.valid & all) != all) return;
   measured_ = last_y_.matrix();
   contradicting_.noalias() = contradiction_ * measured_;

@@ -10,6 +10,11 @@
 
 namespace stageid {
 
+/// The limits of all channels, `otherwise` if none are given. @throws std::invalid_argument for a wrong size or an
+/// entry that is not positive
+Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& otherwise,
+                           const char* name);
+
 /// Judges after every measurement whether the loop may remain closed. If not, brakes the stage.
 ///
 /// For each sensor an observer predicts position p, speed v and unexplained acceleration d from the

@@ -53,7 +53,7 @@ void ReplayStage::give(Inputs& inputs, Eigen::Index sample) const noexcept {
   inputs.t_sample_ns =
       static_cast<std::int64_t>(1e9 * static_cast<double>(cycle_) / info_.sample_rate_hz);
   inputs.t_rx_ns = inputs.t_sample_ns;
-  inputs.valid = sensors >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << sensors) - 1;
+  inputs.valid = all_bits(inputs.y.size());
   inputs.node_state = NodeState::operation_enabled;
 }
 

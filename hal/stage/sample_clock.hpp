@@ -25,16 +25,13 @@ class SampleClock {
   /// The stamp of a sample without deviation that is expected at this time. Only after the first take().
   std::int64_t stamp_ns(std::int64_t expected_ns) const noexcept;
 
-  /// Seconds per second by which the stamping clock is fast.
-  double drift() const noexcept { return drift_; }
-
  private:
   std::int64_t limit_ns_;
   std::int64_t trust_ns_;
   std::int64_t expected_ns_ = 0;
   std::int64_t stamp_ns_ = 0;
   double fraction_ns_ = 0.0;  // of stamp_ns_, which a double cannot hold to a nanosecond
-  double drift_ = 0.0;
+  double drift_ = 0.0;        // seconds per second by which the stamping clock is fast
   int count_ = 0;
   int irregular_ = 0;  // in a row
 };

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
@@ -86,6 +88,11 @@ inline constexpr std::array kWords<Outcome> = {"ok",      "late",        "incomp
 
 const char* to_string(Outcome outcome) noexcept;
 
+/// Whether the stage or its link has failed.
+constexpr bool ends_run(Outcome outcome) noexcept {
+  return outcome == Outcome::fault || outcome == Outcome::bus_off || outcome == Outcome::link_down;
+}
+
 /// States based on CiA 402.
 enum class NodeState : std::uint8_t {
   not_ready,
@@ -104,6 +111,11 @@ inline constexpr std::array kWords<NodeState> = {"not ready",   "switch on disab
                                                  "quick stop",  "fault reaction",     "fault"};
 
 const char* to_string(NodeState state) noexcept;
+
+/// The lowest `count` bits, e.g. Inputs::valid of as many sensors that are all valid.
+constexpr std::uint64_t all_bits(std::size_t count) noexcept {
+  return count == 0 ? 0 : ~std::uint64_t{0} >> (64 - std::min<std::size_t>(count, 64));
+}
 
 /// A measurement. `y` is filled in place (size sensors, SI); `valid` bit i = sensor i.
 struct Inputs {

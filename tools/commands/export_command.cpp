@@ -75,14 +75,7 @@ void export_from_frf(const ExportFlags& flags) {
         fmt::format("{}: is an HDF5 file, not a model; --frf and --driving-point need a model.json",
                     flags.input.string()));
   require_no_input(flags.output, {flags.input});
-  const FrfEstimate frf = read_frf(flags.input);
-  try {
-    require_frf_export_format(flags.output);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(
-        fmt::format("{}: contains a frequency response; {}", flags.input.string(), error.what()));
-  }
-  export_frf(flags.output, frf, flags.mat_version);
+  export_frf(flags.output, read_frf(flags.input), flags.mat_version);
 }
 
 void export_file(const ExportFlags& flags, Console& console) {

@@ -62,10 +62,7 @@ nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
     json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
   if (frf.total_variance.size() > 0)
     json["median_relative_total_std"] = median_relative_std(frf, frf.total_variance);
-  json["nonlinearity"] = linearity_json(frf);
-  json["dropped_periods"] = dropped_json(frf);
-  json["replaced_samples"] = replaced_json(frf);
-  json["left_out_realizations"] = left_out_json(frf);
+  json.update(quality_json(frf));
   return json;
 }
 
@@ -76,17 +73,10 @@ struct FrfFlags {
   std::filesystem::path stage;
   std::filesystem::path fft_wisdom;
   bool no_health = false;
-  std::vector<std::string> inputs;
-  std::vector<std::string> outputs;
-  std::vector<int> realizations;
-  std::optional<int> transient_periods;
+  FrfOptions options;
+  std::vector<int> realizations;  ///< counted from 1, unlike those of `options`
   std::optional<double> delay_s;
-  FrfMethod method = FrfMethod::periodic;
-  PeriodChoice periods = PeriodChoice::consistent;
-  int covariance_lines = 1;
-  CovarianceKind covariance = CovarianceKind::diagonal;
   Compensation compensate = Compensation::none;
-  int threads = 0;
 };
 
 FrfStep estimate_with_plans(const FrfFlags& flags, Console& console, const FrfOptions& options) {
@@ -99,15 +89,7 @@ FrfStep estimate_with_plans(const FrfFlags& flags, Console& console, const FrfOp
 }
 
 void estimate_response(const FrfFlags& flags, Console& console) {
-  FrfOptions options;
-  options.inputs = flags.inputs;
-  options.outputs = flags.outputs;
-  options.transient_periods = flags.transient_periods;
-  options.method = flags.method;
-  options.covariance = flags.covariance;
-  options.periods = flags.periods;
-  options.covariance_lines = flags.covariance_lines;
-  options.threads = flags.threads;
+  FrfOptions options = flags.options;
   for (const int realization : flags.realizations) {
     if (realization < 1)
       throw std::invalid_argument(fmt::format(
@@ -153,29 +135,32 @@ void frf_command(CLI::App& app, Console& console) {
   CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
   command->add_option("logs", flags->logs, "logs (.slog or .h5)")->required();
   command->add_option("-o,--output", flags->output, "HDF5 file to write")->required();
-  command->add_option("--inputs", flags->inputs, "actuators A,B,...; default: the excited ones")
+  command
+      ->add_option("--inputs", flags->options.inputs,
+                   "actuators A,B,...; default: the excited ones")
       ->delimiter(',');
-  command->add_option("--outputs", flags->outputs, "sensors C,D,...; default: all")->delimiter(',');
+  command->add_option("--outputs", flags->options.outputs, "sensors C,D,...; default: all")
+      ->delimiter(',');
   command
       ->add_option("--realizations", flags->realizations,
                    "counted from 1; default: all complete ones")
       ->delimiter(',');
   command->add_option(
-      "--transient-periods", flags->transient_periods,
+      "--transient-periods", flags->options.transient_periods,
       "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
-  add_choice(*command, "--method", flags->method,
+  add_choice(*command, "--method", flags->options.method,
              "periodic: means over periods | lpm: whole records, transient modelled");
-  add_choice(*command, "--periods", flags->periods,
+  add_choice(*command, "--periods", flags->options.periods,
              "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
              "discard periods with glitches) | unmarked: use all periods without marked samples");
   command
-      ->add_option("--smooth-covariance", flags->covariance_lines,
+      ->add_option("--smooth-covariance", flags->options.covariance_lines,
                    "odd number of neighbouring lines over which the noise covariance is averaged; "
                    "more lines give it more degrees of freedom")
       ->type_name("LINES")
       ->check(kPositive)
       ->capture_default_str();
-  add_choice(*command, "--covariance", flags->covariance,
+  add_choice(*command, "--covariance", flags->options.covariance,
              "diagonal: variances | full: also the covariances between channels");
   add_choice(*command, "--compensate", flags->compensate,
              "remove from the response: none | delay | hold: hold and delay");
@@ -190,7 +175,7 @@ void frf_command(CLI::App& app, Console& console) {
       ->add_option("--fft-wisdom", flags->fft_wisdom,
                    "store FFT plans found by timing in FILE and reuse those already there")
       ->type_name("FILE");
-  add_threads(*command, flags->threads);
+  add_threads(*command, flags->options.threads);
   command->final_callback([flags, &console] { estimate_response(*flags, console); });
 }
 

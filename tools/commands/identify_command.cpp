@@ -360,10 +360,7 @@ Json Identification::summary() const {
                  {"relative_rms_error", model_.fit.relative_rms_error},
                  {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
                {"modes", modes_json(model_)}};
-  json["nonlinearity"] = linearity_json(*frf_);
-  json["dropped_periods"] = dropped_json(*frf_);
-  json["replaced_samples"] = replaced_json(*frf_);
-  json["left_out_realizations"] = left_out_json(*frf_);
+  json.update(quality_json(*frf_));
   if (validation_) json["validation"] = validation_json(*validation_);
   if (truth_) json["truth"] = truth_json(*truth_);
   json["health"] = health_json(health_);

@@ -25,17 +25,11 @@
 namespace stageid {
 namespace {
 
-void require_frf_output(const std::filesystem::path& output) {
-  if (output.extension() != ".h5" && output.extension() != ".hdf5")
-    throw std::invalid_argument(
-        fmt::format("{}: a frequency response is written as .h5; use a name with that ending",
-                    output.string()));
-}
-
-/// Keeps the provenance of a stageid file; otherwise the foreign file is the provenance.
+/// Checks the response. Keeps the provenance of a stageid file; otherwise the foreign file is the provenance.
 ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate frf,
                              const std::filesystem::path& input, std::vector<std::string> notes) {
   try {
+    check(frf);
     take_si_units(frf, notes);
   } catch (const std::invalid_argument& error) {
     throw FormatError(input, "", error.what());
@@ -97,7 +91,7 @@ ImportSummary import_with_map(const ImportFlags& flags) {
     throw FormatError(flags.map, "",
                       "key 'files' is for kind: log only; give the file on the command line");
   require_foreign_file(flags);
-  require_frf_output(flags.output);
+  require_frf_ending(flags.output);
   return write_imported(flags.output, mapped_frf(read_foreign_arrays(flags.input), map),
                         flags.input, {});
 }
@@ -116,7 +110,7 @@ void import_file(const ImportFlags& flags, Console& console) {
     write_modes(flags.output, candidates_of(flags.input, read_uff(flags.input)));
   } else {
     require_no_input(flags.output, {flags.input});
-    require_frf_output(flags.output);
+    require_frf_ending(flags.output);
     std::vector<std::string> notes;
     FrfEstimate frf = read_foreign_frf(flags.input, flags.output, notes);
     summary = write_imported(flags.output, std::move(frf), flags.input, std::move(notes));

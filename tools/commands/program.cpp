@@ -19,6 +19,7 @@
 #include "acquisition/files/key_suggestion.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/files/version.hpp"
+#include "tools/commands/command_line.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/manual/command_tree.hpp"
 #include "tools/terminal/console.hpp"
@@ -69,8 +70,7 @@ std::string mismatch(const std::string& what) {
 std::string choice(const std::string& place, const std::string& got, const std::string& choices) {
   std::istringstream list(choices.substr(0, choices.find('}')));
   std::vector<std::string> names;
-  for (std::string name; std::getline(list, name, ',');)
-    names.push_back(name.substr(0, name.find("->")));  // verbosity: quiet->0
+  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
   const std::string nearest = nearest_word(got, names);
   return fmt::format("{}: got '{}'; expected one of {}{}", place, got, fmt::join(names, ", "),
                      nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest));
@@ -82,8 +82,6 @@ std::string invalid(const std::string& what) {
   const auto& [place, problem] = *halves;
   if (const auto set = split_at(problem, " not in {"))
     return choice(place, set->first, set->second);
-  if (const auto set = split_at(problem, " value in {"); set && set->first.starts_with("Check "))
-    return choice(place, set->first.substr(6), set->second);
   if (const auto range = split_at(problem, " not in range ");
       range && range->first.starts_with("Value "))
     if (const auto ends = split_at(range->second, " to "))
@@ -117,13 +115,7 @@ class Program {
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
-    // As int: CLI11 would print the enumerators as characters.
-    const std::vector<std::pair<std::string, int>> levels = {
-        {"quiet", static_cast<int>(Verbosity::quiet)},
-        {"normal", static_cast<int>(Verbosity::normal)},
-        {"debug", static_cast<int>(Verbosity::debug)}};
-    app_.add_option("--verbosity", console_.verbosity, "quiet | normal | debug")
-        ->transform(CLI::CheckedTransformer(levels).description("{quiet,normal,debug}"));
+    add_choice(app_, "--verbosity", console_.verbosity, "quiet | normal | debug");
     app_.require_subcommand(0, 1);
     app_.footer(kFooter);
   }

@@ -28,41 +28,27 @@ Backend backend_of(const std::string& name, Backend configured) {
 /// stageid run CONFIG -o run.slog
 struct RunFlags {
   std::filesystem::path config;
-  std::filesystem::path output;
-  std::string backend;
-  std::filesystem::path replay;
-  double replay_tolerance_n = 1e-9;
-  double pace = -1.0;
   std::filesystem::path excitation;
-  double until = 0.0;
+  std::string backend;
   std::string dashboard;
-  bool resume = false;
-  bool reset_fault = false;
+  MeasurementRequest request;
 };
 
 void measure_and_log(const RunFlags& flags, Console& console) {
-  const std::string ending = flags.output.extension().string();
+  MeasurementRequest request = flags.request;
+  const std::string ending = request.log.extension().string();
   if (ending == ".h5" || ending == ".hdf5" || ending == ".csv")
     throw std::invalid_argument(
         fmt::format("{}: a measurement is recorded as .slog, which survives a crash; use a name "
                     "ending in .slog and 'stageid log convert' to obtain {}",
-                    flags.output.string(), ending));
-  require_ending(flags.output, "a log", {".slog"});
+                    request.log.string(), ending));
+  require_ending(request.log, "a log", {".slog"});
   const ExperimentConfig config = load_experiment_config(flags.config);
-  const Backend backend = backend_of(flags.backend, config.stage.backend);
-  if (backend != Backend::replay) require_stable_loop(config, console);
+  request.backend = backend_of(flags.backend, config.stage.backend);
+  if (request.backend != Backend::replay) require_stable_loop(config, console);
   const ExperimentPlan plan =
       flags.excitation.empty() ? make_plan(config) : read_plan_of(config, flags.excitation);
-  MeasurementRequest request;
-  request.log = flags.output;
-  request.backend = backend;
-  request.replay = flags.replay;
-  request.replay_tolerance_n = flags.replay_tolerance_n;
-  request.resume = flags.resume;
-  request.pace = flags.pace;
   if (!flags.dashboard.empty()) request.dashboard = parse_dashboard_address(flags.dashboard);
-  request.reset_fault = flags.reset_fault;
-  if (flags.until > 0.0) request.until = flags.until;
   const MeasurementResult result = measure(config, plan, request, console);
   console.exit_code = result.exit_code;
 
@@ -70,7 +56,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   const double stage_s = static_cast<double>(health.cycles) / plan.grid().sample_rate_hz();
   const int complete = result.runs_before + result.experiment.runs_done;
   console.result(fmt::format(
-      "{}: {} of {} complete{}", flags.output.string(), complete, counted(result.runs_total, "run"),
+      "{}: {} of {} complete{}", request.log.string(), complete, counted(result.runs_total, "run"),
       result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : ""));
   console.result(
       fmt::format("{}, {} late, {} missing, {} marked; {:.1f} s of stage time in "
@@ -78,7 +64,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
                   counted(health.cycles, "cycle"), health.late, health.missing, health.marked,
                   stage_s, result.seconds, static_cast<double>(result.log_bytes) / 1e6));
   if (result.variance) console.result(result.message);
-  nlohmann::ordered_json json = {{"log", flags.output.string()},
+  nlohmann::ordered_json json = {{"log", request.log.string()},
                                  {"exit_code", result.exit_code},
                                  {"message", result.message},
                                  {"runs_complete", complete},
@@ -93,7 +79,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   if (result.variance) json["relative_variance"] = *result.variance;
   console.result(json);
   if (result.exit_code != 0)
-    console.warning(fmt::format("{}{}", named(flags.output, result.message),
+    console.warning(fmt::format("{}{}", named(request.log, result.message),
                                 complete < result.runs_total ? advice_behind(result) : ""));
 }
 
@@ -103,33 +89,33 @@ void run_command(CLI::App& app, Console& console) {
   const auto flags = std::make_shared<RunFlags>();
   CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
   command->add_option("config", flags->config, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", flags->output, "log to write (.slog)")->required();
+  command->add_option("-o,--output", flags->request.log, "log to write (.slog)")->required();
   command->add_option("--backend", flags->backend,
                       "sim | can | modbus | plugin | replay; default: from the stage file");
-  command->add_option("--replay", flags->replay, "log to replay with --backend replay");
+  command->add_option("--replay", flags->request.replay, "log to replay with --backend replay");
   command
-      ->add_option("--replay-tolerance", flags->replay_tolerance_n,
+      ->add_option("--replay-tolerance", flags->request.replay_tolerance_n,
                    "largest allowed difference between a command and the replayed one, in the unit "
                    "of the actuator")
       ->capture_default_str();
   command
-      ->add_option("--pace", flags->pace,
+      ->add_option("--pace", flags->request.pace,
                    "0: as fast as possible; 1: wall clock; default: from the stage file")
       ->check(kNotNegative);
   command->add_option("--excitation", flags->excitation,
                       "play this result of 'stageid design' instead of designing again");
   command
-      ->add_option("--until", flags->until,
+      ->add_option("--until", flags->request.until,
                    "VARIANCE: stop after the realization that lowers the mean relative variance of "
                    "the response to this value, e.g. 1e-6 for 0.1 %")
       ->check(kPositive);
-  command->add_flag("--resume", flags->resume,
+  command->add_flag("--resume", flags->request.resume,
                     "continue an interrupted log; complete runs are not repeated");
   command->add_option("--dashboard", flags->dashboard,
                       "live view in a browser. PORT: on this machine (0: any free port) | "
                       "HOST:PORT: also on others. The printed address contains the token that "
                       "other machines and the stop button need");
-  command->add_flag("--reset-fault", flags->reset_fault,
+  command->add_flag("--reset-fault", flags->request.reset_fault,
                     "clear a fault of the node or plant before the first run");
   command->final_callback([flags, &console] { measure_and_log(*flags, console); });
 }

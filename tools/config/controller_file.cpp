@@ -189,8 +189,8 @@ NominalStage read_controller_file(const YamlDocument& document) {
   if (!f.stage.empty()) {
     const NominalStage stage = nominal_stage(load_stage_config(folder / f.stage).spec);
     std::string missing;
-    const auto y = positions_in(stage.sensors, nominal.sensors, missing);
-    const auto u = positions_in(stage.actuators, nominal.actuators, missing);
+    const auto y = positions_in(stage.sensors, nominal.sensors, &missing);
+    const auto u = positions_in(stage.actuators, nominal.actuators, &missing);
     if (!missing.empty())
       throw FormatError(document.file(), "",
                         fmt::format("stage: {} has no channel '{}'; use the names of the stage "

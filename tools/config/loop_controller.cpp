@@ -15,9 +15,7 @@
 namespace stageid {
 namespace {
 
-struct Matrices {
-  std::vector<double> a, b, c, d;
-};
+using Matrices = LinearControllerKeys::StateSpace;
 
 constexpr double kSameRate = 1e-9;
 
@@ -114,13 +112,8 @@ std::string text_of(const Matrices& m, const StageInfo& stage) {
       fmt::join(quoted_names(stage.sensors), ", "), fmt::join(quoted_names(stage.actuators), ", "),
       stage.sample_rate_hz);
   for (const auto& [key, values] :
-       {std::pair("a", &m.a), std::pair("b", &m.b), std::pair("c", &m.c), std::pair("d", &m.d)}) {
-    if (values->empty()) continue;
-    text += fmt::format("  {}: [", key);
-    for (std::size_t i = 0; i < values->size(); ++i)
-      text += fmt::format("{}{:.17g}", i == 0 ? "" : ", ", (*values)[i]);
-    text += "]\n";
-  }
+       {std::pair("a", &m.a), std::pair("b", &m.b), std::pair("c", &m.c), std::pair("d", &m.d)})
+    if (!values->empty()) text += fmt::format("  {}: [{:.17g}]\n", key, fmt::join(*values, ", "));
   return text;
 }
 

@@ -76,17 +76,19 @@ void describe_supervisor(ConfigVisitor& v, SupervisorConfig& c) {
 
 }  // namespace
 
-void describe_modbus_groups(ConfigVisitor& v, bool behind_modbus, ModbusGroups& g) {
+void describe_modbus_groups(ConfigVisitor& v, bool behind_modbus,
+                            std::optional<ModbusConfig>& stage,
+                            std::optional<SupervisorConfig>& supervisor) {
   v.group(
-      "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, g.stage.emplace()); }, kOptional,
+      "modbus", [&](ConfigVisitor& keys) { describe_modbus(keys, stage.emplace()); }, kOptional,
       "backend modbus: address of the stage");
-  v.require(!behind_modbus || g.stage.has_value(), "backend",
+  v.require(!behind_modbus || stage.has_value(), "backend",
             "backend: modbus needs the group 'modbus'; add it with the address of the stage");
   v.group(
-      "supervisor", [&](ConfigVisitor& keys) { describe_supervisor(keys, g.supervisor.emplace()); },
+      "supervisor", [&](ConfigVisitor& keys) { describe_supervisor(keys, supervisor.emplace()); },
       kOptional, "enable chain, gravity compensators, temperatures and interlocks, over Modbus");
-  const bool one_line = g.stage && g.supervisor && g.stage->address.serial() &&
-                        g.stage->address.device == g.supervisor->link.address.device;
+  const bool one_line = stage && supervisor && stage->address.serial() &&
+                        stage->address.device == supervisor->link.address.device;
   v.require(!one_line, "supervisor",
             "supervisor: the stage uses the same serial line, which supports one link only; use "
             "another line, or tcp");

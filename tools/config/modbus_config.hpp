@@ -23,13 +23,9 @@ struct SupervisorConfig {
   PlantConditions conditions;
 };
 
-/// The Modbus groups of a stage file.
-struct ModbusGroups {
-  std::optional<ModbusConfig> stage;
-  std::optional<SupervisorConfig> supervisor;
-};
-
 /// Describes the groups `modbus` and `supervisor`; the first is required if the stage is `behind_modbus`.
-void describe_modbus_groups(ConfigVisitor& visitor, bool behind_modbus, ModbusGroups& groups);
+void describe_modbus_groups(ConfigVisitor& visitor, bool behind_modbus,
+                            std::optional<ModbusConfig>& stage,
+                            std::optional<SupervisorConfig>& supervisor);
 
 }  // namespace stageid

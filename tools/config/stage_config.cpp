@@ -116,7 +116,7 @@ void take_controller(StageConfig& config, const StageFile& file,
     controller.actuator_decoupling.resize(static_cast<Eigen::Index>(info.actuators.size()), 0);
     take_linear_controller(linear, info.actuators, info.sensors, controller);
   }
-  controller.feed_forward_ramp_s = file.ramp_s;
+  controller.feed_forward_ramp_s = config.ramp_s;
   controller.feed_forward_n.resize(static_cast<Eigen::Index>(file.actuators.size()));
   for (Eigen::Index i = 0; i < controller.feed_forward_n.size(); ++i)
     controller.feed_forward_n[i] = file.actuators[static_cast<std::size_t>(i)].bias_n;
@@ -124,13 +124,10 @@ void take_controller(StageConfig& config, const StageFile& file,
 
 void complete_spec(StageConfig& config, const StageFile& file) {
   WaferStageSpec& spec = config.spec;
-  spec = file.spec;
   spec.info.backend = to_string(config.backend);
   spec.info.maximum_rate_hz = spec.info.sample_rate_hz;
   spec.info.transport_delay_s = spec.delay_s;
   spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
-  spec.info.actuators = channels_of(file.actuators);
-  spec.info.sensors = channels_of(file.sensors);
   if (spec.has_plant()) {
     std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);
     std::copy_n(file.suspension_hz.begin(), 6, spec.suspension_hz);
@@ -162,22 +159,17 @@ namespace {
 StageFile stage_file(const YamlDocument& document) {
   StageFile file;
   read_config(document, [&](ConfigVisitor& visitor) { describe_stage_file(visitor, file); });
+  file.config.spec.info.actuators = channels_of(file.actuators);
+  file.config.spec.info.sensors = channels_of(file.sensors);
   return file;
 }
 
 StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& document,
-                         const StageFile& file, std::string controller_text) {
-  StageConfig config;
+                         StageFile file, std::string controller_text) {
+  StageConfig config = std::move(file.config);
   config.file = path;
   config.text = document.text();
   config.controller_text = std::move(controller_text);
-  config.between_runs = file.between_runs;
-  config.backend = static_cast<Backend>(file.backend);
-  config.real_time = file.real_time;
-  config.ramp_s = file.ramp_s;
-  config.modbus = file.modbus.stage;
-  config.supervisor = file.modbus.supervisor;
-  config.plugin = file.plugin;
   if (config.plugin) config.plugin->library = path.parent_path() / config.plugin->library;
   // Errors of the libraries get the name of the file; they contain the place themselves.
   try {
@@ -200,24 +192,24 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
 
 StageConfig load_stage_config(const std::filesystem::path& path) {
   const YamlDocument document = YamlDocument::read(path);
-  const StageFile file = stage_file(document);
+  StageFile file = stage_file(document);
   std::string controller;
-  if (!file.controller.empty() && file.controller != kPeer) {
-    StageInfo info = file.spec.info;
-    info.actuators = channels_of(file.actuators);
-    info.sensors = channels_of(file.sensors);
-    controller = loop_controller_text(path.parent_path() / file.controller, info);
-  }
-  return stage_config(path, document, file, std::move(controller));
+  if (!file.controller.empty() && file.controller != kPeer)
+    controller = loop_controller_text(path.parent_path() / file.controller, file.config.spec.info);
+  return stage_config(path, document, std::move(file), std::move(controller));
 }
 
 StageConfig parse_stage_config(const std::filesystem::path& name, std::string text,
                                std::string controller_text) {
   const YamlDocument document = YamlDocument::parse(name, std::move(text));
-  const StageFile file = stage_file(document);
+  StageFile file = stage_file(document);
   if (!file.controller.empty() && file.controller != kPeer && controller_text.empty())
     throw FormatError(name, "", "the controller is in another file, which is unknown");
-  return stage_config(name, document, file, std::move(controller_text));
+  return stage_config(name, document, std::move(file), std::move(controller_text));
+}
+
+StageInfo stage_info(const std::filesystem::path& name, std::string text) {
+  return stage_file(YamlDocument::parse(name, std::move(text))).config.spec.info;
 }
 
 std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,

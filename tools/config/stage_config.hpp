@@ -54,6 +54,9 @@ StageConfig load_stage_config(const std::filesystem::path& file);
 StageConfig parse_stage_config(const std::filesystem::path& name, std::string text,
                                std::string controller_text);
 
+/// Name, sample rate and channels in the text of a stage file; `name` is used in errors only. @throws FormatError
+StageInfo stage_info(const std::filesystem::path& name, std::string text);
+
 /// The keys of a stage file. Used by `stageid config schema`.
 void describe_stage_keys(ConfigVisitor& visitor);
 

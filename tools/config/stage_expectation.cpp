@@ -24,30 +24,30 @@ std::vector<std::string> names_of(const std::vector<Channel>& channels) {
   return names;
 }
 
+using Response = std::function<Eigen::MatrixXcd(double frequency_hz)>;
+
+/// The response with further channels, which are zero.
+Response padded(const Response& response, std::size_t rows, std::size_t columns) {
+  return [=](double frequency_hz) {
+    const Eigen::MatrixXcd part = response(frequency_hz);
+    Eigen::MatrixXcd whole =
+        Eigen::MatrixXcd::Zero(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+    whole.topLeftCorner(part.rows(), part.cols()) = part;
+    return whole;
+  };
+}
+
 /// Channels that are not in the controller file have a zero response of the controller.
-NominalStage with_channels_of(const LogInfo& info, NominalStage known) {
-  NominalStage all = known;
+NominalStage with_channels_of(const LogInfo& info, NominalStage all) {
   const auto append = [](std::vector<std::string>& names, const std::vector<std::string>& more) {
     for (const std::string& name : more)
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
   append(all.actuators, info.actuators.names);
   append(all.sensors, info.sensors.names);
-  const auto n_u = static_cast<Eigen::Index>(all.actuators.size());
-  const auto n_y = static_cast<Eigen::Index>(all.sensors.size());
-  all.controller = [n_u, n_y, controller = known.controller](double frequency_hz) {
-    const Eigen::MatrixXcd part = controller(frequency_hz);
-    Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_u, n_y);
-    whole.topLeftCorner(part.rows(), part.cols()) = part;
-    return whole;
-  };
-  if (known.rigid_body)
-    all.rigid_body = [n_u, n_y, rigid_body = known.rigid_body](double frequency_hz) {
-      const Eigen::MatrixXcd part = rigid_body(frequency_hz);
-      Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_y, n_u);
-      whole.topLeftCorner(part.rows(), part.cols()) = part;
-      return whole;
-    };
+  all.controller = padded(all.controller, all.actuators.size(), all.sensors.size());
+  if (all.rigid_body)
+    all.rigid_body = padded(all.rigid_body, all.sensors.size(), all.actuators.size());
   return all;
 }
 

@@ -156,7 +156,7 @@ void describe_in_plane_mode(ConfigVisitor& v, std::vector<InPlaneModeConfig>& li
 }
 
 void describe_plant(ConfigVisitor& v, StageFile& f) {
-  WaferStageSpec& s = f.spec;
+  WaferStageSpec& s = f.config.spec;
   v.number("mass_kg", s.mass_kg, positive("kg"), kRequired, "moving mass");
   v.numbers("inertia_kg_m2", f.inertia_kg_m2, positive("kg m^2"), {3, 3}, kRequired,
             "about x, y, z");
@@ -303,10 +303,13 @@ void require_ranges(ConfigVisitor& v, const StageFile& f) {
 }  // namespace
 
 void describe_stage_file(ConfigVisitor& v, StageFile& f) {
-  WaferStageSpec& s = f.spec;
+  StageConfig& config = f.config;
+  WaferStageSpec& s = config.spec;
+  auto backend = static_cast<std::size_t>(config.backend);
   v.choice("format", f.format, {"stageid-stage"}, kRequired, "file type");
   v.text("name", s.info.name, kRequired, "name of the stage");
-  v.choice("backend", f.backend, words_before(Backend::replay), kOptional, "back end of the stage");
+  v.choice("backend", backend, words_before(Backend::replay), kOptional, "back end of the stage");
+  config.backend = static_cast<Backend>(backend);
   v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired,
            "sample rate of the loop");
   v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
@@ -316,16 +319,15 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   items(v, "sensors", describe_sensor, f.sensors, {1, 64}, kRequired, "in the order of the log");
   v.number("stuck_sensor_s", s.limits.stuck_sensor_s, not_negative("s"), kOptional,
            "stop if a sensor repeats one value for this long; 0 disables the check");
-  v.number("ramp_s", f.ramp_s, not_negative("s"), kOptional,
+  v.number("ramp_s", config.ramp_s, not_negative("s"), kOptional,
            "time in which a stop ramps the excitation to zero, in closed loop if the loop can be "
            "trusted");
-  choose(v, "between_runs", f.between_runs, kOptional,
+  choose(v, "between_runs", config.between_runs, kOptional,
          "release: forces are cut after every run; hold: the loop stays closed between the runs of "
          "an experiment");
   v.number("thermal_time_constant_s", f.thermal_time_constant_s, positive("s"), kOptional,
            "time constant of the average that thermal_rms_n limits");
-  const bool simulated = f.backend == static_cast<std::size_t>(Backend::sim);
-  group(v, "plant", describe_plant, f, simulated ? kRequired : kOptional,
+  group(v, "plant", describe_plant, f, config.backend == Backend::sim ? kRequired : kOptional,
         "the simulated stage. Optional for other back ends, which without it need a prior to test "
         "the loop and to predict signals");
   group(v, "noise", describe_noise, s, kOptional, "noise of the simulated stage");
@@ -337,16 +339,12 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       "one; or peer: the stage closes the loop itself");
   v.number("pace", s.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
-  group(v, "realtime", describe_real_time, f.real_time, kOptional,
+  group(v, "realtime", describe_real_time, config.real_time, kOptional,
         "settings of the loop thread; ignored in virtual time");
-  describe_modbus_groups(v, f.backend == static_cast<std::size_t>(Backend::modbus), f.modbus);
+  describe_modbus_groups(v, config.backend == Backend::modbus, config.modbus, config.supervisor);
   v.group(
-      "plugin",
-      [&](ConfigVisitor& keys) {
-        f.plugin.emplace();
-        describe_plugin(keys, *f.plugin);
-      },
-      f.backend == static_cast<std::size_t>(Backend::plugin) ? kRequired : kOptional,
+      "plugin", [&](ConfigVisitor& keys) { describe_plugin(keys, config.plugin.emplace()); },
+      config.backend == Backend::plugin ? kRequired : kOptional,
       "a user-written back end, see docs/plugins.md");
   items(v, "faults", describe_fault, f.faults, {}, kOptional,
         "injected faults, to test the safety functions");

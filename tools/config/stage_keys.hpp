@@ -2,7 +2,6 @@
 
 #include <array>
 #include <limits>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,10 +43,7 @@ struct FaultConfig {
 /// Content of the file, key by key.
 struct StageFile {
   std::size_t format = 0;
-  std::size_t backend = 0;
   double thermal_time_constant_s = 10.0;
-  double ramp_s = 0.1;
-  BetweenRuns between_runs = BetweenRuns::release;
   std::vector<ChannelConfig> actuators;
   std::vector<ChannelConfig> sensors;
   std::vector<double> inertia_kg_m2;
@@ -57,11 +53,8 @@ struct StageFile {
   LinearControllerKeys linear;
   std::string controller;  // peer or a file; empty: in this file
   std::vector<FaultConfig> faults;
-  RealTimeKeys real_time;
   CanFile can;
-  ModbusGroups modbus;
-  std::optional<PluginSpec> plugin;
-  WaferStageSpec spec;
+  StageConfig config;  // without what is derived from the keys above
 };
 
 /// Describes the keys of a stage file.

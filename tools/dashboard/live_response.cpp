@@ -22,8 +22,7 @@ constexpr int kLowest = 19;
 
 std::string page_json(const FrfEstimate& frf) {
   ReportData data;
-  data.cmif_kind = PeakOptions().kind;
-  data.cmif_curves = cmif(frf, data.cmif_kind);
+  data.cmif_curves = cmif(frf, CmifKind::accelerance);
   data.frf = frf;
   const report::PageContent content = report::page_content(data);
   std::string json = fmt::format(R"({{"realizations":{},"content":{},"blocks":{{)",

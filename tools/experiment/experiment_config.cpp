@@ -25,15 +25,10 @@ struct ExperimentFile {
   std::vector<std::string> axes;
   FlexibleValue rms_n;
   FlexibleValue peak_n;
-  std::optional<LimitRequest> limits;
   FlexibleValue shape = {"flat", {}, false, {}};
   std::vector<double> band_hz;
   double period_s = 0.0;
-  LineSpec lines;
-  ExperimentSpec spec;
-  FrfOptions frf;
-  FitRequest fit;
-  int validation_realization = 0;
+  ExperimentConfig config;  // without what is derived from the keys above
 };
 
 bool is_set(const FlexibleValue& value) { return !value.numbers.empty(); }
@@ -72,11 +67,12 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
   describe_neutral(v, "rms", "rms_n", f.rms_n, rule);
   describe_neutral(v, "peak", "peak_n", f.peak_n, rule);
   group(
-      v, "limits", describe_limits, f.limits, kOptional,
+      v, "limits", describe_limits, f.config.limits, kOptional,
       "instead: as large as the limits allow, distributed for the smallest mean relative variance");
-  const char* key = f.limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
+  const std::optional<LimitRequest>& limits = f.config.limits;
+  const char* key = limits ? "limits" : is_set(f.rms_n) ? "rms_n" : "peak_n";
   v.require(
-      int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{f.limits.has_value()} == 1, key,
+      int{is_set(f.rms_n)} + int{is_set(f.peak_n)} + int{limits.has_value()} == 1, key,
       "level: write exactly one of 'rms_n: NUMBER', 'peak_n: NUMBER' and 'limits: {prior: FILE}'");
   const std::size_t given = std::max(f.rms_n.numbers.size(), f.peak_n.numbers.size());
   v.require(given <= 1 || given == f.axes.size(), key,
@@ -85,8 +81,9 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
 }
 
 void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
-  choose(v, "lines", f.lines.selection, kOptional, "which lines of the period are excited");
-  count(v, "group_size", f.lines.group_size, 2, 1000, kOptional,
+  LineSpec& lines = f.config.lines;
+  choose(v, "lines", lines.selection, kOptional, "which lines of the period are excited");
+  count(v, "group_size", lines.group_size, 2, 1000, kOptional,
         "odd_random: one odd line in this many is not excited");
   v.numbers("band_hz", f.band_hz, positive("Hz"), {2, 2}, kRequired,
             "lowest and highest frequency");
@@ -106,23 +103,24 @@ void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
 }
 
 void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
+  ExperimentSpec& spec = f.config.experiment;
   v.texts("axes", f.axes, {1, 64}, kRequired, "names of the excited actuators");
-  choose(v, "scheme", f.spec.scheme, kOptional, "distribution of the axes over the experiments");
+  choose(v, "scheme", spec.scheme, kOptional, "distribution of the axes over the experiments");
   group(v, "level", describe_level, f, kRequired, "size of the excitation");
   describe_lines(v, f);
   v.number("period_s", f.period_s, positive("s"), kRequired, "period of the multisine");
-  count(v, "transient_periods", f.spec.transient_periods, 0, 1000, kOptional,
+  count(v, "transient_periods", spec.transient_periods, 0, 1000, kOptional,
         "unused periods before the measured ones");
-  count(v, "periods", f.spec.periods, 1, 100000, kOptional, "measured periods per run");
-  count(v, "realizations", f.spec.realizations, 1, 10000, kOptional,
+  count(v, "periods", spec.periods, 1, 100000, kOptional, "measured periods per run");
+  count(v, "realizations", spec.realizations, 1, 10000, kOptional,
         "number of realizations of the random phases");
-  count(v, "crest_iterations", f.spec.crest_iterations, 0, 100000, kOptional,
+  count(v, "crest_iterations", spec.crest_iterations, 0, 100000, kOptional,
         "iterations of the crest-factor reduction; 0: phases stay random");
-  v.require(!f.limits || f.spec.crest_iterations > 0, "crest_iterations",
+  v.require(!f.config.limits || spec.crest_iterations > 0, "crest_iterations",
             "crest_iterations: 'limits' also optimizes the phases; write 20");
-  v.require(!f.limits || f.shape.pairs.empty(), "shape",
+  v.require(!f.config.limits || f.shape.pairs.empty(), "shape",
             "shape: 'limits' designs the spectrum; remove 'shape'");
-  count(v, "seed", f.spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
+  count(v, "seed", spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
         "the same seed gives the same experiment on every machine");
 }
 
@@ -149,20 +147,23 @@ void describe(ConfigVisitor& v, ExperimentFile& f) {
   v.choice("format", f.format, {"stageid-experiment"}, kRequired, "file type");
   v.text("stage", f.stage, kRequired, "stage file, relative to this one");
   group(v, "experiment", describe_experiment, f, kRequired, "the measurement");
-  group(v, "frf", describe_frf, f.frf, kOptional, "estimation of the frequency response");
-  group(v, "fit", describe_fit_keys, f.fit, kOptional, "fit of the model");
+  group(v, "frf", describe_frf, f.config.frf, kOptional, "estimation of the frequency response");
+  group(v, "fit", describe_fit_keys, f.config.fit, kOptional, "fit of the model");
   v.group(
       "validation",
       [&](ConfigVisitor& validation) {
-        count(validation, "realization", f.validation_realization, 1, 10000, kRequired,
+        const int realizations = f.config.experiment.realizations;
+        int realization = 0;
+        count(validation, "realization", realization, 1, 10000, kRequired,
               "realization held back from the fit, counted from 1");
         validation.require(
-            f.validation_realization <= f.spec.realizations, "realization",
+            realization <= realizations, "realization",
             fmt::format("realization: {} is out of range, {} are measured; hold back one of these",
-                        f.validation_realization, f.spec.realizations));
+                        realization, realizations));
         validation.require(
-            f.spec.realizations > 1, "realization",
+            realizations > 1, "realization",
             "realization: no realization remains for the fit; set realizations to 2 or more");
+        f.config.validation_realization = realization - 1;
       },
       kOptional, "validation; omitted: no realization is held back");
 }
@@ -239,7 +240,7 @@ class ExperimentChecker {
 
 std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const FrequencyGrid& grid) {
   const std::vector<double> designed = {1.0};
-  const std::vector<double>& levels = file.limits          ? designed
+  const std::vector<double>& levels = file.config.limits   ? designed
                                       : is_set(file.rms_n) ? file.rms_n.numbers
                                                            : file.peak_n.numbers;
   const Eigen::VectorXd shape = shape_on(grid, file.shape.pairs);
@@ -263,57 +264,53 @@ void require_zippered_lines(const ExperimentSpec& spec, const FrequencyGrid& gri
 }
 
 /// Fingerprint of the numbers and the stage that determine the measurement, not of the later use of the data.
-std::string measurement_id(const ExperimentFile& f, const StageConfig& stage) {
-  const ExperimentSpec& s = f.spec;
+std::string measurement_id(const ExperimentFile& f) {
+  const ExperimentSpec& s = f.config.experiment;
+  const LineSpec& lines = f.config.lines;
+  const std::optional<LimitRequest>& limits = f.config.limits;
   std::string text = fmt::format(
       "scheme {} scaling {} lines {} group {} period {} transient {} periods {} realizations {} "
       "crest {} seed {} band {} {}",
-      static_cast<int>(s.scheme), static_cast<int>(s.scaling), static_cast<int>(f.lines.selection),
-      f.lines.group_size, f.period_s, s.transient_periods, s.periods, s.realizations,
-      s.crest_iterations, s.seed, f.lines.low_hz, f.lines.high_hz);
+      static_cast<int>(s.scheme), static_cast<int>(s.scaling), static_cast<int>(lines.selection),
+      lines.group_size, f.period_s, s.transient_periods, s.periods, s.realizations,
+      s.crest_iterations, s.seed, lines.low_hz, lines.high_hz);
   for (const ExcitationAxis& axis : s.axes)
     text += fmt::format(" axis {} {}", axis.channel, axis.level);
-  if (f.limits)
-    text +=
-        fmt::format(" limits {} {} {}", f.limits->safety, f.limits->velocity_m_s,
-                    std::filesystem::exists(f.limits->prior) ? fingerprint_of_file(f.limits->prior)
-                                                             : "not there yet");
+  if (limits)
+    text += fmt::format(" limits {} {} {}", limits->safety, limits->velocity_m_s,
+                        std::filesystem::exists(limits->prior) ? fingerprint_of_file(limits->prior)
+                                                               : "not there yet");
   for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
     text += fmt::format(" shape {} {}", frequency_hz, amplitude);
-  return fingerprint_of(text + "\n" + stage.text + stage.controller_text);
+  return fingerprint_of(text + "\n" + f.config.stage.text + f.config.stage.controller_text);
 }
 
-void complete(ExperimentConfig& config, ExperimentFile& file, const YamlDocument& document) {
+void complete(ExperimentFile& file, const YamlDocument& document) {
+  ExperimentConfig& config = file.config;
   const ExperimentChecker checker(document, config.stage);
   const StageInfo& info = config.stage.spec.info;
   FormatErrorList errors;
   checker.check_names("experiment", "axes", file.axes, info.actuators, "actuator", errors);
-  checker.check_names("frf", "inputs", file.frf.inputs, info.actuators, "actuator", errors);
-  checker.check_names("frf", "outputs", file.frf.outputs, info.sensors, "sensor", errors);
+  checker.check_names("frf", "inputs", config.frf.inputs, info.actuators, "actuator", errors);
+  checker.check_names("frf", "outputs", config.frf.outputs, info.sensors, "sensor", errors);
   errors.attempt([&] { checker.check_band(file.band_hz); });
   errors.attempt([&] { config.samples_per_period = checker.samples_per_period(file.period_s); });
   errors.raise();
-  file.lines.low_hz = file.band_hz[0];
-  file.lines.high_hz = file.band_hz[1];
-  file.lines.seed = file.spec.seed;
-  file.spec.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
+  config.lines.low_hz = file.band_hz[0];
+  config.lines.high_hz = file.band_hz[1];
+  config.lines.seed = config.experiment.seed;
+  config.experiment.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
   // Errors of the excitation library get the position of the corresponding section.
   try {
     const auto grid =
-        FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, file.lines);
-    file.spec.axes = excitation_axes(file, grid);
-    config.lines = file.lines;
-    config.experiment = file.spec;
-    config.limits = file.limits;
+        FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, config.lines);
+    config.experiment.axes = excitation_axes(file, grid);
     outline_plan(config);
-    require_zippered_lines(file.spec, grid);
+    require_zippered_lines(config.experiment, grid);
   } catch (const std::invalid_argument& error) {
     checker.fail("band_hz", error.what());
   }
-  config.frf = file.frf;
-  config.fit = file.fit;
-  config.validation_realization = file.validation_realization - 1;
-  config.measurement_id = measurement_id(file, config.stage);
+  config.measurement_id = measurement_id(file);
 }
 
 }  // namespace
@@ -342,7 +339,7 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
 ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
   const YamlDocument document = YamlDocument::read(path);
   ExperimentFile file;
-  ExperimentConfig config;
+  ExperimentConfig& config = file.config;
   config.file = path;
   config.text = document.text();
   FormatErrorList errors;
@@ -352,10 +349,10 @@ ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
     errors.attempt(
         [&] { config.stage = load_stage_config(stage_file_of(path, document, file.stage)); });
   errors.raise();
-  if (file.limits)
-    file.limits->prior = (path.parent_path() / file.limits->prior).lexically_normal();
-  complete(config, file, document);
-  return config;
+  if (config.limits)
+    config.limits->prior = (path.parent_path() / config.limits->prior).lexically_normal();
+  complete(file, document);
+  return std::move(file.config);
 }
 
 }  // namespace stageid

@@ -28,6 +28,23 @@ double realization_s(const ExperimentPlan& plan) {
   return plan.duration_s() / plan.spec().realizations;
 }
 
+/// Mean relative variance after all runs of the plan.
+double final_variance(const LimitedPlan& limited) {
+  const ExperimentPlan& plan = limited.design.plan;
+  return relative_variance(plan, limited.loop.cost) /
+         (static_cast<double>(plan.spec().realizations) * plan.spec().periods);
+}
+
+/// Duration in s of as many whole realizations of the plan as reach a mean relative variance.
+double duration_to_reach_s(const LimitedPlan& limited, double variance) {
+  if (!(variance > 0.0) || !std::isfinite(variance))
+    throw std::invalid_argument(fmt::format(
+        "accuracy: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
+  const ExperimentPlan& plan = limited.design.plan;
+  const double one = relative_variance(plan, limited.loop.cost) / plan.spec().periods;
+  return std::ceil(one / variance) * realization_s(plan);
+}
+
 }  // namespace
 
 LimitedPlan make_limited_plan(const ExperimentConfig& config) {
@@ -58,21 +75,6 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
         config.file, "",
         fmt::format("level.limits from {}: {}", request.prior.string(), error.what()));
   }
-}
-
-double final_variance(const LimitedPlan& limited) {
-  const ExperimentPlan& plan = limited.design.plan;
-  return relative_variance(plan, limited.loop.cost) /
-         (static_cast<double>(plan.spec().realizations) * plan.spec().periods);
-}
-
-double duration_to_reach_s(const LimitedPlan& limited, double variance) {
-  if (!(variance > 0.0) || !std::isfinite(variance))
-    throw std::invalid_argument(fmt::format(
-        "accuracy: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
-  const ExperimentPlan& plan = limited.design.plan;
-  const double one = relative_variance(plan, limited.loop.cost) / plan.spec().periods;
-  return std::ceil(one / variance) * realization_s(plan);
 }
 
 std::vector<std::string> limited_table(const LimitedPlan& limited, double accuracy) {

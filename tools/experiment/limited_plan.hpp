@@ -21,13 +21,6 @@ struct LimitedPlan {
 /// @throws FileError if the prior does not exist; FormatError if the prior or the request is unsuitable.
 LimitedPlan make_limited_plan(const ExperimentConfig& config);
 
-/// Duration in s of as many whole realizations of the plan as reach a mean relative variance.
-/// @throws std::invalid_argument unless `variance` is positive and finite.
-double duration_to_reach_s(const LimitedPlan& limited, double variance);
-
-/// Mean relative variance after all runs of the plan.
-double final_variance(const LimitedPlan& limited);
-
 /// The signals relative to their limits, and the predicted accuracy; `accuracy` 0: no requested accuracy.
 std::vector<std::string> limited_table(const LimitedPlan& limited, double accuracy);
 nlohmann::ordered_json limited_json(const LimitedPlan& limited, double accuracy);

@@ -2,26 +2,20 @@
 
 #include <fmt/format.h>
 
-#include "hal/can/can_bus_load.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 
 namespace stageid {
 
 std::vector<LinkLoad> link_loads(const StageConfig& config) {
   const StageInfo& info = config.spec.info;
-  std::vector<LinkLoad> loads;
-  if (config.backend == Backend::can && config.can.present &&
-      config.can.mode == CanMode::streaming) {
-    const CanLayout layout = can_layout(config.can.spec, info);
-    for (const CanBusLoad& bus : can_bus_load(config.can.spec, layout, info.sample_rate_hz))
-      loads.push_back({bus.interface, bus.load, bus.cycle_s, bus.highest_rate_hz});
-  }
+  if (config.backend == Backend::can && config.can.present && config.can.mode == CanMode::streaming)
+    return can_bus_load(config.can.spec, can_layout(config.can.spec, info), info.sample_rate_hz);
   if (config.backend == Backend::modbus && config.modbus) {
     const double cycle_s = modbus_exchange_s(config.modbus->address, config.modbus->timing, info);
-    loads.push_back(
-        {to_string(config.modbus->address), cycle_s * info.sample_rate_hz, cycle_s, 1.0 / cycle_s});
+    return {
+        {to_string(config.modbus->address), cycle_s * info.sample_rate_hz, cycle_s, 1.0 / cycle_s}};
   }
-  return loads;
+  return {};
 }
 
 std::string to_string(const LinkLoad& load) {

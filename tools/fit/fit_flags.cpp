@@ -13,6 +13,7 @@
 #include "acquisition/files/key_suggestion.hpp"
 #include "estimation/request/submodel_text.hpp"
 #include "tools/fit/flag_values.hpp"
+#include "tools/terminal/text_lines.hpp"
 
 namespace stageid {
 namespace {
@@ -22,7 +23,7 @@ constexpr const char* kRigidBodies =
     "auto, none, full, a rank of 1 or more, suspension, or suspension:F1:F2 (Hz)";
 
 int parse_rank(const char* flag, const std::string& text, const char* expected) {
-  const std::optional<double> number = to_number(text);
+  const std::optional<double> number = parse_number(text);
   if (!number || *number < 1.0 || *number > 1000.0 || std::floor(*number) != *number)
     refuse(flag, text, expected);
   return static_cast<int>(*number);
@@ -33,7 +34,7 @@ std::vector<ModeCandidate> parse_frequencies(const std::string& text) {
   std::string_view rest = text;
   while (!rest.empty()) {
     const std::size_t comma = std::min(rest.find(','), rest.size());
-    const std::optional<double> frequency_hz = to_number(rest.substr(0, comma));
+    const std::optional<double> frequency_hz = parse_number(rest.substr(0, comma));
     if (!frequency_hz || *frequency_hz <= 0.0)
       refuse("--modes", text,
              "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
@@ -51,8 +52,8 @@ ModesRequest parse_modes(const std::string& text) {
   if (text == "auto") return {Kind::search, 0, {}};
   if (text == "none") return {Kind::none, 0, {}};
   if (text.find(',') != std::string::npos) return {Kind::given, 0, parse_frequencies(text)};
-  const std::optional<double> number = to_number(text);
-  if (number && text.find_first_of(".eE") == std::string::npos) {
+  const std::optional<double> number = parse_number(text);
+  if (number && text.find_first_of(".eEdD") == std::string::npos) {
     if (*number < 1.0 || *number > 1000.0) refuse("--modes", text, "1 to 1000 modes");
     return {Kind::count, static_cast<int>(*number), {}};
   }
@@ -88,7 +89,7 @@ void parse_weighting(const std::string& text, FitRequest& request) {
 DelayRequest parse_delay(const std::string& text) {
   if (const auto model = from_word<DelayModel>(text); model && *model != DelayModel::fixed)
     return {*model, 0.0};
-  const std::optional<double> delay_s = to_number(text);
+  const std::optional<double> delay_s = parse_number(text);
   if (!delay_s) refuse("--delay", text, "a number in s, estimate or per_channel");
   return {DelayModel::fixed, *delay_s};
 }
@@ -99,7 +100,7 @@ std::vector<double> parse_suspension(const std::string& text) {
   while (!rest.empty()) {
     const std::size_t colon = rest[0] == ':' ? std::min(rest.find(':', 1), rest.size()) : 0;
     const std::optional<double> frequency_hz =
-        colon > 0 ? to_number(rest.substr(1, colon - 1)) : std::nullopt;
+        colon > 0 ? parse_number(rest.substr(1, colon - 1)) : std::nullopt;
     if (!frequency_hz || *frequency_hz <= 0.0)
       refuse("--rigid-body", text, "suspension, or suspension:F1:F2 with known frequencies in Hz");
     frequencies_hz.push_back(*frequency_hz);
@@ -115,7 +116,7 @@ RigidBodyRequest parse_rigid_body(const std::string& text) {
   if (const auto kind = from_word<Kind>(text); kind && *kind != Kind::by_submodels) return {*kind};
   const std::string nearest =
       nearest_word(text.substr(0, text.find(':')), words_before(Kind::by_submodels));
-  if (!to_number(text) && !nearest.empty())
+  if (!parse_number(text) && !nearest.empty())
     refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
   return {Kind::free, parse_rank("--rigid-body", text, kRigidBodies)};
 }

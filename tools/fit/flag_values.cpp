@@ -3,21 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
-#include <cmath>
 #include <stdexcept>
 
 #include "acquisition/files/key_suggestion.hpp"
 
 namespace stageid {
-
-std::optional<double> to_number(std::string_view text) {
-  double value = 0.0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || stop != text.data() + text.size() || !std::isfinite(value))
-    return std::nullopt;
-  return value;
-}
 
 void refuse(const char* flag, const std::string& given, const std::string& right) {
   throw std::invalid_argument(fmt::format("{}: got '{}'; expected {}", flag, given, right));

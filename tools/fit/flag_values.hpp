@@ -2,15 +2,11 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "excitation/words/words.hpp"
 
 namespace stageid {
-
-/// The whole text as a finite number; empty if it is not one.
-std::optional<double> to_number(std::string_view text);
 
 /// @throws std::invalid_argument "FLAG: 'given'; write RIGHT"
 [[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right);

@@ -74,6 +74,29 @@ std::string why_not_tested(const FrfEstimate& frf) {
              : why;
 }
 
+Json linearity_json(const FrfEstimate& frf) {
+  const NonlinearityTest& test = frf.nonlinearity;
+  if (test.band_hz.rows() == 0) return {{"tested", false}, {"reason", why_not_tested(frf)}};
+  Json bands = Json::array();
+  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
+    const Verdict verdict = least(test.p_value, b);
+    bands.push_back({{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
+                     {"settled", test.settled(b)},
+                     {"tests", test.p_value.rows()},
+                     {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
+                     {"output", frf.outputs.name(verdict.at % frf.n_outputs())},
+                     {"input", frf.inputs.name(verdict.at / frf.n_outputs())},
+                     {"p_value", verdict.p_value},
+                     {"distortion", test.distortion(verdict.at, b)},
+                     {"even", detected_json(test.even, b)},
+                     {"odd", detected_json(test.odd, b)}});
+  }
+  return {{"tested", true},
+          {"nonlinear", test.nonlinear()},
+          {"false_alarm_rate", kNonlinearBelow},
+          {"bands", bands}};
+}
+
 }  // namespace
 
 std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
@@ -100,29 +123,6 @@ std::vector<std::string> linearity_lines(const FrfEstimate& frf) {
   if (unsettled > 0) lines.push_back(unsettled_line(test));
   if (unsettled < static_cast<std::size_t>(test.band_hz.rows())) lines.push_back(conclusion(test));
   return lines;
-}
-
-Json linearity_json(const FrfEstimate& frf) {
-  const NonlinearityTest& test = frf.nonlinearity;
-  if (test.band_hz.rows() == 0) return {{"tested", false}, {"reason", why_not_tested(frf)}};
-  Json bands = Json::array();
-  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
-    const Verdict verdict = least(test.p_value, b);
-    bands.push_back({{"band_hz", {test.band_hz(b, 0), test.band_hz(b, 1)}},
-                     {"settled", test.settled(b)},
-                     {"tests", test.p_value.rows()},
-                     {"nonlinear", (test.p_value.col(b).array() < kNonlinearBelow).count()},
-                     {"output", frf.outputs.name(verdict.at % frf.n_outputs())},
-                     {"input", frf.inputs.name(verdict.at / frf.n_outputs())},
-                     {"p_value", verdict.p_value},
-                     {"distortion", test.distortion(verdict.at, b)},
-                     {"even", detected_json(test.even, b)},
-                     {"odd", detected_json(test.odd, b)}});
-  }
-  return {{"tested", true},
-          {"nonlinear", test.nonlinear()},
-          {"false_alarm_rate", kNonlinearBelow},
-          {"bands", bands}};
 }
 
 std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
@@ -164,33 +164,27 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf) {
   return lines;
 }
 
-Json left_out_json(const FrfEstimate& frf) {
-  Json list = Json::array();
-  for (const LeftOutRealization& one : frf.left_out_realizations)
-    list.push_back({{"realization", one.realization + 1}, {"reason", one.reason}});
-  return list;
-}
-
-Json dropped_json(const FrfEstimate& frf) {
-  Json list = Json::array();
+Json quality_json(const FrfEstimate& frf) {
+  Json json = {{"nonlinearity", linearity_json(frf)},
+               {"dropped_periods", Json::array()},
+               {"replaced_samples", Json::array()},
+               {"left_out_realizations", Json::array()}};
   for (const DroppedPeriod& period : frf.dropped_periods)
-    list.push_back({{"realization", period.realization + 1},
-                    {"experiment", period.experiment + 1},
-                    {"period", period.period + 1},
-                    {"reason", period.reason}});
-  return list;
-}
-
-Json replaced_json(const FrfEstimate& frf) {
-  Json list = Json::array();
+    json["dropped_periods"].push_back({{"realization", period.realization + 1},
+                                       {"experiment", period.experiment + 1},
+                                       {"period", period.period + 1},
+                                       {"reason", period.reason}});
   for (const ReplacedSamples& one : frf.replaced_samples)
-    list.push_back({{"realization", one.realization + 1},
-                    {"experiment", one.experiment + 1},
-                    {"period", one.period + 1},
-                    {"first_sample", one.first + 1},
-                    {"samples", one.samples},
-                    {"reason", one.reason}});
-  return list;
+    json["replaced_samples"].push_back({{"realization", one.realization + 1},
+                                        {"experiment", one.experiment + 1},
+                                        {"period", one.period + 1},
+                                        {"first_sample", one.first + 1},
+                                        {"samples", one.samples},
+                                        {"reason", one.reason}});
+  for (const LeftOutRealization& one : frf.left_out_realizations)
+    json["left_out_realizations"].push_back(
+        {{"realization", one.realization + 1}, {"reason", one.reason}});
+  return json;
 }
 
 }  // namespace stageid

@@ -98,26 +98,13 @@ std::unique_ptr<CanTransport> open_buses(const CanSpec& spec, const CanLayout& l
   return std::make_unique<SocketCan>(interfaces, can_host_identifiers(layout));
 }
 
-/// The stage at the SocketCAN interfaces of its file, with a node that answers.
-/// @throws std::invalid_argument if a bus cannot carry it; @throws StageError if there is no interface, no node, or
-/// another node than described in the file.
-std::unique_ptr<CyclicStage> make_can_stage(const StageConfig& config,
-                                            const CanHostOptions& options) {
+/// The stage at the CAN interfaces of its file, with a node that answers.
+/// @throws StageError if there is no interface, no node, or another node than described in the file.
+template <typename Stage>
+std::unique_ptr<Stage> make_can_stage(const StageConfig& config, const CanLayout& layout,
+                                      const CanHostOptions& options) {
   const CanSpec& spec = config.can.spec;
-  const StageInfo& info = config.spec.info;
-  const CanLayout layout = can_layout(spec, info);
-  require_bus_carries(spec, layout, info.sample_rate_hz);  // before an interface is opened
-  auto stage = std::make_unique<CanStage>(info, spec, open_buses(spec, layout), options);
-  stage->connect();
-  return stage;
-}
-
-std::unique_ptr<ResidentStage> make_can_resident_stage(const StageConfig& config,
-                                                       const CanHostOptions& options) {
-  const CanSpec& spec = config.can.spec;
-  const StageInfo& info = config.spec.info;
-  auto stage = std::make_unique<CanResidentStage>(
-      info, spec, open_buses(spec, can_layout(spec, info)), options);
+  auto stage = std::make_unique<Stage>(config.spec.info, spec, open_buses(spec, layout), options);
   stage->connect();
   return stage;
 }
@@ -234,9 +221,13 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
     case Backend::can: {
       const CanHostOptions options{spec.pace, request.reset_fault,
                                    [] { return interrupt_flag().load(); }};
+      const CanSpec& can = config.stage.can.spec;
+      const CanLayout layout = can_layout(can, spec.info);
       if (config.stage.can.mode == CanMode::resident)
-        return std::make_unique<PlayingStage>(plan, make_can_resident_stage(config.stage, options));
-      return streamed(make_can_stage(config.stage, options));
+        return std::make_unique<PlayingStage>(
+            plan, make_can_stage<CanResidentStage>(config.stage, layout, options));
+      require_bus_carries(can, layout, spec.info.sample_rate_hz);  // before an interface is opened
+      return streamed(make_can_stage<CanStage>(config.stage, layout, options));
     }
     case Backend::modbus:
       return streamed(std::make_unique<ModbusStage>(

@@ -22,28 +22,14 @@ constexpr std::array kCurves = {
 constexpr const char* kModeLine = "lw 0.7 dt (1,2) lc rgb '#606060'";
 constexpr const char* kRing = "pt 6 ps 0.45 * point lw 0.9 lc rgb 'black'";
 
-const char* axis_title(CmifKind kind) {
-  switch (kind) {
-    case CmifKind::response:
-      return "CMIF of G";
-    case CmifKind::accelerance:
-      return "CMIF of ω²G";
-    case CmifKind::whitened:
-      return "CMIF of G relative to noise";
-  }
-  return "";
-}
-
-/// "[(m/(N s²))²]" if all elements have the same unit; whitened curves have none.
-std::string unit_of(const FrfEstimate& frf, CmifKind kind) {
+/// " [(m/(N s²))²]" if all elements have the same unit.
+std::string unit_of(const FrfEstimate& frf) {
   const std::set<std::string> outputs(frf.outputs.units.begin(), frf.outputs.units.end());
   const std::set<std::string> inputs(frf.inputs.units.begin(), frf.inputs.units.end());
-  if (kind == CmifKind::whitened || outputs.size() != 1 || inputs.size() != 1 ||
-      outputs.begin()->empty() || inputs.begin()->empty())
+  if (outputs.size() != 1 || inputs.size() != 1 || outputs.begin()->empty() ||
+      inputs.begin()->empty())
     return "";
-  return kind == CmifKind::accelerance
-             ? fmt::format(" [({}/({} s²))²]", *outputs.begin(), *inputs.begin())
-             : fmt::format(" [({}/{})²]", *outputs.begin(), *inputs.begin());
+  return fmt::format(" [({}/({} s²))²]", *outputs.begin(), *inputs.begin());
 }
 
 /// The line nearest to a frequency, as on the page.
@@ -129,7 +115,7 @@ Picture cmif_picture(const ReportData& data) {
       fmt::format(
           "set xlabel 'Frequency [Hz]' offset 0,0.4\nset ylabel {} noenhanced offset 1,0\n{}plot "
           "{}\n",
-          quoted(axis_title(data.cmif_kind) + unit_of(frf, data.cmif_kind)), lines, drawn) +
+          quoted("CMIF of ω²G" + unit_of(frf)), lines, drawn) +
       legend_row(picture, 0.1, names) + (marks.empty() ? "" : legend_row(picture, 0.28, marks)) +
       "unset multiplot\n";
   return picture;

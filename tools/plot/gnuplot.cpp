@@ -79,26 +79,15 @@ std::string preamble(const Picture& picture, PictureFormat format) {
   return "";
 }
 
-/// Language and time settings of the environment must not affect the picture.
-std::vector<std::string> environment_of_gnuplot() {
-  std::vector<std::string> out = {"LC_ALL=C.UTF-8", "TZ=UTC"};
-  for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
-    const std::string_view text = *entry;
-    if (!text.starts_with("LC_ALL=") && !text.starts_with("TZ=")) out.emplace_back(text);
-  }
-  return out;
-}
-
 std::atomic<pid_t> running_gnuplot = -1;
 
-/// Runs `gnuplot -d script.gp` in the directory, messages into a file. @returns the status of waitpid()
+/// Runs `gnuplot -d script.gp` in the directory, messages into a file. Language and time settings of the environment
+/// must not affect the picture. @returns the status of waitpid()
 int run_gnuplot(const std::filesystem::path& directory) {
-  std::vector<std::string> environment = environment_of_gnuplot();
-  std::vector<char*> environment_pointers;
-  for (std::string& entry : environment) environment_pointers.push_back(entry.data());
-  environment_pointers.push_back(nullptr);
-  std::string words[] = {"gnuplot", "-d", "script.gp"};
-  char* const arguments[] = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  std::string words[] = {"/usr/bin/env", "LC_ALL=C.UTF-8", "TZ=UTC", "gnuplot", "-d", "script.gp"};
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -114,12 +103,10 @@ int run_gnuplot(const std::filesystem::path& directory) {
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
   pid_t child = -1;
-  const int error = ::posix_spawnp(&child, words[0].c_str(), &actions, &attributes, arguments,
-                                   environment_pointers.data());
+  const int error =
+      ::posix_spawn(&child, words[0].c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  if (error == ENOENT)
-    throw FileError("gnuplot: not installed; install the Debian package gnuplot-nox");
   if (error != 0)
     throw FileError(fmt::format("gnuplot: cannot be started: {}", std::strerror(error)));
   running_gnuplot = child;
@@ -127,6 +114,8 @@ int run_gnuplot(const std::filesystem::path& directory) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   running_gnuplot = -1;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 127)  // env did not find it
+    throw FileError("gnuplot: not installed; install the Debian package gnuplot-nox");
   return status;
 }
 

@@ -133,9 +133,9 @@ Json comparison_json(const ReportData& own) {
   for (const ModePair& pair : pair_modes(ours, theirs))
     out["pairs"].push_back(pair_json(pair, own, ours, theirs));
   out["output_mac"] =
-      matrix_json(modal_assurance(output_shapes(ours), output_shapes(theirs)), kMacDigits);
+      matrix_json(modal_assurance(output_shapes(ours), output_shapes(theirs)), rounded_mac);
   out["input_mac"] =
-      matrix_json(modal_assurance(input_shapes(ours), input_shapes(theirs)), kMacDigits);
+      matrix_json(modal_assurance(input_shapes(ours), input_shapes(theirs)), rounded_mac);
   return out;
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "tools/report/report_shapes.hpp"
+
 namespace stageid::report {
 namespace {
 
@@ -12,16 +14,6 @@ Json significant(double value) {
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
   const double rounded = std::round(value * scale) / scale;
   return std::isfinite(rounded) ? Json(rounded) : Json(value);
-}
-
-Json rows_of(const Eigen::MatrixXd& matrix) {
-  Json out = Json::array();
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    Json line = Json::array();
-    for (const double value : matrix.row(row)) line.push_back(significant(value));
-    out.push_back(std::move(line));
-  }
-  return out;
 }
 
 }  // namespace
@@ -38,10 +30,10 @@ Json stabilization_json(const std::vector<StabilizationPole>& poles) {
 Json nonlinearity_json(const NonlinearityTest& test) {
   Json settled = Json::array();
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) settled.push_back(test.settled(b));
-  return {{"bands", rows_of(test.band_hz)},
+  return {{"bands", matrix_json(test.band_hz, significant)},
           {"settled", std::move(settled)},
-          {"p_value", rows_of(test.p_value)},
-          {"distortion", rows_of(test.distortion)},
+          {"p_value", matrix_json(test.p_value, significant)},
+          {"distortion", matrix_json(test.distortion, significant)},
           {"chance", kNonlinearBelow}};
 }
 

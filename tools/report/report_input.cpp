@@ -13,11 +13,11 @@
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
-#include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/file/json_file.hpp"
 #include "frf/file/frf_file.hpp"
+#include "tools/config/stage_config.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/report/report_comparison.hpp"
@@ -140,8 +140,8 @@ void add_summary(ReportData& data, const std::filesystem::path& file,
   if (summary.has("truth")) {
     const JsonNode truth = summary.member("truth");
     for (const JsonNode& mode : truth.elements_of("modes"))
-      data.true_modes.push_back({mode.member("true_frequency_hz").number(),
-                                 mode.member("true_damping_ratio").number(), true});
+      data.true_modes.push_back(
+          {mode.member("true_frequency_hz").number(), mode.member("true_damping_ratio").number()});
     if (const std::optional<double> error = number_in(truth.raw(), "relative_rms_error"))
       data.figures.push_back(
           {"error against the exact plant", fmt::format("{:.3g} %", 100.0 * *error)});
@@ -157,11 +157,11 @@ void add_summary(ReportData& data, const std::filesystem::path& file,
 
 /// A log contains the stage file. That of another version may have unknown keys; the shapes are then shown without
 /// positions.
-StageGeometry geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
+StageInfo geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
   const std::string stage = text_in(metadata, "stage");
   if (stage.empty()) return {};
   try {
-    return stage_geometry(file, stage);
+    return stage_info(file, stage);
   } catch (const FormatError&) {
     return {};
   }
@@ -192,6 +192,20 @@ ReportData read_response(const ReportInput& input) {
   return data;
 }
 
+/// Completes the response data of pages and pictures: FRFs within the band of the model, response and error of the
+/// model on their lines, validation, CMIF curves.
+/// @param data with FRFs, model, its variance and the chosen modes, as far as they exist
+void complete_response(ReportData& data) {
+  keep_fitted_band(data);
+  if (!data.frf) return;
+  if (data.model) {
+    data.model_response = response_like(*data.model, *data.frf);
+    if (data.validation_frf)
+      data.validation = validate(*data.model, *data.validation_frf, distortion_of(*data.model));
+  }
+  data.cmif_curves = cmif(*data.frf, CmifKind::accelerance);
+}
+
 }  // namespace
 
 ReportInput report_input(const std::vector<std::filesystem::path>& files) {
@@ -216,35 +230,17 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
-void complete_response(ReportData& data) {
-  keep_fitted_band(data);
-  if (!data.frf) return;
-  if (data.model) {
-    data.model_response = response_like(*data.model, *data.frf);
-    if (data.validation_frf)
-      data.validation = validate(*data.model, *data.validation_frf, distortion_of(*data.model));
-  }
-  data.cmif_kind = PeakOptions().kind;
-  data.cmif_curves = cmif(*data.frf, data.cmif_kind);
-}
-
 void complete_report(ReportData& data, const ReportInput& input,
                      const nlohmann::ordered_json& summary) {
   complete_response(data);
-  data.version = version();
   data.title = "stageid";
-  if (data.model) {
-    data.cost = data.model->cost_history;
-    data.decisions = decisions_of(*data.model);
-  }
   if (data.frf) {
     add_checks(data);
     add_stabilization(data);
   }
   if (!input.log.empty()) add_log(data, input.log);
-  if (!input.stage.empty())
-    data.geometry = stage_geometry(input.stage, read_whole_file(input.stage));
-  if (!data.geometry.stage.empty()) data.title = data.geometry.stage;
+  if (!input.stage.empty()) data.geometry = stage_info(input.stage, read_whole_file(input.stage));
+  if (!data.geometry.name.empty()) data.title = data.geometry.name;
   if (!summary.is_null()) add_summary(data, input.summary, summary);
 }
 

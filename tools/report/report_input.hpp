@@ -24,12 +24,6 @@ struct ReportInput {
 /// @throws std::invalid_argument for an unsupported file, or two of the same kind.
 ReportInput report_input(const std::vector<std::filesystem::path>& files);
 
-/// Completes the response data of pages and pictures: FRFs within the band of the model, response and error of the
-/// model on their lines, validation, CMIF curves.
-/// @param data with FRFs, model, its variance and the chosen modes, as far as they exist
-/// @throws std::invalid_argument
-void complete_response(ReportData& data);
-
 /// Completes a page: the response, the verdicts on linearity and the health findings in the FRF (computed if it has
 /// none), poles over orders, log, stage and summary.
 /// @param input log and stage are read; the file of the summary is only named in errors

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_text.hpp"
+#include "acquisition/files/version.hpp"
 #include "estimation/model/cmif.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
@@ -17,6 +18,7 @@
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
+#include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 
@@ -132,7 +134,7 @@ void add_response(const ReportData& data, Arrays& arrays) {
     arrays.add("cmif", "f32", encode_float32(data.cmif_curves),
                {{"curves", data.cmif_curves.rows()}});
     if (variance != nullptr)
-      arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, data.cmif_kind, *variance));
+      arrays.add_log_bytes("cmif_deviation", cmif_deviation(frf, CmifKind::accelerance, *variance));
   }
   if (data.model_response.size() == 0) return;
   if (data.model_variance.size() > 0) arrays.add_deviation("model_deviation", data.model_variance);
@@ -204,8 +206,7 @@ Json modes_json(const ReportData& data) {
     Json truth;
     if (row.truth)
       truth = {{"frequency_hz", row.truth->natural_frequency_hz},
-               {"damping_ratio", row.truth->damping_ratio},
-               {"observable", row.truth->observable}};
+               {"damping_ratio", row.truth->damping_ratio}};
     out.push_back({{"frequency_hz", optional_number(row.frequency_hz)},
                    {"frequency_std_hz", optional_number(row.frequency_std_hz)},
                    {"damping_ratio", optional_number(row.damping_ratio)},
@@ -262,7 +263,6 @@ Json provenances_json(const ReportData& data) {
     Json content = provenance(text);
     if (!content.empty()) out.push_back({{"of", of}, {"content", std::move(content)}});
   };
-  add("job", data.provenance_json);
   if (data.frf) add("frequency response", data.frf->provenance_json);
   if (data.validation_frf) add("held-back response", data.validation_frf->provenance_json);
   if (data.model) add("model", data.model->provenance_json);
@@ -290,12 +290,11 @@ PageContent page_content(const ReportData& data) {
   json["verdict"] = {
       {"level", to_string(verdict.level)}, {"text", verdict.text}, {"reasons", verdict.reasons}};
   json["title"] = data.title;
-  json["version"] = data.version;
-  json["decisions"] = data.decisions;
+  json["version"] = version();
+  json["decisions"] = data.model ? decisions_of(*data.model) : std::vector<std::string>();
   json["provenance"] = provenances_json(data);
-  json["cmif_kind"] = to_string(data.cmif_kind);
   json["candidates"] = candidates_json(data.chosen_modes);
-  json["cost"] = data.cost.empty() && data.model ? data.model->cost_history : data.cost;
+  json["cost"] = data.model ? data.model->cost_history : std::vector<double>();
   RunTiming timing;
   for (const LogRun& run : data.runs) timing += run.timing;
   json["timing"] = timing_json(timing);

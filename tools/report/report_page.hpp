@@ -14,7 +14,7 @@
 #include "frf/periods/health_finding.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "frf/response/nonlinearity.hpp"
-#include "tools/config/stage_geometry.hpp"
+#include "hal/stage/stage.hpp"
 
 namespace stageid {
 
@@ -22,8 +22,6 @@ namespace stageid {
 struct TrueMode {
   double natural_frequency_hz = 0.0;
   double damping_ratio = 0.0;
-  /// false: no sensor of the sub-plant observes it, so it need not be found
-  bool observable = true;
 };
 
 /// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
@@ -56,7 +54,6 @@ struct ReportComparison {
 /// Content of the page. Every part may be absent; its section is then omitted.
 struct ReportData {
   std::string title;
-  std::string version;  ///< of the program
 
   std::optional<FrfEstimate> frf;             ///< the fitted response
   std::optional<FrfEstimate> validation_frf;  ///< held back; same channels and lines as frf
@@ -65,10 +62,9 @@ struct ReportData {
   Eigen::MatrixXcd model_response;  ///< (n_y n_u) x N on frf's lines, as measured; 0 x 0: none
   Eigen::MatrixXd model_variance;   ///< same shape, E|dP|^2; 0 x 0: unknown
 
-  StageGeometry geometry;  ///< channels by name; empty: shapes are drawn as bars
+  StageInfo geometry;  ///< name and channels; empty: shapes are drawn as bars
 
-  Eigen::MatrixXd cmif_curves;  ///< min(n_y, n_u) x N on frf's lines, largest first; 0 x 0: none
-  CmifKind cmif_kind = CmifKind::accelerance;
+  Eigen::MatrixXd cmif_curves;  ///< accelerance, min(n_y, n_u) x N, largest first; 0 x 0: none
   std::vector<ModeCandidate> chosen_modes;  ///< start of the fit
   std::vector<TrueMode> true_modes;
   std::vector<StabilizationPole> stabilization;  ///< empty: no diagram
@@ -77,8 +73,6 @@ struct ReportData {
   std::optional<ReportComparison> comparison;
 
   std::optional<Validation> validation;
-  std::vector<double> cost;            ///< one entry per iterate; empty: cost_history of the model
-  std::vector<std::string> decisions;  ///< in order
 
   std::vector<Finding> findings;  ///< of the checks of the data, as `log info --health` orders them
   std::vector<LogRun> runs;       ///< timing and health of the measurement
@@ -90,7 +84,6 @@ struct ReportData {
   std::vector<std::string> doubts;    ///< about the result, besides the findings; one line each
   std::vector<std::string> notes;     ///< about the page itself; one line each
   std::vector<ReportDocument> documents;
-  std::string provenance_json = "{}";  ///< of the job; those of frf and model are shown as well
 };
 
 /// Writes one self-contained page, atomically: no network, no other file. Equal data give equal bytes. All external

@@ -28,17 +28,13 @@ Json pairs(const Eigen::VectorXcd& shape) {
   return out;
 }
 
-Json places(const std::vector<ChannelPlace>& places, const ChannelList& channels) {
+Json places(const std::vector<Channel>& places, const ChannelList& channels) {
   Json out = Json::array();
   for (const std::string& name : channels.names) {
-    const auto place = std::ranges::find(places, name, &ChannelPlace::name);
-    if (place == places.end()) {
-      out.push_back(nullptr);
-      continue;
-    }
-    out.push_back(
-        {{"position_m", std::vector<double>(place->position_m.begin(), place->position_m.end())},
-         {"direction", std::vector<double>(place->direction.begin(), place->direction.end())}});
+    const auto place = std::ranges::find(places, name, &Channel::name);
+    out.push_back(place == places.end()
+                      ? Json()
+                      : Json{{"position_m", place->position_m}, {"direction", place->direction}});
   }
   return out;
 }
@@ -51,11 +47,13 @@ std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model) {
   return modes;
 }
 
-Json matrix_json(const Eigen::MatrixXd& matrix, int digits) {
+Json rounded_mac(double value) { return rounded(value, 4); }
+
+Json matrix_json(const Eigen::MatrixXd& matrix, Json (*rounding)(double)) {
   Json out = Json::array();
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
     Json line = Json::array();
-    for (const double value : matrix.row(row)) line.push_back(rounded(value, digits));
+    for (const double value : matrix.row(row)) line.push_back(rounding(value));
     out.push_back(std::move(line));
   }
   return out;
@@ -74,11 +72,11 @@ Json shapes_json(const AdditiveModel& model) {
   const Eigen::MatrixXcd outputs = output_shapes(modes);
   const Eigen::MatrixXcd inputs = input_shapes(modes);
   return {{"modes", list},
-          {"output_mac", matrix_json(modal_assurance(outputs, outputs), kMacDigits)},
-          {"input_mac", matrix_json(modal_assurance(inputs, inputs), kMacDigits)}};
+          {"output_mac", matrix_json(modal_assurance(outputs, outputs), rounded_mac)},
+          {"input_mac", matrix_json(modal_assurance(inputs, inputs), rounded_mac)}};
 }
 
-Json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
+Json geometry_json(const StageInfo& geometry, const ChannelList& outputs,
                    const ChannelList& inputs) {
   Json out = {{"outputs", places(geometry.sensors, outputs)},
               {"inputs", places(geometry.actuators, inputs)}};

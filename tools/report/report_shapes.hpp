@@ -4,7 +4,7 @@
 
 #include "estimation/modal/modal_form.hpp"
 #include "estimation/model/additive_model.hpp"
-#include "tools/config/stage_geometry.hpp"
+#include "hal/stage/stage.hpp"
 
 namespace stageid::report {
 
@@ -17,12 +17,13 @@ nlohmann::json shapes_json(const AdditiveModel& model);
 
 /// {"outputs": [{position_m, direction} or null], "inputs": [...]} in the order of the channels of the model, by name;
 /// null if no channel has a position.
-nlohmann::json geometry_json(const StageGeometry& geometry, const ChannelList& outputs,
+nlohmann::json geometry_json(const StageInfo& geometry, const ChannelList& outputs,
                              const ChannelList& inputs);
 
-inline constexpr int kMacDigits = 4;
+/// Four decimals of a MAC; null if it is not finite.
+nlohmann::json rounded_mac(double value);
 
-/// Rows of a matrix, rounded to `digits` decimals; values that are not finite become null.
-nlohmann::json matrix_json(const Eigen::MatrixXd& matrix, int digits);
+/// Rows of a matrix, every value as `rounding` gives it.
+nlohmann::json matrix_json(const Eigen::MatrixXd& matrix, nlohmann::json (*rounding)(double));
 
 }  // namespace stageid::report

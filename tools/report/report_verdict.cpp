@@ -36,9 +36,8 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
       reasons.push_back(
           fmt::format("the mode at {:.2f} Hz does not exist in the plant", *row.frequency_hz));
     } else if (!row.frequency_hz) {
-      if (row.truth->observable)
-        reasons.push_back(fmt::format("the true mode at {:.2f} Hz was not identified",
-                                      row.truth->natural_frequency_hz));
+      reasons.push_back(fmt::format("the true mode at {:.2f} Hz was not identified",
+                                    row.truth->natural_frequency_hz));
     } else if (std::abs(row.frequency_deviation().value_or(0.0)) > 3.0 &&
                *row.relative_frequency_error() > 1e-4) {
       reasons.push_back(fmt::format(

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
+
 namespace stageid {
 
 enum class Verbosity : std::uint8_t { quiet, normal, debug };
+template <>
+inline constexpr std::array kWords<Verbosity> = {"quiet", "normal", "debug"};
 
 /// Output of a command: results on stdout (a text, or with --json one object), messages and progress on stderr.
 class Console {

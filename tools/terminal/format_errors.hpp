@@ -37,7 +37,6 @@ class FormatErrorList {
       add(error);
     }
   }
-  bool empty() const noexcept { return errors_.empty(); }
   std::size_t size() const noexcept { return errors_.size(); }
   /// @throws FormatErrors if there are any
   void raise() const {

@@ -52,6 +52,12 @@ class StampedStage final : public CyclicStage {
   StageInfo info_;
 };
 
+SampleStamp unpack_stamp(std::uint64_t word) {
+  SampleStamp stamp{static_cast<std::uint32_t>(word), {}};
+  if (((word >> 32) & 1U) != 0) stamp.node_us = static_cast<std::uint16_t>(word >> 48);
+  return stamp;
+}
+
 struct Row {
   SampleStatus status;
   SampleStamp stamp;

@@ -175,8 +175,10 @@ TEST(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
     expect_spoilt(0, name, "missing", without(name));
   }
   expect_spoilt(0, "/realizations", "contains 2 realizations", without("/realizations/0001"));
-  expect_spoilt(0, "/", "'format' is ''", [](hid_t file) { H5Adelete(file, "format"); });
-  expect_spoilt(0, "/", "'format' is 'other'", [](hid_t f) { set_text(f, "format", "other"); });
+  expect_spoilt(0, "/", "attribute format is missing",
+                [](hid_t file) { H5Adelete(file, "format"); });
+  expect_spoilt(0, "/", "format is 'other'; expected 'stageid-excitation'",
+                [](hid_t f) { set_text(f, "format", "other"); });
   expect_spoilt(0, "/", "this program reads 1",
                 [](hid_t f) { set_integer(f, "format_version", 2); });
   expect_spoilt(0, "/", "'scheme' is 'x'", [](hid_t f) { set_text(f, "scheme", "x"); });

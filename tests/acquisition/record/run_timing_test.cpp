@@ -69,23 +69,23 @@ TEST(RunTiming, AddsUp) {
 }
 
 TEST(RunTiming, ComesBackFromTheLogsText) {
-  SlogRunEnd end;
+  LogRun end;
   for (int i = 0; i < 5000; i += 7) end.timing.execution.add(i * i);
   end.timing.lateness.add(3);
   end.timing.skipped = 11;
-  EXPECT_EQ(parse_run_end(to_json(end)).timing, end.timing);
+  EXPECT_EQ(parse_run_end(run_end_json(end)).timing, end.timing);
 }
 
 TEST(RunTiming, IsNotWrittenInVirtualTimeNorMissedInOldLogs) {
-  const std::string text = to_json(SlogRunEnd{});
+  const std::string text = run_end_json({});
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("timing")));
   EXPECT_TRUE(parse_run_end(text).timing.empty());
 }
 
 TEST(RunTiming, ABinThatIsNoneIsRefused) {
-  SlogRunEnd end;
+  LogRun end;
   end.timing.lateness.add(32);  // bins of 32: [32, 36)
-  std::string text = to_json(end);
+  std::string text = run_end_json(end);
   text.replace(text.find("[32,"), 4, "[33,");
   EXPECT_THAT([&] { parse_run_end(text); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("33 ns")));

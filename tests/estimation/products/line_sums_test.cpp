@@ -98,7 +98,7 @@ TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
   Eigen::MatrixXd together;
   double cost = 0.0;
   ASSERT_TRUE(solve_numerators(fit, groups, together, cost));
-  EXPECT_NEAR(cost, residual(fit, groups, together).cost, 1e-12 * cost);
+  EXPECT_NEAR(cost, residual_cost(fit, groups, together), 1e-12 * cost);
   const std::vector<Eigen::Index> all = groups[0].channels;
   groups.assign(all.size(), groups[0]);
   for (std::size_t c = 0; c < all.size(); ++c) {
@@ -128,7 +128,7 @@ TEST(Numerators, PolishedHaveAllDigitsOfExactData) {
   polish_numerators(fit, groups, B, cost);
   EXPECT_LT(cost, 1e-3 * plain);
   EXPECT_LT(std::sqrt(2.0 * cost / static_cast<double>(fit.channels())), 1e-13);
-  EXPECT_NEAR(residual(fit, groups, B).cost, cost, 0.5 * cost);
+  EXPECT_NEAR(residual_cost(fit, groups, B), cost, 0.5 * cost);
 }
 
 TEST(Numerators, PolishingWhatIsBestChangesNothing) {

@@ -42,7 +42,8 @@ TEST(PartOfData, FewDataAreWhole) {
 }
 
 TEST(PartOfData, ManyLinesAndInputsAreTakenEvenly) {
-  const FrfEstimate frf = frf_of(2, 300, 1100);
+  FrfEstimate frf = frf_of(2, 300, 1100);
+  frf.correlated_lines = 3.0;
   const AdditiveModel model = one_mode(frf);
   const PartOfData part = part_of_data(frf, weighed(frf), model);
   EXPECT_FALSE(part.all);
@@ -59,6 +60,7 @@ TEST(PartOfData, ManyLinesAndInputsAreTakenEvenly) {
     }
   }
   EXPECT_EQ(part.frf.frequency_hz[7], frf.frequency_hz[14]);
+  EXPECT_EQ(part.frf.correlated_lines, 3.0);
 
   const AdditiveModel whole = with_all_inputs(frf, part.model);
   EXPECT_EQ(whole.inputs.names, frf.inputs.names);

@@ -94,7 +94,7 @@ TEST(LikelihoodFit, OperatorIsTheDenseMatrixWithEveryKindOfDelay) {
     const FitProblem problem = test::fit_problem(m.problem, delay);
     const FitParameters beta = test::fit_parameters(m.problem);
     const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-    const Residual E = residual(problem, groups, beta.B);
+    const SplitMatrix E = residual(problem, groups, beta.B);
     const JointEquations equations(problem, weights, beta, groups, E);
     const DenseEquations dense = dense_equations(m.problem, m.frf, m.noise, delay);
     ASSERT_EQ(equations.size(), dense.e.size());

@@ -36,12 +36,12 @@ TEST(CanBusLoad, AWaferStageAsInTheTable) {
   };
   for (const Row& row : {Row{2e6, 637, 51}, Row{5e6, 316, 41}, Row{8e6, 236, 38}}) {
     const CanSpec spec = test::one_bus_spec(info, row.data_bit_rate_hz);
-    const CanBusLoad load = can_bus_load(spec, can_layout(spec, info), 1e3).front();
+    const LinkLoad load = can_bus_load(spec, can_layout(spec, info), 1e3).front();
     EXPECT_NEAR(1e6 * load.cycle_s, row.cycle_us - row.sync_us, 1.0);
     // Ten state frames of 48 bytes a second beside it.
     const double heartbeat = 10.0 * can_fd_frame_time_s(48, 1e6, row.data_bit_rate_hz);
     EXPECT_NEAR(load.load, 1e3 * load.cycle_s + heartbeat, 1e-12);
-    EXPECT_NEAR(load.highest_rate_hz * load.cycle_s + heartbeat, 0.8, 1e-12);
+    EXPECT_NEAR(load.most_hz * load.cycle_s + heartbeat, 0.8, 1e-12);
   }
 }
 

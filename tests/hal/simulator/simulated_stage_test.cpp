@@ -64,7 +64,7 @@ TEST(SimulatedStage, TellsWhatItIs) {
   EXPECT_EQ(stage.info().transport_delay_s, 1.5e-3);
   EXPECT_EQ(stage.info().maximum_rate_hz, 1e3);
   EXPECT_EQ(stage.info().clock, Clock::virtual_time);
-  EXPECT_EQ(stage.modes().size(), 7U);
+  EXPECT_EQ(wafer_stage_modes(spec).size(), 7U);
   spec.pace = 1.0;
   EXPECT_EQ(SimulatedStage(spec).info().clock, Clock::wall);
 }

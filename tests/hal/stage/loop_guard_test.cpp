@@ -169,7 +169,7 @@ TEST(LoopGuard, AWeightThatIsCarriedIsNotAMotion) {
       guard.predict(std::min(1.0, static_cast<double>(n) / kRamp) * load.array());
       kind = guard.inspect(inputs).violation.kind;
     }
-    EXPECT_EQ(kind == LimitKind::none, carried) << to_string(kind);
+    EXPECT_EQ(kind == LimitKind::none, carried) << static_cast<int>(kind);
     if (!carried) continue;
     ASSERT_TRUE(guard.begin_brake());
     Eigen::ArrayXd u(actuators);

@@ -92,7 +92,7 @@ bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threa
     beta = stepped(problem, beta, step);
     for (Eigen::Index c = 0; c < problem.channels(); ++c)
       beta.B.row(c) += (system.channel(c).x - system.channel(c).Z * step).transpose();
-    const double next = residual(problem, evaluate_groups(problem, beta, false), beta.B).cost;
+    const double next = residual_cost(problem, evaluate_groups(problem, beta, false), beta.B);
     if (!std::isfinite(next) || next > 1e12 * wanted) return false;
     if (std::abs(next - cost) < 1e-9 * cost) break;
     cost = next;

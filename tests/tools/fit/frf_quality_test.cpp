@@ -51,7 +51,7 @@ TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
   frf.nonlinearity.settled_p_value[0] = 1e-5;
   EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("not settled")));
   EXPECT_THAT(linearity_lines(frf), Contains(HasSubstr("linearity cannot be tested")));
-  EXPECT_EQ(linearity_json(frf)["bands"][0]["settled"], false);
+  EXPECT_EQ(quality_json(frf)["nonlinearity"]["bands"][0]["settled"], false);
   const std::vector<Finding> found = keep_health(frf, {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].cause, Cause::unsettled);
@@ -121,7 +121,7 @@ TEST(DroppedLines, TellALeftOutRealizationOnceAndNotEachOfItsPeriods) {
       ElementsAre(
           "realization 2 discarded, the others are used: run.slog:/runs/0003: no clean period",
           "realization 1, experiment 3: period 5 discarded: a glitch"));
-  EXPECT_EQ(left_out_json(frf),
+  EXPECT_EQ(quality_json(frf)["left_out_realizations"],
             json({{{"realization", 2}, {"reason", "run.slog:/runs/0003: no clean period"}}}));
   frf.left_out_realizations.clear();
   EXPECT_THAT(dropped_lines(frf), Contains("realization 2, experiment 2: samples 51 ... 56 of "
@@ -135,7 +135,7 @@ TEST(DroppedLines, TellWhichSamplesWereReplaced) {
   EXPECT_THAT(dropped_lines(frf),
               ElementsAre("realization 1, experiment 3: samples 100 ... 105 of period 5 replaced, "
                           "the others are used: a glitch"));
-  EXPECT_EQ(replaced_json(frf).dump(),
+  EXPECT_EQ(quality_json(frf)["replaced_samples"].dump(),
             R"([{"realization":1,"experiment":3,"period":5,"first_sample":100,"samples":6,)"
             R"("reason":"a glitch"}])");
   frf.replaced_samples.resize(13, frf.replaced_samples.front());

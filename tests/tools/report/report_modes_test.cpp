@@ -22,8 +22,8 @@ AdditiveModel model_of(std::vector<Submodel> submodels) {
   return model;
 }
 
-TrueMode truth(double frequency_hz, double damping = 0.01, bool observable = true) {
-  return {.natural_frequency_hz = frequency_hz, .damping_ratio = damping, .observable = observable};
+TrueMode truth(double frequency_hz, double damping = 0.01) {
+  return {.natural_frequency_hz = frequency_hz, .damping_ratio = damping};
 }
 
 TEST(ModeTable, PairsAClosePairInOrder) {

@@ -124,9 +124,8 @@ TEST(Report, LeavesOutWhatIsAbsent) {
   EXPECT_EQ(content(report_page(model))["modes"].size(), 3u);
 }
 
-TEST(Report, TakesTheModelsCostHistoryWhereNoneIsGiven) {
+TEST(Report, ShowsTheModelsCostHistory) {
   ReportData data = small();
-  data.cost.clear();
   data.model->cost_history = {3.0, 2.0, 1.0};
   EXPECT_EQ(content(report_page(data))["cost"], json({3.0, 2.0, 1.0}));
 }
@@ -135,9 +134,9 @@ TEST(Report, NoTextCanLeaveItsPlace) {
   const std::string attack = "</script><script>alert(1)</script><!--\"'&{{js}}";
   const ReportData plain = small();
   ReportData data = plain;
-  data.title = data.version = data.provenance_json = attack;
+  data.title = data.frf->provenance_json = attack;
   data.frf->inputs.names[0] = data.frf->inputs.units[1] = attack;
-  data.decisions = {attack};
+  data.model->provenance_json = json({{"decisions", json::array({attack})}}).dump();
   data.documents = {{attack, attack}};
   data.figures = {{attack, attack}};
   data.steps = {{attack, 1.0, attack}};
@@ -165,7 +164,7 @@ TEST(Report, SurvivesTextThatIsNotUtf8AndNumbersThatAreNone) {
   ReportData data = small();
   data.frf->outputs.names[1] = "z\xff\xfe";
   data.validation->chi_square_per_dof = std::numeric_limits<double>::quiet_NaN();
-  data.cost = {1.0, std::numeric_limits<double>::infinity()};
+  data.model->cost_history = {1.0, std::numeric_limits<double>::infinity()};
   const json got = content(report_page(data));
   EXPECT_EQ(got["frf"]["outputs"][1]["name"], "z\xEF\xBF\xBD\xEF\xBF\xBD");  // U+FFFD
   EXPECT_TRUE(got["validation"]["chi_square_per_dof"].is_null());

@@ -206,9 +206,9 @@ void make_hostile(ReportData& data) {
   data.geometry.actuators[0].name = attack;
   data.validation_frf->inputs = data.frf->inputs;
   data.validation_frf->outputs = data.frf->outputs;
-  data.decisions[0] = attack;
+  data.model->provenance_json = Json({{"decisions", Json::array({attack})}}).dump();
   data.documents.push_back({attack, attack});
-  data.provenance_json = attack;
+  data.frf->provenance_json = attack;
   data.figures.push_back({attack, attack});
   data.doubts.push_back(attack);
   data.notes.push_back(attack);
@@ -217,7 +217,6 @@ void make_hostile(ReportData& data) {
   data.runs[0].started_utc = attack;
   data.model->fit.status = attack;
   data.model->fit.weighting = attack;
-  data.version = attack;
 }
 
 ReportData sample(const std::string& kind) {

@@ -8,30 +8,32 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
+#include "tools/config/stage_config.hpp"
 
 namespace stageid {
 namespace test_report_shapes {
 
 using nlohmann::json;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
-TEST(StageGeometry, IsWhatTheStageFileSays) {
+TEST(StageInfoOfAFile, IsWhatTheStageFileSays) {
   const std::string file = STAGEID_SOURCE_DIR "/configs/stage/wafer_stage.yaml";
-  const StageGeometry geometry = stage_geometry(file, read_whole_file(file));
-  EXPECT_EQ(geometry.stage, "wafer stage");
+  const StageInfo geometry = stage_info(file, read_whole_file(file));
+  EXPECT_EQ(geometry.name, "wafer stage");
   ASSERT_EQ(geometry.actuators.size(), 17u);
   ASSERT_EQ(geometry.sensors.size(), 7u);
   EXPECT_EQ(geometry.actuators[2].name, "z3");
-  EXPECT_EQ(geometry.actuators[2].position_m, Eigen::Vector3d(0.26, -0.21, 0.0));
-  EXPECT_EQ(geometry.actuators[13].direction, Eigen::Vector3d(1.0, 0.0, 0.0));
-  EXPECT_EQ(geometry.sensors[0].position_m, Eigen::Vector3d(-0.255, -0.258, 0.0));
+  EXPECT_THAT(geometry.actuators[2].position_m, ElementsAre(0.26, -0.21, 0.0));
+  EXPECT_THAT(geometry.actuators[13].direction, ElementsAre(1.0, 0.0, 0.0));
+  EXPECT_THAT(geometry.sensors[0].position_m, ElementsAre(-0.255, -0.258, 0.0));
 }
 
-TEST(StageGeometry, RefusesWhatIsNoStageFile) {
+TEST(StageInfoOfAFile, RefusesWhatIsNoStageFile) {
   for (const char* text : {"", "[1, 2", "format: stageid-experiment\n", "format: stageid-stage\n",
                            "format: stageid-stage\nactuators: 3\n"}) {
     try {
-      stage_geometry("a.yaml", text);
+      stage_info("a.yaml", text);
       FAIL() << text;
     } catch (const FormatError& error) {
       EXPECT_THAT(error.what(), HasSubstr("a.yaml")) << text;
@@ -40,8 +42,8 @@ TEST(StageGeometry, RefusesWhatIsNoStageFile) {
 }
 
 TEST(ReportShapes, FindPlacesByName) {
-  StageGeometry geometry;
-  geometry.sensors = {{"b", {1.0, 2.0, 3.0}, {0.0, 1.0, 0.0}}};
+  StageInfo geometry;
+  geometry.sensors = {{"b", "m", {1.0, 2.0, 3.0}, {0.0, 1.0, 0.0}}};
   const ChannelList outputs{.names = {"a", "b"}, .units = {"m", "m"}};
   const ChannelList inputs{.names = {"u"}, .units = {"N"}};
   const json got = report::geometry_json(geometry, outputs, inputs);
@@ -64,8 +66,8 @@ TEST(ReportShapes, ComeByFrequencyHoweverTheModelOrdersThem) {
 
 TEST(ReportShapes, RoundAndLeaveOutWhatIsNoNumber) {
   const Eigen::MatrixXd matrix{{0.123456, -2.0}, {std::numeric_limits<double>::quiet_NaN(), 1e-9}};
-  const json got = report::matrix_json(matrix, 3);
-  EXPECT_EQ(got, json({{0.123, -2.0}, {nullptr, 0.0}}));
+  const json got = report::matrix_json(matrix, report::rounded_mac);
+  EXPECT_EQ(got, json({{0.1235, -2.0}, {nullptr, 0.0}}));
 }
 
 }  // namespace test_report_shapes

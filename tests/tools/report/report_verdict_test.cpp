@@ -92,12 +92,10 @@ TEST(Verdict, LostAndMarkedCyclesAreDoubtedLateOnesAreNot) {
   expect_doubt(data, "incomplete");
 }
 
-TEST(Verdict, AMissingModeIsDoubtedUnlessNoSensorSeesIt) {
+TEST(Verdict, AMissingModeIsDoubted) {
   ReportData data = sound();
   data.true_modes.push_back({.natural_frequency_hz = 5.0, .damping_ratio = 0.01});
   expect_doubt(data, "5.00 Hz was not identified");
-  data.true_modes.back().observable = false;
-  EXPECT_EQ(judge(data).level, Level::good);
 }
 
 TEST(Verdict, AModeThatThePlantDoesNotHaveIsDoubted) {

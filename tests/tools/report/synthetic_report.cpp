@@ -37,12 +37,12 @@ std::pair<double, double> position(Eigen::Index i, Eigen::Index of) {
   return {0.9 * std::cos(turn), 0.8 * std::sin(turn)};
 }
 
-std::vector<ChannelPlace> places(const ChannelList& channels) {
-  std::vector<ChannelPlace> out;
+std::vector<Channel> places(const ChannelList& channels) {
+  std::vector<Channel> out;
   for (const std::string& name : channels.names) {
     const auto [x, y] = position(static_cast<Eigen::Index>(out.size()),
                                  static_cast<Eigen::Index>(channels.names.size()));
-    out.push_back({name, {0.3 * x, 0.3 * y, 0.0}, Eigen::Vector3d::UnitZ()});
+    out.push_back({name, {}, {0.3 * x, 0.3 * y, 0.0}});
   }
   return out;
 }
@@ -75,7 +75,7 @@ AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& 
     double f = 148.0 * std::pow(13.0, static_cast<double>(mode) / std::max(1, size.modes - 1));
     if (mode == 4 || mode == 9) f = truth.back().natural_frequency_hz * 1.008;  // close pairs
     const double zeta = 0.004 + 0.008 * random.uniform();
-    truth.push_back({.natural_frequency_hz = f, .damping_ratio = zeta, .observable = true});
+    truth.push_back({.natural_frequency_hz = f, .damping_ratio = zeta});
     const double omega = 2.0 * pi * f;
     for (Eigen::Index o = 0; o < size.outputs; ++o)
       for (Eigen::Index i = 0; i < size.inputs; ++i) {
@@ -252,9 +252,10 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   Random random(seed);
   ReportData data;
   data.title = "Wafer stage, out of plane";
-  data.version = "0.1.0";
   data.model = synthetic_model(size, data.true_modes, random);
-  data.geometry = {"synthetic stage", places(data.model->inputs), places(data.model->outputs)};
+  data.geometry.name = "synthetic stage";
+  data.geometry.actuators = places(data.model->inputs);
+  data.geometry.sensors = places(data.model->outputs);
   add_measurement(data, size, random);
   data.validation = compare(data);
   add_cmif(data);
@@ -267,8 +268,8 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
     mode.damping_ratio *= 1.0 + 2e-3 * 0.8 * random.normal();
   }
   for (int i = 0; i < 35; ++i)
-    data.cost.push_back(0.51 + 4e3 * std::exp(-0.55 * i) + 0.2 * std::exp(-0.1 * i));
-  data.model->fit = {.cost = data.cost.back(),
+    data.model->cost_history.push_back(0.51 + 4e3 * std::exp(-0.55 * i) + 0.2 * std::exp(-0.1 * i));
+  data.model->fit = {.cost = data.model->cost_history.back(),
                      .weighting = "total_variance",
                      .iterations = 34,
                      .status = "gradient_small",
@@ -276,14 +277,13 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
                      .relative_rms_error = data.validation->relative_rms_error,
                      .band_hz = {data.frf->frequency_hz[0], data.frf->frequency_hz[size.lines - 1]},
                      .seconds = 21.4};
-  data.decisions = {"start: 15 peaks of the CMIF", "delay: 163.0 us from the slope of the phase",
-                    "mode added at 271.3 Hz: BIC falls by 8.1e4",
-                    "mode added at 633.0 Hz: BIC falls by 5.7e4",
-                    "no further mode: best candidate at 1711.9 Hz would raise BIC by 212"};
+  data.model->provenance_json = R"({"decisions": [
+    "start: 15 peaks of the CMIF", "delay: 163.0 us from the slope of the phase",
+    "mode added at 271.3 Hz: BIC falls by 8.1e4", "mode added at 633.0 Hz: BIC falls by 5.7e4",
+    "no further mode: best candidate at 1711.9 Hz would raise BIC by 212"]})";
   data.figures = {{"error against the exact plant", "0.05 %"}};
   data.documents = {{"configs/experiment/wafer_stage_quick.yaml",
                      "realizations: 3\nperiods: 3\nband_hz: [0.25, 2000]\n"}};
-  data.provenance_json = R"({"seed": 1, "config_xxh3": "90ab12cd34ef5678"})";
   return data;
 }
 

@@ -19,7 +19,7 @@ std::string frf_csv(const FrfEstimate& frf);
 bool is_frf_csv(const std::filesystem::path& file);
 
 /// The reverse of frf_csv(). Without the JSON comment, names and units are read from the titles of the columns.
-/// Covariances and provenance are not part of the table.
+/// Covariances and provenance are not part of the table. The result is not yet checked with check().
 /// @throws FileError, FormatError
 FrfEstimate read_frf_csv(const std::filesystem::path& file);
 

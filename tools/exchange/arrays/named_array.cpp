@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 
 namespace stageid {
@@ -69,14 +70,14 @@ const NamedArray& ArrayList::at(const std::string& name) const {
         name.starts_with(variable.name + "/"))
       throw FormatError(file, variable.name,
                         fmt::format("{} cannot be read. {}", variable.what, variable.remedy));
+  throw FormatError(file, "",
+                    fmt::format("has no '{}'; it contains {}", name, listed(names(), 40)));
+}
+
+std::vector<std::string> ArrayList::names() const {
   std::vector<std::string> names;
   for (const NamedArray& array : arrays) names.push_back(array.name);
-  constexpr std::size_t kMostNames = 40;
-  const bool more = names.size() > kMostNames;
-  if (more) names.resize(kMostNames);
-  throw FormatError(file, "",
-                    fmt::format("has no '{}'; it contains {}{}", name, fmt::join(names, ", "),
-                                more ? ", ..." : ""));
+  return names;
 }
 
 NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axes) {
@@ -107,7 +108,7 @@ NamedArray reversed(const NamedArray& array) {
   return permuted(array, axes);
 }
 
-std::vector<double> real_values(const ArrayList& list, const NamedArray& array) {
+const std::vector<double>& real_values(const ArrayList& list, const NamedArray& array) {
   if (array.is_text()) refuse(list, array, "text", "numbers");
   if (array.is_complex()) refuse(list, array, "complex numbers", "real ones");
   return std::get<0>(array.values);
@@ -115,7 +116,7 @@ std::vector<double> real_values(const ArrayList& list, const NamedArray& array) 
 
 std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array) {
   if (array.is_complex()) return std::get<1>(array.values);
-  const std::vector<double> real = real_values(list, array);
+  const std::vector<double>& real = real_values(list, array);
   return {real.begin(), real.end()};
 }
 

@@ -44,6 +44,7 @@ struct ArrayList {
   const NamedArray* find(const std::string& name) const;
   /// @throws FormatError that lists the available names.
   const NamedArray& at(const std::string& name) const;
+  std::vector<std::string> names() const;
 };
 
 /// Axis q of the result is axis `axes[q]` of `array`, e.g. {1, 2, 0} of N x a x b gives a x b x N.
@@ -54,7 +55,7 @@ NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axe
 NamedArray reversed(const NamedArray& array);
 
 /// @throws FormatError naming the file if the array has texts or, for real_values(), complex numbers.
-std::vector<double> real_values(const ArrayList& list, const NamedArray& array);
+const std::vector<double>& real_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array);
 

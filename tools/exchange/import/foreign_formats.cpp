@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -20,17 +21,12 @@ namespace stageid {
 namespace {
 
 [[noreturn]] void ask_for_map(const ArrayList& arrays) {
-  std::string shown;
-  constexpr std::size_t kMost = 6;
-  for (std::size_t k = 0; k < arrays.arrays.size() && k < kMost; ++k)
-    shown += (k == 0 ? "" : ", ") + arrays.arrays[k].name;
   throw FormatError(
       arrays.file, "",
       fmt::format(
-          "the meaning of its {} arrays ({}{}) is unknown; write a map with kind: frf or kind: log "
+          "the meaning of its {} arrays ({}) is unknown; write a map with kind: frf or kind: log "
           "(docs/exchange.md) and pass it with --map; 'stageid import {}' lists the arrays",
-          arrays.arrays.size(), shown, arrays.arrays.size() > kMost ? ", ..." : "",
-          arrays.file.string()));
+          arrays.arrays.size(), listed(arrays.names(), 6), arrays.file.string()));
 }
 
 }  // namespace

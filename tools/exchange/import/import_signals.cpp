@@ -14,12 +14,6 @@
 namespace stageid {
 namespace {
 
-std::vector<std::string> names_in(const ArrayList& arrays) {
-  std::vector<std::string> names;
-  for (const NamedArray& array : arrays.arrays) names.push_back(array.name);
-  return names;
-}
-
 std::string with_slashes(std::string name) {
   if (name.starts_with('/')) name.erase(0, 1);
   return name;
@@ -29,7 +23,7 @@ std::string with_slashes(std::string name) {
 const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const std::string& name,
                            const RunNumbers& wanted) {
   if (!is_pattern(name)) return arrays.at(name);
-  for (const auto& [numbers, found] : matches_of(with_slashes(name), names_in(arrays))) {
+  for (const auto& [numbers, found] : matches_of(with_slashes(name), arrays.names())) {
     // A name with one placeholder is shared by all runs with that number.
     const bool same = (!numbers.realization || numbers.realization == wanted.realization) &&
                       (!numbers.experiment || numbers.experiment == wanted.experiment);
@@ -43,14 +37,6 @@ const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const 
       fmt::format("has no '{}' of{}{}, which '{}' requires. Add it, or correct the pattern in {}",
                   name, number("realization", wanted.realization),
                   number("experiment", wanted.experiment), name, map.file.string()));
-}
-
-const std::vector<double>& reals_of(const ArrayList& arrays, const NamedArray& array) {
-  if (array.is_text() || array.is_complex())
-    throw FormatError(arrays.file, array.name,
-                      fmt::format("contains {}; expected real numbers",
-                                  array.is_text() ? "text" : "complex numbers"));
-  return std::get<0>(array.values);
 }
 
 /// Extent and step of every declared axis.
@@ -84,7 +70,7 @@ SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const
                                   "axes: [sample, channel, run]}}, in their order; allowed are "
                                   "sample, channel, realization, experiment and run",
                                   fmt::join(array.shape, " x "), key, array.name));
-  const std::vector<double>& values = reals_of(arrays, array);
+  const std::vector<double>& values = real_values(arrays, array);
   const bool vector = array.shape.size() < 2 || array.shape[0] == 1;
   const auto rows = static_cast<Eigen::Index>(vector ? values.size() : array.shape[0]);
   if (rows == 0) throw FormatError(arrays.file, array.name, "is empty; expected samples");
@@ -96,7 +82,7 @@ SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
                       const std::vector<std::string>& names, const char* key,
                       const RunPlace& place) {
   if (names.empty()) return plain_samples(arrays, array, key);
-  const std::vector<double>& values = reals_of(arrays, array);
+  const std::vector<double>& values = real_values(arrays, array);
   const std::vector<Axis> axes = axes_of(arrays, array, names);
   Axis sample, channel;
   std::size_t first = 0;
@@ -172,7 +158,7 @@ std::vector<RunNumbers> name_numbers_of(const ArrayList& arrays, const ImportMap
     for (const std::string& name : group->arrays) {
       if (!is_pattern(name)) continue;
       patterns = true;
-      const auto found = matches_of(with_slashes(name), names_in(arrays));
+      const auto found = matches_of(with_slashes(name), arrays.names());
       if (found.empty()) (void)arrays.at(name);  // throws an error that lists the available names
       if (numbers.empty())
         for (const auto& [run, text] : found) numbers.insert(run);

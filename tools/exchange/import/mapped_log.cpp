@@ -18,6 +18,7 @@
 #include "tools/exchange/import/foreign_formats.hpp"
 #include "tools/exchange/import/import_period.hpp"
 #include "tools/exchange/import/import_rate.hpp"
+#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
@@ -155,10 +156,7 @@ class LogImport {
 
 ImportSummary import_mapped_log(const std::vector<ForeignFile>& files, const ImportMap& map,
                                 const std::filesystem::path& output) {
-  const std::string ending = output.extension().string();
-  if (ending != ".slog" && ending != ".h5" && ending != ".hdf5")
-    throw std::invalid_argument(
-        fmt::format("{}: unsupported log format '{}'; use .slog or .h5", output.string(), ending));
+  require_ending(output, "a log", {".slog", ".h5", ".hdf5"});
   LogImport log(map, output);
   for (const ForeignFile& file : files) {
     const ArrayList arrays = read_foreign_arrays(file.path);

@@ -143,6 +143,7 @@ void require_all_of(const Hdf5File& file, const std::string& group, int depth, A
 
 /// The objects among the variables of a version 5 file.
 /// Source: MAT-File Format (MathWorks), array class 17 (opaque): flags, name, "MCOS", class.
+/// @throws FormatError if its last element does not end at the end of the file: libmatio does not detect truncation
 std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
   const std::string content = read_whole_file(path);
   std::vector<UnreadVariable> objects;
@@ -158,8 +159,10 @@ std::vector<UnreadVariable> objects_of_v5(const std::filesystem::path& path) {
                             ? object_of(inflated_begin(element.substr(8)), big_endian)
                             : object_of(element, big_endian);
     if (object) objects.push_back(*object);
-    at += element.size();
+    at += 8 + size;
   }
+  if (at != content.size())
+    throw FormatError(path, "", "unexpected end of file; the file is truncated or damaged");
   return objects;
 }
 
@@ -343,25 +346,6 @@ void require_plausible(const std::filesystem::path& path, const matvar_t& variab
                       "its declared size exceeds the file; the file is damaged");
 }
 
-/// libmatio does not detect a truncated file: it treats the end as that of the last variable. In v5 files, the
-/// elements after the header of 128 bytes, each with type and size first, must end at the end of the file.
-void require_whole(const std::filesystem::path& path, std::uintmax_t file_bytes) {
-  std::ifstream stream(path, std::ios::binary);
-  char head[kHeadBytes] = {};
-  if (!stream.read(head, sizeof(head)) || !std::string_view(head, 10).starts_with("MATLAB 5.0"))
-    return;
-  const bool big_endian = head[126] == 'M';
-  std::uintmax_t at = kHeadBytes;
-  while (at < file_bytes) {
-    char tag[8] = {};
-    stream.seekg(static_cast<std::streamoff>(at));
-    stream.read(tag, sizeof(tag));
-    at += sizeof(tag) + raw_number<std::uint32_t>(tag + 4, big_endian);
-  }
-  if (at != file_bytes)
-    throw FormatError(path, "", "unexpected end of file; the file is truncated or damaged");
-}
-
 /// The default format of Octave's `save` is its own, whatever the name of the file.
 std::string no_matlab_file(const std::filesystem::path& path) {
   char head[20] = {};
@@ -381,7 +365,9 @@ ArrayList read_here(const std::filesystem::path& path) {
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), &Mat_Close);
   if (!file) throw FormatError(path, "", no_matlab_file(path));
   const std::uintmax_t bytes = std::filesystem::file_size(path);
-  require_whole(path, bytes);
+  const bool hdf5 = Mat_GetVersion(file.get()) == MAT_FT_MAT73;
+  std::vector<UnreadVariable> objects;
+  if (!hdf5) objects = objects_of_v5(path);
   ArrayList list{path, {}};
   Reader reader(list);
   while (true) {
@@ -393,10 +379,8 @@ ArrayList read_here(const std::filesystem::path& path) {
       throw FormatError(path, variable->name, "its data cannot be read; the file is damaged");
     reader.read(*variable, variable->name, 0);
   }
-  if (Mat_GetVersion(file.get()) == MAT_FT_MAT73)
-    require_all_of(Hdf5File::open(list.file), "/", 0, list);
-  else
-    for (UnreadVariable& object : objects_of_v5(path)) list.unread.push_back(std::move(object));
+  list.unread.insert(list.unread.end(), objects.begin(), objects.end());
+  if (hdf5) require_all_of(Hdf5File::open(list.file), "/", 0, list);
   if (list.arrays.empty() && list.unread.empty())
     throw FormatError(path, "", "contains no variables; the file is empty or damaged");
   return list;

@@ -1,7 +1,6 @@
 #include "tools/exchange/model/model_export.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,21 +17,10 @@
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/exchange/model/model_script.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
+#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
-
-const std::vector<std::string> kModelEndings = {".json", ".h5",  ".hdf5", ".csv", ".mat",
-                                                ".npz",  ".unv", ".uff",  ".py",  ".m"};
-const std::vector<std::string> kFrfEndings = {".mat", ".npz", ".csv", ".unv", ".uff"};
-
-void require_ending(const std::filesystem::path& file, const std::vector<std::string>& endings,
-                    const char* what) {
-  const std::string ending = file.extension().string();
-  if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return;
-  throw std::invalid_argument(fmt::format("{}: {} cannot be exported as '{}'; use one of {}",
-                                          file.string(), what, ending, fmt::join(endings, ", ")));
-}
 
 void write_arrays(const std::filesystem::path& file, ArrayList list, MatVersion mat_version) {
   list.file = file;
@@ -151,11 +139,8 @@ UffContent uff_of_model(const std::filesystem::path& file, const AdditiveModel& 
 }  // namespace
 
 void require_export_format(const std::filesystem::path& file) {
-  require_ending(file, kModelEndings, "models");
-}
-
-void require_frf_export_format(const std::filesystem::path& file) {
-  require_ending(file, kFrfEndings, "frequency responses");
+  require_ending(file, "a model",
+                 {".json", ".h5", ".hdf5", ".csv", ".mat", ".npz", ".unv", ".uff", ".py", ".m"});
 }
 
 void export_model(const std::filesystem::path& file, const AdditiveModel& model,
@@ -180,7 +165,7 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
 }
 
 void export_frf(const std::filesystem::path& file, const FrfEstimate& frf, MatVersion mat_version) {
-  require_frf_export_format(file);
+  require_ending(file, "a frequency response", {".mat", ".npz", ".csv", ".unv", ".uff"});
   if (is_uff_name(file))
     write_uff(file, uff_of_frf(frf));
   else if (file.extension() == ".csv")

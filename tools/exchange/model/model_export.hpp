@@ -29,8 +29,7 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
 void export_frf(const std::filesystem::path& file, const FrfEstimate& frf,
                 MatVersion mat_version = MatVersion::v5);
 
-/// @throws std::invalid_argument as export_model() and export_frf(), before any work is done.
+/// @throws std::invalid_argument as export_model(), before any work is done.
 void require_export_format(const std::filesystem::path& file);
-void require_frf_export_format(const std::filesystem::path& file);
 
 }  // namespace stageid

@@ -7,7 +7,6 @@
 #include <array>
 #include <complex>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,19 +61,15 @@ struct UffMode {
 
 /// Dataset 164. SI = value of the file / factor.
 struct UffUnits {
-  int code = 1;  ///< 1: SI
-  std::string description = "SI";
   double length = 1.0;
   double force = 1.0;
-  double temperature = 1.0;
-  double temperature_offset = 273.15;
 };
 
 struct UffContent {
   std::string model_name;   ///< dataset 151, record 1
   std::string description;  ///< record 2
   std::string program;      ///< records 3 and 6
-  std::optional<UffUnits> units;
+  UffUnits units;           ///< of a read file; SI is written
   std::vector<UffFunction> functions;
   std::vector<UffMode> modes;
 };

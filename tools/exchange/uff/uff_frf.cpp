@@ -228,8 +228,7 @@ std::map<Channel, const UffFunction*> table_of(const std::filesystem::path& file
                                                const UffContent& content, FrfEstimate& frf,
                                                const std::string& title) {
   std::map<Channel, const UffFunction*> table;
-  const UffUnits units = content.units.value_or(UffUnits{});
-  const bool other_units = units.length != 1.0 || units.force != 1.0;
+  const bool other_units = content.units.length != 1.0 || content.units.force != 1.0;
   const UffFunction* first = nullptr;
   for (const UffFunction& f : content.functions) {
     if (title.empty() ? f.type != 4 : f.id[0] != title) continue;
@@ -294,7 +293,6 @@ UffContent uff_of_frf(const FrfEstimate& frf) {
   content.description = fmt::format("{} {} {} {} {}", kSettings, to_string(frf.hold),
                                     to_string(frf.compensated), frf.sample_rate_hz, frf.delay_s);
   content.program = fmt::format("stageid {}", version());
-  content.units = UffUnits{};
   add_functions(frf, frf.response, "", content);
   content.functions.push_back(frequency_function(frf));
   add_functions(frf, frf.noise_variance, kNoiseVariance, content);
@@ -316,7 +314,7 @@ FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& cont
   frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(), lines);
   frf.response.resize(frf.n_outputs() * frf.n_inputs(), lines);
   for (const auto& [channel, f] : table) {
-    const double scale = scale_to_si(file, *f, content.units.value_or(UffUnits{}));
+    const double scale = scale_to_si(file, *f, content.units);
     frf.response.row(channel.first + frf.n_outputs() * channel.second) =
         scale * Eigen::Map<const Eigen::RowVectorXcd>(f->ordinate.data(), lines);
   }

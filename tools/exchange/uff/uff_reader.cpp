@@ -230,14 +230,10 @@ std::optional<UffMode> read_mode(TextLines& lines) {
 }
 
 UffUnits read_units(TextLines& lines) {
-  Record record(lines, lines.next());
-  UffUnits units;
-  units.code = static_cast<int>(record.integer(10));
-  units.description = record.text(20);
+  Record(lines, lines.next()).integer(10);  // code
   Record factors(lines, lines.next());
-  units.length = factors.number(25);
-  units.force = factors.number(25);
-  units.temperature = factors.number(25);
+  const UffUnits units{factors.number(25), factors.number(25)};
+  factors.number(25);  // of temperature
   if (!(units.length > 0.0) || !(units.force > 0.0)) lines.fail("unit factors must be positive");
   return units;
 }

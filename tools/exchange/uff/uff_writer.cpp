@@ -35,18 +35,11 @@ std::string header_text(const UffContent& content) {
          text_line(content.program) + fmt::format("{:20}\n", "") + kEdgeLine;
 }
 
-std::string units_text(const UffUnits& units) {
-  // D25.17: Fortran's letter for double precision.
-  const auto factor = [](double value) {
-    std::string text = fmt::format("{:25.17E}", value);
-    text[text.find('E')] = 'D';
-    return text;
-  };
-  return kEdgeLine + dataset_line(164) +
-         fmt::format("{:>10}{:<20}{:>10}\n", units.code, units.description, 2) +
-         factor(units.length) + factor(units.force) + factor(units.temperature) + "\n" +
-         factor(units.temperature_offset) + "\n" + kEdgeLine;
-}
+/// SI: factors of length, force and temperature, and the offset of temperatures, as D25.17.
+constexpr const char* kUnits =
+    "         1SI                           2\n"
+    "  1.00000000000000000D+00  1.00000000000000000D+00  1.00000000000000000D+00\n"
+    "  2.73149999999999977D+02\n";
 
 std::string axis_line(const UffAxis& axis) {
   if (axis.unit.size() > 20)
@@ -174,8 +167,7 @@ std::string mode_text(const UffMode& mode) {
 
 void write_uff(const std::filesystem::path& file, const UffContent& content) {
   const bool binary = file.extension() == ".uff";
-  std::string text = header_text(content);
-  if (content.units) text += units_text(*content.units);
+  std::string text = header_text(content) + kEdgeLine + dataset_line(164) + kUnits + kEdgeLine;
   for (const UffFunction& function : content.functions) text += function_text(function, binary);
   for (const UffMode& mode : content.modes) text += mode_text(mode);
   write_text_file(file, text);

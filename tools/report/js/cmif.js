@@ -2,15 +2,10 @@
 
 const cmif = { graph: null };
 
-const cmifNames = {
-  response: 'squared singular values of G',
-  accelerance: 'squared singular values of \u03c9\u00b2G, which removes the slope of the rigid body',
-  whitened: 'squared singular values of G, every channel divided by its standard deviation: the noise floor is 1',
-};
-
 function buildCmif() {
   const curves = content.arrays.cmif.curves;
-  const body = section('cmif', 'CMIF', 'Complex mode indicator function', 'The ' + cmifNames[content.cmif_kind] + '.');
+  const body = section('cmif', 'CMIF', 'Complex mode indicator function',
+    'The squared singular values of \u03c9\u00b2G, which removes the slope of the rigid body.');
   const legend = element('div', { class: 'legend' });
   for (let i = 0; i < curves; ++i) legend.append(element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, 'curve ' + (i + 1)));
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'starting value (' + content.candidates.length + ')'));

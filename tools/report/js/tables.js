@@ -3,7 +3,7 @@
 function buildHead() {
   const head = document.getElementById('head');
   const { verdict, model, validation, frf } = content;
-  head.append(element('p', { class: 'brand' }, 'stageid ' + (content.version || '') + ' \u00b7 report'),
+  head.append(element('p', { class: 'brand' }, 'stageid ' + content.version + ' \u00b7 report'),
     element('h1', null, content.title || 'Report'),
     element('p', { class: 'verdict ' + verdict.level, id: 'verdict' }, element('span', { class: 'sign', 'aria-hidden': 'true' }), verdict.text));
   if (verdict.reasons.length) head.append(element('ul', { class: 'reasons' }, ...verdict.reasons.map((reason) => element('li', null, reason))));
@@ -107,9 +107,7 @@ function shapeCell(row) {
 }
 
 function frequencyCell(row) {
-  if (!isNumber(row.frequency_hz)) {
-    return row.truth && !row.truth.observable ? 'not observable' : 'not identified';
-  }
+  if (!isNumber(row.frequency_hz)) return 'not identified';
   if (!content.frf) return fixed(row.frequency_hz);
   const half = Math.max(0.03, 12 * (row.damping_ratio || 0.01));
   return element('button', {
