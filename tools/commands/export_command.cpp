@@ -75,7 +75,10 @@ void export_from_frf(const ExportFlags& flags) {
         fmt::format("{}: is an HDF5 file, not a model; --frf and --driving-point need a model.json",
                     flags.input.string()));
   require_no_input(flags.output, {flags.input});
-  export_frf(flags.output, read_frf(flags.input), flags.mat_version);
+  const FrfEstimate frf = read_frf(flags.input);
+  require_ending(flags.output, "the frequency response of " + flags.input.string(),
+                 {".mat", ".npz", ".csv", ".unv", ".uff"});
+  export_frf(flags.output, frf, flags.mat_version);
 }
 
 void export_file(const ExportFlags& flags, Console& console) {

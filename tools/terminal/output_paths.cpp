@@ -46,7 +46,7 @@ void require_readable(const std::filesystem::path& file) {
                                 system_reason(errno != 0 ? errno : EISDIR)));
 }
 
-void require_ending(const std::filesystem::path& file, const char* what,
+void require_ending(const std::filesystem::path& file, const std::string& what,
                     const std::vector<std::string>& endings) {
   if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
   throw std::invalid_argument(fmt::format("{}: {} is written as {}; use a name with that ending",

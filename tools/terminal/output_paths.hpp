@@ -24,7 +24,7 @@ void require_readable(const std::filesystem::path& file);
 
 /// Requires a valid extension for this kind of file, because readers depend on it.
 /// @throws std::invalid_argument "FILE: WHAT is written as ENDING, ..."
-void require_ending(const std::filesystem::path& file, const char* what,
+void require_ending(const std::filesystem::path& file, const std::string& what,
                     const std::vector<std::string>& endings);
 
 /// require_ending() for the outputs of `fit` and of `frf`.

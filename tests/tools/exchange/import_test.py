@@ -326,7 +326,7 @@ class Damaged(Case):
         self.refuse("unsupported file type '.doc'", "import", "x.doc", "-o", "n.h5")
         self.refuse("a frequency response is written as .h5", "import", "text.unv", "-o", "n.csv")
         frf = self.frf()
-        self.refuse("n.h5: a frequency response is written as .mat, .npz, .csv", "export", frf, "-o", "n.h5")
+        self.refuse("frf.h5 is written as .mat, .npz, .csv", "export", frf, "-o", "n.h5")
         self.refuse("--mat-version", "export", frf, "-o", "n.mat", "--mat-version", "6")
 
     def test_what_a_universal_file_cannot_hold(self):

@@ -165,7 +165,6 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
 }
 
 void export_frf(const std::filesystem::path& file, const FrfEstimate& frf, MatVersion mat_version) {
-  require_ending(file, "a frequency response", {".mat", ".npz", ".csv", ".unv", ".uff"});
   if (is_uff_name(file))
     write_uff(file, uff_of_frf(frf));
   else if (file.extension() == ".csv")

@@ -25,7 +25,7 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
                   const std::optional<DrivingPoint>& driving_point = {},
                   MatVersion mat_version = MatVersion::v5);
 
-/// .mat, .npz, .csv, .unv, .uff. @throws as export_model().
+/// @pre the ending is .mat, .npz, .csv, .unv or .uff. @throws as export_model().
 void export_frf(const std::filesystem::path& file, const FrfEstimate& frf,
                 MatVersion mat_version = MatVersion::v5);
 
