@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <stdexcept>
 
 #include "acquisition/loop/excited_actuators.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "hal/stage/motion_controller.hpp"
 
@@ -36,8 +36,7 @@ ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) 
         sampled_response(modes, stage.delay_s, info.sample_rate_hz, frequency_hz);
     const Eigen::MatrixXcd K = controller.response(frequency_hz);
     const Eigen::MatrixXcd return_difference = Eigen::MatrixXcd::Identity(n_u, n_u) - K * G;
-    loop.to_u.push_back(
-        return_difference.partialPivLu().solve(selection.cast<std::complex<double>>()));
+    loop.to_u.push_back(solve(return_difference, selection.cast<std::complex<double>>()));
     loop.to_y.push_back(G * loop.to_u.back());
   }
   return loop;

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <complex>
 #include <stdexcept>
 
 #include "acquisition/loop/excited_actuators.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/motion_controller.hpp"
 
 namespace stageid {
@@ -88,8 +88,7 @@ class LoopTransfers {
   /// @returns S on the excited axes
   MatrixXcd add_transfers(Index column, const MatrixXcd& G, const MatrixXcd& K,
                           std::vector<MatrixXcd>& u, std::vector<MatrixXcd>& y) const {
-    const MatrixXcd S_all =
-        (MatrixXcd::Identity(K.rows(), K.rows()) - K * G).partialPivLu().inverse();
+    const MatrixXcd S_all = inverse(MatrixXcd::Identity(K.rows(), K.rows()) - K * G);
     const MatrixXcd S = S_all(Eigen::all, axes_);
     const MatrixXcd Y = G * S;
     for (Index i = 0; i < S.rows(); ++i)
@@ -102,13 +101,13 @@ class LoopTransfers {
   void add_line(Index k, const MatrixXcd& K) {
     const MatrixXcd& G = prior_.response[static_cast<std::size_t>(k)];
     const MatrixXcd S = add_transfers(k, G, K, to_u, to_y);
-    const MatrixXcd inverse = MatrixXcd(S(axes_, Eigen::all)).partialPivLu().inverse();
+    const MatrixXcd from_axes = inverse(S(axes_, Eigen::all));
     double relative = 0.0;
     for (const Index i : outputs_) {
       const double size = G(i, axes_).squaredNorm();
       relative += density(i, k) * grid_.resolution_hz() / size;
     }
-    cost.col(k) = inverse.cwiseAbs2().colwise().sum().transpose() * relative /
+    cost.col(k) = from_axes.cwiseAbs2().colwise().sum().transpose() * relative /
                   static_cast<double>(outputs_.size());
     if (prior_.noise_density.size() > 0) add_noise(k, K, G);
   }
@@ -123,8 +122,7 @@ class LoopTransfers {
     const double from = k == 0 ? 0.0 : 0.5 * (f[k - 1] + f[k]);
     const bool last = k + 1 == grid_.size();
     const double to = last ? 0.5 * grid_.sample_rate_hz() : 0.5 * (f[k] + f[k + 1]);
-    const MatrixXcd S_y =
-        (MatrixXcd::Identity(G.rows(), G.rows()) - G * K).partialPivLu().inverse();
+    const MatrixXcd S_y = inverse(MatrixXcd::Identity(G.rows(), G.rows()) - G * K);
     const Eigen::VectorXd power = 2.0 * (to - from) * prior_.noise_density.col(k);
     const Eigen::VectorXd y = S_y.cwiseAbs2() * power;
     const Eigen::VectorXd u = (K * S_y).cwiseAbs2() * power;

@@ -1,10 +1,10 @@
 #include "estimation/equations/numerators.hpp"
 
-#include <Eigen/QR>
 #include <cmath>
 
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/products/weighted_products.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -221,10 +221,10 @@ void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>&
           root.cwiseProduct(problem.G->row(c).imag().transpose());
       const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
       A *= scale.asDiagonal();
-      const Eigen::HouseholderQR<Eigen::MatrixXd> factor(A);
-      Eigen::VectorXd x = factor.solve(rest);
+      const auto factor = qr(A);
+      Eigen::VectorXd x = least_squares(factor, rest);
       rest -= A * x;
-      const Eigen::VectorXd refinement = factor.solve(rest);
+      const Eigen::VectorXd refinement = least_squares(factor, rest);
       x += refinement;
       rest -= A * refinement;
       polished.row(c) = scale.cwiseProduct(x).transpose();

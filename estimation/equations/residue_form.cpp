@@ -3,9 +3,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 #include <stdexcept>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -32,8 +33,7 @@ Pole pole_of(const Eigen::VectorXd& a) {
 /// Minimizes sum weight |L - phi psi^T|^2 by alternating least squares from the singular vectors.
 void weighted_low_rank(const Eigen::MatrixXcd& L, const Eigen::MatrixXd& weight, Eigen::Index rank,
                        Eigen::MatrixXcd& phi, Eigen::MatrixXcd& psi) {
-  const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(L, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  psi = svd.matrixV().leftCols(rank).conjugate();
+  psi = svd(L, Eigen::ComputeThinU | Eigen::ComputeThinV).matrixV().leftCols(rank).conjugate();
   phi.resize(L.rows(), rank);
   // Rows of x with  L(row, .) = x(row, .) fixed^T.
   const auto solve_rows = [rank](const Eigen::MatrixXcd& data, const Eigen::MatrixXd& w,

@@ -1,7 +1,6 @@
 #include "estimation/equations/sigma_equations.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -9,6 +8,7 @@
 
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/products/fraction_gram.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -29,8 +29,8 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
 void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
   both << R, further;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(both));
-  R = qr.matrixQR().topRows(R.cols()).triangularView<Eigen::Upper>();
+  qr_in_place(both);
+  R = both.topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
 /// The triangle of all triangles stacked, combined in pairs.
@@ -81,7 +81,7 @@ Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::V
   A.block(0, numerators, N, n) = phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
   A.block(N, numerators, N, n) = phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
   A.rightCols(1) << h_re.matrix(), h_im.matrix();
-  const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(A);
+  qr_in_place(A);
   return Eigen::MatrixXd(
       A.block(numerators, numerators, n + 1, n + 1).triangularView<Eigen::Upper>());
 }

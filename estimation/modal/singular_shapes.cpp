@@ -1,6 +1,6 @@
 #include "estimation/modal/singular_shapes.hpp"
 
-#include <Eigen/SVD>
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -21,9 +21,8 @@ auto leading_component(const Shape& shape) {
 template <typename Scalar>
 SingularShapes<Scalar> decompose(
     const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>> svd(
-      matrix, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  SingularShapes<Scalar> out{svd.matrixU(), svd.matrixV().conjugate(), svd.singularValues()};
+  const auto parts = svd(matrix, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  SingularShapes<Scalar> out{parts.matrixU(), parts.matrixV().conjugate(), parts.singularValues()};
   for (Eigen::Index r = 0; r < out.output.cols(); ++r) {
     const Scalar leading = leading_component(out.output.col(r));
     const Scalar turn = conjugate(leading) / std::abs(leading);

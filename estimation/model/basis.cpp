@@ -1,10 +1,10 @@
 #include "estimation/model/basis.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <stdexcept>
 
 #include "estimation/model/partial_fractions.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -42,7 +42,7 @@ std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>&
     companion(0, i) = -a[i] / power;
     if (i + 1 < n) companion(i + 1, i) = 1.0;
   }
-  const Eigen::VectorXcd inverse = companion.eigenvalues();
+  const Eigen::VectorXcd inverse = eigenvalues(companion);
   std::vector<Complex> out;
   for (const Complex x : inverse) out.push_back(1.0 / (x * scale));
   return out;

@@ -1,11 +1,11 @@
 #include "estimation/model/cmif.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/response/dc_line.hpp"
 #include "frf/statistics/order_statistic.hpp"
@@ -44,8 +44,7 @@ Eigen::MatrixXcd wide_response(const FrfEstimate& frf, CmifKind kind, Eigen::Ind
 
 /// Left singular vectors of one line; those of all lines would need as much memory as the response.
 Eigen::MatrixXcd shapes(const FrfEstimate& frf, CmifKind kind, Eigen::Index k) {
-  return Eigen::JacobiSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k), Eigen::ComputeThinU)
-      .matrixU();
+  return svd(wide_response(frf, kind, k), Eigen::ComputeThinU).matrixU();
 }
 
 /// Height of a peak above the higher of the two valleys around it, in dB of power.
@@ -135,10 +134,8 @@ bool above_scatter(const Eigen::RowVectorXd& curve_db, Eigen::Index peak) {
 Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
   Eigen::MatrixXd curves(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
   for_each_line(worker_count(0), frf.lines(), [&](Eigen::Index k) {
-    curves.col(k) = Eigen::JacobiSVD<Eigen::MatrixXcd>(wide_response(frf, kind, k))
-                        .singularValues()
-                        .head(curves.rows())
-                        .cwiseAbs2();
+    curves.col(k) =
+        svd(wide_response(frf, kind, k), 0).singularValues().head(curves.rows()).cwiseAbs2();
   });
   return curves;
 }
@@ -154,11 +151,11 @@ Eigen::MatrixXd cmif_deviation(const FrfEstimate& frf, CmifKind kind,
     const Eigen::MatrixXcd G = weighted_response(frf, kind, k);
     const Eigen::Map<const Eigen::MatrixXd> raw(variance.col(k).data(), G.rows(), G.cols());
     const Eigen::MatrixXd V = raw.cwiseProduct(weights.cwiseAbs2());
-    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(G, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const auto parts = svd(G, Eigen::ComputeThinU | Eigen::ComputeThinV);
     for (Eigen::Index i = 0; i < curves; ++i) {
-      const double s = svd.singularValues()[i];
+      const double s = parts.singularValues()[i];
       const double spread =
-          svd.matrixU().col(i).cwiseAbs2().dot(V * svd.matrixV().col(i).cwiseAbs2());
+          parts.matrixU().col(i).cwiseAbs2().dot(V * parts.matrixV().col(i).cwiseAbs2());
       deviation(i, k) = std::sqrt(2.0 * s * s * spread);
     }
   }

@@ -1,6 +1,6 @@
 #include "estimation/model/pole_set.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 
@@ -43,7 +43,7 @@ Eigen::VectorXcd zeros_of_sum(const PoleSet& poles, const Eigen::VectorXd& c) {
     A(at, at) = p;
     A.row(at++) -= c.transpose();
   }
-  return A.eigenvalues();
+  return eigenvalues(A);
 }
 
 }  // namespace stageid

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -76,9 +77,8 @@ bool is_semidefinite(const Eigen::MatrixXcd& W) {
   const Eigen::ArrayXd diagonal = W.diagonal().real();
   if (diagonal.minCoeff() < 0.0) return false;
   const Eigen::VectorXd scale = (diagonal > 0.0).select(diagonal.rsqrt(), 1.0).matrix();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> eigen(
-      Eigen::MatrixXcd(scale.asDiagonal() * W * scale.asDiagonal()), Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] >= kSemidefinite * std::max(eigen.eigenvalues()[W.rows() - 1], 0.0);
+  const Eigen::VectorXd values = hermitian_eigenvalues(scale.asDiagonal() * W * scale.asDiagonal());
+  return values[0] >= kSemidefinite * std::max(values[W.rows() - 1], 0.0);
 }
 
 }  // namespace

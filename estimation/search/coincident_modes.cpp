@@ -1,8 +1,6 @@
 #include "estimation/search/coincident_modes.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -11,6 +9,7 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/search_constants.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -54,11 +53,10 @@ std::optional<TiedModel> parted(const FrfEstimate& frf, const TiedModel& tied, s
   const Eigen::MatrixXd& upper = fit.model.submodels[i].numerator[0];
   const Eigen::MatrixXd& lower = fit.model.submodels[i + 1].numerator[0];
 
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(upper + lower,
-                                              Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::MatrixXd U = svd.matrixU().leftCols(2);
-  const Eigen::MatrixXd V = svd.matrixV().leftCols(2);
-  const Eigen::Vector2d S = svd.singularValues().head(2);
+  const auto sum = svd(Eigen::MatrixXd(upper + lower), Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::MatrixXd U = sum.matrixU().leftCols(2);
+  const Eigen::MatrixXd V = sum.matrixV().leftCols(2);
+  const Eigen::Vector2d S = sum.singularValues().head(2);
   const Eigen::Matrix2d pencil =
       U.transpose() * (upper - lower) * V * S.cwiseInverse().asDiagonal();
   const Eigen::EigenSolver<Eigen::Matrix2d> eigen(pencil);
@@ -123,13 +121,12 @@ void split_tied(const std::vector<int>& ranks, FitResult& fit) {
       parts.push_back(whole);
       continue;
     }
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(whole.numerator[0],
-                                                Eigen::ComputeThinU | Eigen::ComputeThinV);
-    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(ranks[i], svd.singularValues().size());
+    const auto sum = svd(whole.numerator[0], Eigen::ComputeThinU | Eigen::ComputeThinV);
+    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(ranks[i], sum.singularValues().size());
          ++k) {
       Submodel part = whole;
       part.numerator[0] =
-          svd.singularValues()[k] * svd.matrixU().col(k) * svd.matrixV().col(k).transpose();
+          sum.singularValues()[k] * sum.matrixU().col(k) * sum.matrixV().col(k).transpose();
       part.numerator_std.clear();
       part.residue_rank = 1;
       sources.push_back(i);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -12,6 +11,7 @@
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -87,8 +87,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
       const Eigen::MatrixXd M = group.F.re.transpose() * w.asDiagonal() * group.F.re +
                                 group.F.im.transpose() * w.asDiagonal() * group.F.im;
       const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * M *
-                                                                 scale.asDiagonal());
+      const auto eigen = symmetric_eigen(scale.asDiagonal() * M * scale.asDiagonal());
       const Eigen::VectorXd& values = eigen.eigenvalues();
       if (!(values[0] < weakest * values[values.size() - 1])) continue;
       weakest = values[0] / values[values.size() - 1];

@@ -1,6 +1,5 @@
 #include "estimation/start/residual_modes.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include "estimation/model/basis.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/fit_problem.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -86,8 +86,7 @@ Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model
     columns.col(c).normalize();
   }
   if (columns.cols() == 0) return columns;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(2 * N, columns.cols());
+  return leading_columns(qr(columns), columns.cols());
 }
 
 /// Square root of the mean over channels, each scaled to the same size.

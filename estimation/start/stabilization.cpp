@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 #include <stdexcept>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -88,7 +89,7 @@ Eigen::VectorXcd zeros(const Eigen::VectorXd& d) {
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(n, n);
   companion.row(0) = -d.tail(n).transpose() / d[0];
   companion.diagonal(-1).setOnes();
-  return Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
+  return eigenvalues(companion);
 }
 
 void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& before) {

@@ -1,6 +1,5 @@
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/modal/submodel_residues.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -22,7 +22,7 @@ class ModeResidue {
       : mode_(mode),
         lambda_(described_pole(mode)),
         M_(numerator_at(mode, lambda_) / mode.denominator[2]),
-        svd_(M_, Eigen::ComputeFullU | Eigen::ComputeFullV) {
+        svd_(svd(M_, Eigen::ComputeFullU | Eigen::ComputeFullV)) {
     const ModeShape shape = mode_shape(mode, 0);
     if (!(svd_.singularValues()[0] > 0.0)) return;
     // The shapes are the first singular vectors, rotated by the same phase.

@@ -1,7 +1,6 @@
 #include "estimation/uncertainty/parameter_covariance.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <atomic>
@@ -12,6 +11,7 @@
 
 #include "estimation/model/poles.hpp"
 #include "estimation/products/weighted_products.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -98,7 +98,7 @@ Eigen::MatrixXd nearest_covariance(const Eigen::MatrixXd& C) {
   const Eigen::VectorXd scale = deviation.cwiseInverse();
   const Eigen::MatrixXd scaled =
       scale.asDiagonal() * (0.5 * (C + C.transpose())) * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(scaled);
+  const auto parts = symmetric_eigen(scaled);
   const Eigen::MatrixXd root = deviation.asDiagonal() * parts.eigenvectors() *
                                parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   return root * root.transpose();

@@ -1,12 +1,12 @@
 #include "frf/health/health_measures.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <complex>
 #include <limits>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
@@ -77,7 +77,7 @@ double condition(const Eigen::MatrixXcd& M) {
   const Eigen::VectorXd row_norm = M.rowwise().norm();
   if (!(row_norm.minCoeff() > 0.0)) return std::numeric_limits<double>::infinity();
   const Eigen::VectorXd values =
-      Eigen::JacobiSVD<Eigen::MatrixXcd>(row_norm.cwiseInverse().asDiagonal() * M).singularValues();
+      svd(Eigen::MatrixXcd(row_norm.cwiseInverse().asDiagonal() * M), 0).singularValues();
   return values[0] / values[values.size() - 1];
 }
 

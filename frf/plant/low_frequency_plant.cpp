@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/response/rigid_lines.hpp"
 
 namespace stageid {
@@ -21,9 +22,9 @@ double omega_of(double frequency_hz) { return 2.0 * std::numbers::pi * frequency
 
 /// Projects onto the motions of the channels that are possible for a rigid body.
 MatrixXd onto_range(const MatrixXd& motions) {
-  Eigen::JacobiSVD<MatrixXd> svd(motions, Eigen::ComputeThinU);
-  svd.setThreshold(kSmallestMotion);
-  const MatrixXd U = svd.matrixU().leftCols(svd.rank());
+  Eigen::JacobiSVD<MatrixXd> parts = svd(motions, Eigen::ComputeThinU);
+  parts.setThreshold(kSmallestMotion);
+  const MatrixXd U = parts.matrixU().leftCols(parts.rank());
   return U * U.transpose();
 }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/experiment_noise.hpp"
 
@@ -241,7 +241,7 @@ void PlantAverage::finish_line(FrfEstimate& frf, Eigen::Index k) const {
   const Eigen::Map<const Eigen::MatrixXcd> Z(Z_sum_.col(k).data(), outputs_ + inputs_, inputs_);
   const Eigen::MatrixXcd Y = Z.topRows(outputs_);
   const Eigen::MatrixXcd U = Z.bottomRows(inputs_);
-  unvec(frf.response, k, outputs_) = Y * U.partialPivLu().inverse();
+  unvec(frf.response, k, outputs_) = Y * inverse(U);
 }
 
 }  // namespace stageid

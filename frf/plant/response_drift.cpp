@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/statistics/mean_around.hpp"
 
 namespace stageid {
@@ -67,8 +67,7 @@ MatrixXcd by_pole(const FrfEstimate& frf, Index first, const Eigen::ArrayXd& noi
   for (int pass = 0; pass < 3; ++pass) {  // Sanathanan and Koerner's weights
     MatrixXd powers(kWindow, 3);
     powers << weight, weight.array() * r, weight.array() * r * r;
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(powers);
-    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(kWindow, 3);
+    const MatrixXd Q = leading_columns(pivoted_qr(powers), 3);
     const auto rest = [&](const MatrixXcd& columns) {
       return MatrixXcd(columns - Q * (Q.transpose() * columns));
     };

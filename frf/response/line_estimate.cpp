@@ -1,9 +1,9 @@
 #include "frf/response/line_estimate.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -21,8 +21,7 @@ double one_norm(const Eigen::MatrixXcd& M) {
 double spectral_norm(const Eigen::MatrixXcd& M) {
   const Eigen::MatrixXcd gram =
       M.rows() <= M.cols() ? Eigen::MatrixXcd(M * M.adjoint()) : Eigen::MatrixXcd(M.adjoint() * M);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> eigen(gram, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+  return std::sqrt(std::max(0.0, hermitian_eigenvalues(gram).maxCoeff()));
 }
 
 /// Inverse of a square matrix. Empty if its reciprocal condition number, after scaling the rows to norm one (their
@@ -32,10 +31,10 @@ Eigen::MatrixXcd scaled_inverse(const Eigen::MatrixXcd& M, double smallest) {
   if (!(row_norm.minCoeff() > 0.0)) return {};
   const Eigen::VectorXd scale = row_norm.cwiseInverse();
   const Eigen::MatrixXcd scaled = scale.asDiagonal() * M;
-  const Eigen::MatrixXcd inverse = scaled.partialPivLu().inverse();
-  const double reciprocal_condition = 1.0 / (one_norm(scaled) * one_norm(inverse));
+  const Eigen::MatrixXcd unscaled = inverse(scaled);
+  const double reciprocal_condition = 1.0 / (one_norm(scaled) * one_norm(unscaled));
   if (!(reciprocal_condition >= smallest)) return {};
-  return inverse * scale.asDiagonal();
+  return unscaled * scale.asDiagonal();
 }
 
 /// R^+ with R R^+ = I; empty if the rows of R are linearly dependent.

@@ -1,7 +1,6 @@
 #include "frf/statistics/local_fit.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -9,6 +8,8 @@
 #include <limits>
 #include <utility>
 #include <vector>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -92,7 +93,7 @@ bool wide_enough(const LocalProblem& problem, const Eigen::VectorXcd& d) {
   Eigen::MatrixXcd companion = Eigen::MatrixXcd::Zero(n, n);
   companion.row(0) = -d.transpose();
   for (Eigen::Index i = 1; i < n; ++i) companion(i, i - 1) = 1.0;
-  for (const std::complex<double> inverse : companion.eigenvalues())
+  for (const std::complex<double> inverse : eigenvalues(companion))
     if (std::abs((1.0 / inverse).imag()) < problem.narrowest_pole * distance) return false;
   return true;
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/statistics/order_statistic.hpp"
 #include "frf/wiring/connected_blocks.hpp"
 
@@ -39,7 +40,7 @@ struct Normal {
     v += weight * other.v;
     square += weight * other.square;
   }
-  Eigen::VectorXd solution() const { return M.completeOrthogonalDecomposition().solve(v); }
+  Eigen::VectorXd solution() const { return shortest_least_squares(M, v); }
   double residual(const Eigen::VectorXd& x) const {
     return std::max(0.0, square - 2.0 * x.dot(v) + x.dot(M * x));
   }
@@ -137,11 +138,11 @@ class SkewFit {
       const double distance = (log_omega(k) - middle) / kNear;
       near.col(k) /= 1.0 + distance * distance;
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(near);
+    const auto qr = pivoted_qr(near);
     Index rank = 0;
     while (rank < imaginary.rows() / 2 && std::abs(qr.matrixQR()(rank, rank)) > kLeastDirection)
       ++rank;
-    return qr.householderQ() * Eigen::MatrixXd::Identity(imaginary.rows(), rank);
+    return leading_columns(qr, rank);
   }
 
   /// @param Q directions to project off

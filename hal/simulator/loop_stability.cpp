@@ -1,6 +1,5 @@
 #include "hal/simulator/loop_stability.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/modal_propagator.hpp"
 
 namespace stageid {
@@ -40,9 +40,9 @@ Range range_of(const MatrixXd& m) {
     const double size = scaled.col(i).norm();
     if (size > 0.0) scaled.col(i) /= size;
   }
-  Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled);
+  Eigen::ColPivHouseholderQR<MatrixXd> qr = pivoted_qr(scaled);
   qr.setThreshold(kRankThreshold);
-  out.directions = qr.householderQ() * MatrixXd::Identity(m.rows(), m.isZero(0.0) ? 0 : qr.rank());
+  out.directions = leading_columns(qr, m.isZero(0.0) ? 0 : qr.rank());
   return out;
 }
 
@@ -194,8 +194,7 @@ std::vector<double> test_frequencies(const WaferStageSpec& spec) {
 
 double largest_sensitivity(const MatrixXcd& loop_gain) {
   if (loop_gain.size() == 0) return 1.0;
-  const Eigen::ComplexEigenSolver<MatrixXcd> loci(loop_gain, false);
-  return 1.0 / (loci.eigenvalues().array() + 1.0).abs().minCoeff();
+  return 1.0 / (eigenvalues(loop_gain).array() + 1.0).abs().minCoeff();
 }
 
 bool LoopStability::stable() const noexcept { return !tested || largest_pole <= 1.0 + kRounding; }
@@ -208,13 +207,13 @@ LoopStability loop_stability(const WaferStageSpec& spec) {
   if (loop.states() > kMostStates) return out;
   MatrixXd a = loop.matrix();
   balance(a);
-  const Eigen::EigenSolver<MatrixXd> solver(a, false);
-  if (!a.allFinite() || solver.info() != Eigen::Success) return out;
+  if (!a.allFinite()) return out;
+  const Eigen::VectorXcd poles = eigenvalues(a);
+  if (!poles.allFinite()) return out;
   out.tested = true;
   Index outermost = 0;
-  out.largest_pole = solver.eigenvalues().cwiseAbs().maxCoeff(&outermost);
-  out.pole_hz =
-      std::abs(std::arg(solver.eigenvalues()[outermost])) / kTwoPi * spec.info.sample_rate_hz;
+  out.largest_pole = poles.cwiseAbs().maxCoeff(&outermost);
+  out.pole_hz = std::abs(std::arg(poles[outermost])) / kTwoPi * spec.info.sample_rate_hz;
   const std::vector<PlantMode> modes = wafer_stage_modes(spec);
   for (const double f : test_frequencies(spec)) {
     const double size =

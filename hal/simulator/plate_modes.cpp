@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -108,7 +109,7 @@ void PlateModes::append_class(int parity_x, int parity_y) {
       2.0 * (1.0 - nu) * sx * sy *
           kronecker(of_parity(slope, parity_x), of_parity(slope, parity_y));
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(stiffness);
+  const auto solver = symmetric_eigen(stiffness);
   // One rigid motion (heave and the two tilts) in every class except the doubly odd one.
   const Eigen::Index rigid = (parity_x == 1 && parity_y == 1) ? 0 : 1;
   for (Eigen::Index i = rigid; i < stiffness.rows(); ++i) {

@@ -8,15 +8,13 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "excitation/decompositions/decompositions.hpp"
+
 namespace stageid {
 namespace {
 
 using std::numbers::pi;
 using Jacobian = Eigen::MatrixXd;
-
-Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
-  return matrix.completeOrthogonalDecomposition().pseudoInverse();
-}
 
 // J^+ J projects onto the motions that the channels determine. It leaves an axis's unit vector unchanged if and
 // only if they determine that axis. The row has no mixed units, unlike J^+.
@@ -72,8 +70,7 @@ double lowest_crossover_hz(const MotionController& controller, double sample_rat
     const Eigen::MatrixXcd gain =
         (acceleration_per_n / (omega * omega)).cast<std::complex<double>>() *
         controller.response(f);
-    return Eigen::VectorXd(
-        Eigen::ComplexEigenSolver<Eigen::MatrixXcd>(gain, false).eigenvalues().cwiseAbs());
+    return Eigen::VectorXd(eigenvalues(gain).cwiseAbs());
   };
   const double lowest_hz = 1e-5 * sample_rate_hz;
   const auto closed = (sizes(lowest_hz).array() > 1.0).count();

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <stdexcept>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/controller_sections.hpp"
 
 namespace stageid {
@@ -37,8 +37,7 @@ std::vector<Factor> factors_of(const std::vector<double>& coefficients) {
   companion.diagonal(-1).setOnes();
   for (Index i = 0; i < degree; ++i)
     companion(0, i) = -coefficients[static_cast<std::size_t>(i + 1)] / coefficients.front();
-  const Eigen::VectorXcd roots =
-      Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
+  const Eigen::VectorXcd roots = eigenvalues(companion);
   std::vector<Factor> factors;
   std::vector<double> real;
   for (const std::complex<double>& root : roots) {

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/controller_sections.hpp"
 
 namespace stageid {
@@ -236,8 +236,7 @@ Eigen::MatrixXcd MotionController::response(double frequency_hz) const {
   const Eigen::Index n = state_space_.a.rows();
   if (n == 0) return response;
   const Eigen::MatrixXcd M = Eigen::MatrixXcd::Identity(n, n) / z_inverse - state_space_.a;
-  return response -
-         state_space_.c * M.partialPivLu().solve(state_space_.b.cast<std::complex<double>>());
+  return response - state_space_.c * solve(M, state_space_.b.cast<std::complex<double>>());
 }
 
 ControllerStateSpace MotionController::realization() const {

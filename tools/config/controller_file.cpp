@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <complex>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/config_reader.hpp"
@@ -104,7 +104,7 @@ NominalStage of_state_space(const ControllerFile& f) {
     if (A.rows() > 0) {
       const Eigen::MatrixXcd M =
           variable_of(f, hz) * Eigen::MatrixXcd::Identity(A.rows(), A.rows()) - A;
-      response += C * M.partialPivLu().solve(B.cast<std::complex<double>>());
+      response += C * solve(M, B.cast<std::complex<double>>());
     }
     return Eigen::MatrixXcd(-response);
   };

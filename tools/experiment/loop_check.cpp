@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/loop_stability.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/plant_prior_file.hpp"
@@ -137,9 +137,7 @@ class PriorLoop {
   /// suspension, times PI and lead, which are positive.
   double start_angle(const MatrixXcd& loop_gain, std::complex<double> value) const {
     double expected = 0.0;
-    const Eigen::VectorXcd loci =
-        Eigen::ComplexEigenSolver<MatrixXcd>(loop_gain, false).eigenvalues();
-    for (const std::complex<double>& locus : loci) {
+    for (const std::complex<double>& locus : eigenvalues(loop_gain)) {
       if (std::abs(locus) < kNegligibleGain) continue;
       ++closed_;
       if (locus.real() > 0.0) ++signs_;

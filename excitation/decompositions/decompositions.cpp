@@ -1,0 +1,86 @@
+#include "excitation/decompositions/decompositions.hpp"
+
+#include <Eigen/LU>
+#include <limits>
+
+namespace stageid {
+namespace {
+
+template <typename Solver, typename Matrix>
+Eigen::VectorXcd converged_eigenvalues(const Matrix& m) {
+  const Solver solver(m, false);
+  if (solver.info() == Eigen::Success) return solver.eigenvalues();
+  return Eigen::VectorXcd::Constant(m.rows(), std::numeric_limits<double>::quiet_NaN());
+}
+
+template <typename Decomposition>
+Eigen::MatrixXd leading(const Decomposition& qr, Eigen::Index columns) {
+  return qr.householderQ() * Eigen::MatrixXd::Identity(qr.rows(), columns);
+}
+
+}  // namespace
+
+Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& m) {
+  return converged_eigenvalues<Eigen::EigenSolver<Eigen::MatrixXd>>(m);
+}
+
+Eigen::VectorXcd eigenvalues(const Eigen::MatrixXcd& m) {
+  return converged_eigenvalues<Eigen::ComplexEigenSolver<Eigen::MatrixXcd>>(m);
+}
+
+Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> symmetric_eigen(const Eigen::MatrixXd& m) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(m);
+}
+
+Eigen::VectorXd hermitian_eigenvalues(const Eigen::MatrixXcd& m) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(m, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+Eigen::JacobiSVD<Eigen::MatrixXd> svd(const Eigen::MatrixXd& m, unsigned vectors) {
+  return Eigen::JacobiSVD<Eigen::MatrixXd>(m, vectors);
+}
+
+Eigen::JacobiSVD<Eigen::MatrixXcd> svd(const Eigen::MatrixXcd& m, unsigned vectors) {
+  return Eigen::JacobiSVD<Eigen::MatrixXcd>(m, vectors);
+}
+
+void qr_in_place(Eigen::MatrixXd& m) { Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(m); }
+
+Eigen::HouseholderQR<Eigen::MatrixXd> qr(const Eigen::MatrixXd& m) {
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(m);
+}
+
+Eigen::VectorXd least_squares(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,
+                              const Eigen::VectorXd& b) {
+  return qr.solve(b);
+}
+
+Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_qr(const Eigen::MatrixXd& m) {
+  return Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(m);
+}
+
+Eigen::MatrixXd leading_columns(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,
+                                Eigen::Index columns) {
+  return leading(qr, columns);
+}
+
+Eigen::MatrixXd leading_columns(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr,
+                                Eigen::Index columns) {
+  return leading(qr, columns);
+}
+
+Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& m, const Eigen::VectorXd& b) {
+  return m.completeOrthogonalDecomposition().solve(b);
+}
+
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& m) {
+  return m.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+Eigen::MatrixXcd inverse(const Eigen::MatrixXcd& m) { return m.partialPivLu().inverse(); }
+
+Eigen::MatrixXcd solve(const Eigen::MatrixXcd& m, const Eigen::MatrixXcd& b) {
+  return m.partialPivLu().solve(b);
+}
+
+}  // namespace stageid
