@@ -1,7 +1,6 @@
 #include "estimation/equations/residue_form.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
 #include <stdexcept>
@@ -98,8 +97,7 @@ void ResidueForm::project(const Eigen::VectorXd& a, const Eigen::MatrixXd& B,
     held.row(r) = psi_.row(input);
     free_input_[static_cast<std::size_t>(input)] = -1 - r;
   }
-  const Eigen::MatrixXcd inverse = held.fullPivLu().inverse();
-  psi_ = psi_ * inverse;
+  psi_ = psi_ * inverse(held);
   phi_ = phi_ * held.transpose();
   Eigen::Index place = 0;
   for (Eigen::Index u = 0; u < n_u_; ++u) {

@@ -59,7 +59,7 @@ std::optional<TiedModel> parted(const FrfEstimate& frf, const TiedModel& tied, s
   const Eigen::Vector2d S = sum.singularValues().head(2);
   const Eigen::Matrix2d pencil =
       U.transpose() * (upper - lower) * V * S.cwiseInverse().asDiagonal();
-  const Eigen::EigenSolver<Eigen::Matrix2d> eigen(pencil);
+  const auto eigen = general_eigen(pencil);
   const Eigen::Vector2cd values = eigen.eigenvalues();
   if (!pencil.allFinite() || values[0].imag() != 0.0 || values[0] == values[1]) return std::nullopt;
   const Eigen::Matrix2d T = eigen.eigenvectors().real();

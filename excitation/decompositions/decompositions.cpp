@@ -28,6 +28,10 @@ Eigen::VectorXcd eigenvalues(const Eigen::MatrixXcd& m) {
   return converged_eigenvalues<Eigen::ComplexEigenSolver<Eigen::MatrixXcd>>(m);
 }
 
+Eigen::EigenSolver<Eigen::MatrixXd> general_eigen(const Eigen::MatrixXd& m) {
+  return Eigen::EigenSolver<Eigen::MatrixXd>(m);
+}
+
 Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> symmetric_eigen(const Eigen::MatrixXd& m) {
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(m);
 }
@@ -57,6 +61,11 @@ Eigen::VectorXd least_squares(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,
 
 Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_qr(const Eigen::MatrixXd& m) {
   return Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(m);
+}
+
+Eigen::VectorXd least_squares(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr,
+                              const Eigen::VectorXd& b) {
+  return qr.solve(b);
 }
 
 Eigen::MatrixXd leading_columns(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,

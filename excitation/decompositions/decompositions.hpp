@@ -12,6 +12,9 @@ namespace stageid {
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& m);
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXcd& m);
 
+/// Eigenvalues and eigenvectors of a square matrix, unordered.
+Eigen::EigenSolver<Eigen::MatrixXd> general_eigen(const Eigen::MatrixXd& m);
+
 /// Eigenvalues of a symmetric matrix in increasing order, and its eigenvectors.
 Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> symmetric_eigen(const Eigen::MatrixXd& m);
 
@@ -32,6 +35,8 @@ Eigen::VectorXd least_squares(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,
 
 /// m P = Q R with the largest remaining column first.
 Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted_qr(const Eigen::MatrixXd& m);
+Eigen::VectorXd least_squares(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr,
+                              const Eigen::VectorXd& b);
 
 /// The first columns of Q.
 Eigen::MatrixXd leading_columns(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr,

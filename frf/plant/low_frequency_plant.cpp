@@ -59,7 +59,7 @@ LowFrequencyPlant::LowFrequencyPlant(const FrfEstimate& frf, double delay_s,
       w[k] = variance > 0.0 && std::isfinite(variance) ? 1.0 / std::sqrt(variance) : 0.0;
     }
     const Eigen::VectorXd target = w.cwiseProduct(G.row(c).real().transpose());
-    terms_.col(c).head(terms) = (w.asDiagonal() * X).colPivHouseholderQr().solve(target);
+    terms_.col(c).head(terms) = least_squares(pivoted_qr(w.asDiagonal() * X), target);
   }
   const Eigen::VectorXd constant = terms_.row(0);
   const MatrixXd B = onto_range(output_motions) *

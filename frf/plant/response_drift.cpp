@@ -83,7 +83,7 @@ MatrixXcd by_pole(const FrfEstimate& frf, Index first, const Eigen::ArrayXd& noi
     plain.col(1) = r.matrix().cast<std::complex<double>>();
     plain.col(2) = r.square().matrix().cast<std::complex<double>>();
     const MatrixXcd W = weight.cast<std::complex<double>>().asDiagonal() * plain;
-    N = (W.adjoint() * W).ldlt().solve(W.adjoint() * (weight.asDiagonal() * left));
+    N = solve(W.adjoint() * W, W.adjoint() * (weight.asDiagonal() * left));
   }
   if (std::abs(pole.real()) > 1.0 || std::abs(pole.imag()) > 1.0) return {};
   const Eigen::RowVectorXcd at_pole = N.row(0) + pole * N.row(1) + pole * pole * N.row(2);

@@ -40,7 +40,7 @@ Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& o
 }
 
 LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
-    : period_s_(1.0 / info.sample_rate_hz), stuck_sensor_s_(limits.stuck_sensor_s) {
+    : period_s_(1.0 / info.sample_rate_hz) {
   const auto sensors = static_cast<Eigen::Index>(info.sensors.size());
   const auto actuators = static_cast<Eigen::Index>(info.actuators.size());
   const RigidMotion& motion = limits.motion;

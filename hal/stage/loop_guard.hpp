@@ -114,7 +114,6 @@ class LoopGuard {
   double brake_rate_rad_s_ = 0.0;
   std::uint64_t brake_samples_ = std::numeric_limits<std::uint64_t>::max();
   std::uint32_t repeats_allowed_ = 0;  // of a sensor's value; 0: unlimited
-  double stuck_sensor_s_ = 0.0;
   Eigen::ArrayXd window_m_;
   Eigen::ArrayXd hard_window_m_;
   Eigen::ArrayXd deviation_m_;

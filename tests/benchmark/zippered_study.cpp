@@ -17,7 +17,6 @@
 //   resonances and between them.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -25,6 +24,7 @@
 #include <string_view>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/health/estimate_check.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
@@ -90,7 +90,7 @@ SampledPlant random_plant(int outputs, int inputs, std::uint64_t seed) {
     const SampledPlant plant =
         stageid::test::sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
     const Eigen::MatrixXd closed = plant.A - plant.B * plant.K * plant.C;
-    if (closed.eigenvalues().cwiseAbs().maxCoeff() < 0.995) return plant;
+    if (eigenvalues(closed).cwiseAbs().maxCoeff() < 0.995) return plant;
   }
 }
 

@@ -4,13 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/search/fit_additive_model.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
@@ -101,7 +101,7 @@ TEST(ResidueForm, RefusesARankThatHasNoForm) {
 // Fits -------------------------------------------------------------------------------------------
 
 double second_singular_value(const Eigen::MatrixXd& B, Eigen::Index rank) {
-  const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXd>(B).singularValues();
+  const Eigen::VectorXd values = svd(B, 0).singularValues();
   return values[rank] / values[0];
 }
 

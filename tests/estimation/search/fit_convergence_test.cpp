@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "estimation/search/fit_additive_model.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
@@ -124,8 +125,8 @@ TEST(FitConvergence, TheConvexStartIsTheWeightedLeastSquaresSolution) {
         data[N + k] = root * problem.G(c, k).imag();
       }
       const Eigen::VectorXd scale = columns.colwise().norm().cwiseInverse();
-      const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns * scale.asDiagonal());
-      const Eigen::VectorXd B = scale.cwiseProduct(qr.solve(data));
+      const auto qr = pivoted_qr(columns * scale.asDiagonal());
+      const Eigen::VectorXd B = scale.cwiseProduct(least_squares(qr, data));
       cost += (data - columns * B).squaredNorm() / (2.0 * static_cast<double>(N));
       const Eigen::VectorXd pivots = qr.matrixR().diagonal().cwiseAbs();
       const double condition = pivots.maxCoeff() / pivots.minCoeff();

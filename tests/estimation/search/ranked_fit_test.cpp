@@ -5,12 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "estimation/search/automatic_fit.hpp"
 #include "estimation/search/coincident_modes.hpp"
 #include "estimation/search/fit_additive_model.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
@@ -66,8 +66,7 @@ class CoincidentModes : public testing::Test {
   }
 
   static double second_share(const Submodel& s) {
-    const Eigen::VectorXd values =
-        Eigen::JacobiSVD<Eigen::MatrixXd>(s.numerator[0]).singularValues();
+    const Eigen::VectorXd values = svd(s.numerator[0], 0).singularValues();
     return values[1] / values[0];
   }
 

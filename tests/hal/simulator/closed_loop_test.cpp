@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "tests/hal/simulator/closed_loop_model.hpp"
@@ -51,7 +52,7 @@ TEST(ClosedLoop, SimulationFollowsTheModelOfTheWholeLoop) {
 TEST(ClosedLoop, ForgetsItsStartWithinTheTransientPeriod) {
   const WaferStageSpec spec = test::silent_wafer_stage_spec();
   const test::ClosedLoopModel model = test::closed_loop_model(spec);
-  const double radius = model.a.eigenvalues().cwiseAbs().maxCoeff();
+  const double radius = eigenvalues(model.a).cwiseAbs().maxCoeff();
   const double slowest = std::log(radius) * spec.info.sample_rate_hz;
   RecordProperty("slowest_pole_real_part_per_s", std::to_string(slowest));
   EXPECT_LT(slowest, -std::log(1e6) / 4.0);
@@ -74,7 +75,7 @@ TEST(ClosedLoop, HasASensitivityPeakBelowTwoAndAHalf) {
     const Eigen::MatrixXcd G = sampled_response(modes, spec.delay_s, 1e4, f);
     const Eigen::MatrixXcd loop = Eigen::MatrixXcd::Identity(7, 7) - G * controller.response(f);
     // sigma_max(S) = 1 / sigma_min(I - G K)
-    peak = std::max(peak, 1.0 / loop.jacobiSvd().singularValues().minCoeff());
+    peak = std::max(peak, 1.0 / svd(loop, 0).singularValues().minCoeff());
   }
   RecordProperty("sensitivity_peak", std::to_string(peak));
   EXPECT_LT(peak, 2.5);
@@ -89,8 +90,7 @@ TEST(ClosedLoop, CrossesOverBetweenThirtyAndSixtyHertzOutOfPlane) {
     const Eigen::MatrixXcd G = sampled_response(modes, spec.delay_s, 1e4, f);
     const Eigen::MatrixXcd L = spec.controller.sensor_decoupling * G * controller.response(f);
     // T_y G K = -(T_y G T_u) C T_y: back to the axis through the pseudo-inverse of T_y.
-    const Eigen::MatrixXd back =
-        spec.controller.sensor_decoupling.completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::MatrixXd back = pseudo_inverse(spec.controller.sensor_decoupling);
     return std::abs((L * back)(axis, axis));
   };
   for (const Eigen::Index axis : {2, 3, 4}) {

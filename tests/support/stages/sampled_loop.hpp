@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <cmath>
 #include <complex>
 #include <cstdint>
@@ -10,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/logs/memory_log.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
@@ -28,8 +28,7 @@ struct SampledPlant {
     const std::complex<double> z = std::polar(1.0, omega_rad_s / sample_rate_hz);
     const Eigen::MatrixXcd pencil =
         z * Eigen::MatrixXcd::Identity(A.rows(), A.cols()) - A.cast<std::complex<double>>();
-    return C.cast<std::complex<double>>() *
-           pencil.partialPivLu().solve(B.cast<std::complex<double>>());
+    return C.cast<std::complex<double>>() * solve(pencil, B.cast<std::complex<double>>());
   }
 };
 

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <numbers>
 
 #include "estimation/modal/sampled_state_space.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid::test {
 
@@ -12,7 +11,7 @@ namespace stageid::test {
 inline Eigen::VectorXcd transfer(const StateSpace& system, std::complex<double> x) {
   const Eigen::MatrixXcd left =
       x * Eigen::MatrixXcd::Identity(system.order(), system.order()) - system.A;
-  const Eigen::MatrixXcd states = left.partialPivLu().solve(system.B.cast<std::complex<double>>());
+  const Eigen::MatrixXcd states = solve(left, system.B.cast<std::complex<double>>());
   return (system.C * states + system.D).reshaped();
 }
 
@@ -48,7 +47,7 @@ inline double controllability(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B
   Eigen::MatrixXd power = B;
   for (Eigen::Index k = 0; k < A.rows(); ++k, power = scaled * power)
     all.middleCols(k * B.cols(), B.cols()) = power;
-  const Eigen::VectorXd values = all.jacobiSvd().singularValues();
+  const Eigen::VectorXd values = svd(all, 0).singularValues();
   return values.tail(1).value() / values[0];
 }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
@@ -112,7 +112,7 @@ int VariedPlant::modes() const {
   int modes = 0;
   for (const Submodel& s : truth.submodels)
     if (s.is_mode() && s.natural_frequency_hz() > frf.frequency_hz[0])
-      modes += static_cast<int>(s.numerator[0].colPivHouseholderQr().rank());
+      modes += static_cast<int>(pivoted_qr(s.numerator[0]).rank());
   return modes;
 }
 

@@ -2,13 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cstdlib>
 #include <map>
 #include <sstream>
 
 #include "acquisition/files/file_error.hpp"
 #include "estimation/modal/validation.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
@@ -143,8 +143,7 @@ TEST_F(Plot, TheModeIndicatorHasItsCurvesAndAMarkForEveryMode) {
   ASSERT_EQ(curves.size(), static_cast<std::size_t>(n) + 1);
   for (const Eigen::Index k : {0, 10, 100}) {  // largest first: of omega^2 G, by its own SVD
     const double omega = file.omega_rad_s()[k];
-    const Eigen::VectorXd s =
-        Eigen::JacobiSVD<Eigen::MatrixXcd>(omega * omega * file.at(k)).singularValues();
+    const Eigen::VectorXd s = svd(Eigen::MatrixXcd(omega * omega * file.at(k)), 0).singularValues();
     for (Eigen::Index i = 0; i < n; ++i)
       EXPECT_NEAR(curves.at("curve_" + std::to_string(i + 1))[static_cast<std::size_t>(k)],
                   s[i] * s[i], 1e-10 * s[0] * s[0]);

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/tools/report/synthetic_random.hpp"
 
 namespace stageid::test {
@@ -185,8 +185,7 @@ void add_cmif(ReportData& data) {
     const double scale = std::pow(2.0 * pi * frf.frequency_hz[k], 4);
     const Eigen::MatrixXcd square = g.rows() <= g.cols() ? Eigen::MatrixXcd(g * g.adjoint())
                                                          : Eigen::MatrixXcd(g.adjoint() * g);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> eigen(square, Eigen::EigenvaluesOnly);
-    data.cmif_curves.col(k) = (scale * eigen.eigenvalues().reverse()).cwiseMax(1e-30);
+    data.cmif_curves.col(k) = (scale * hermitian_eigenvalues(square).reverse()).cwiseMax(1e-30);
   }
   int curve = 1;
   for (const TrueMode& mode : data.true_modes) {
