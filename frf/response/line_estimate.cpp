@@ -31,10 +31,10 @@ Eigen::MatrixXcd scaled_inverse(const Eigen::MatrixXcd& M, double smallest) {
   if (!(row_norm.minCoeff() > 0.0)) return {};
   const Eigen::VectorXd scale = row_norm.cwiseInverse();
   const Eigen::MatrixXcd scaled = scale.asDiagonal() * M;
-  const Eigen::MatrixXcd unscaled = inverse(scaled);
-  const double reciprocal_condition = 1.0 / (one_norm(scaled) * one_norm(unscaled));
+  const Eigen::MatrixXcd inverse_scaled = inverse(scaled);
+  const double reciprocal_condition = 1.0 / (one_norm(scaled) * one_norm(inverse_scaled));
   if (!(reciprocal_condition >= smallest)) return {};
-  return unscaled * scale.asDiagonal();
+  return inverse_scaled * scale.asDiagonal();
 }
 
 /// R^+ with R R^+ = I; empty if the rows of R are linearly dependent.

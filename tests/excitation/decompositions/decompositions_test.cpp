@@ -41,6 +41,14 @@ TEST(Decompositions, EigenvaluesThatDoNotConvergeAreNaN) {
   EXPECT_TRUE(eigenvalues(m).array().isNaN().all());
 }
 
+TEST(Decompositions, EigenvectorsBelongToTheirEigenvalues) {
+  const MatrixXd m = companion();
+  const auto eigen = general_eigen(m);
+  const MatrixXcd V = eigen.eigenvectors();
+  EXPECT_TRUE((m * V).isApprox(V * eigen.eigenvalues().asDiagonal(), 1e-12));
+  expect_roots(eigen.eigenvalues());
+}
+
 TEST(Decompositions, SymmetricEigenvaluesIncrease) {
   MatrixXd m(2, 2);
   m << 2.0, 1.0, 1.0, 2.0;
@@ -76,6 +84,7 @@ TEST(Decompositions, LeastSquaresByQr) {
   const VectorXd b = VectorXd::Random(9);
   const VectorXd normal = (m.transpose() * m).ldlt().solve(m.transpose() * b);
   EXPECT_TRUE(least_squares(qr(m), b).isApprox(normal, 1e-10));
+  EXPECT_TRUE(least_squares(pivoted_qr(m), b).isApprox(normal, 1e-10));
   EXPECT_TRUE(shortest_least_squares(m, b).isApprox(normal, 1e-10));
   EXPECT_TRUE((pseudo_inverse(m) * b).isApprox(normal, 1e-10));
   for (const MatrixXd& Q : {leading_columns(qr(m), 3), leading_columns(pivoted_qr(m), 3)}) {
