@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/factored_equations.hpp"
 #include "estimation/products/weighted_products.hpp"
-#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -115,10 +115,10 @@ std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, E
   return out;
 }
 
-/// A block's numerators, members x n_f, and its sum W |E|^2; false if they are not determined.
+/// A block's numerators, members x n_f, and its sum W |E|^2; false if the sums have too few digits.
 ///
-/// The first solution is refined with its residual. The refinement d lowers the squares by exactly FE . d,
-/// because they are quadratic; they are summed again only if that is a large part of them.
+/// The first solution is refined with its residual. The refinement d lowers the squares by exactly FE . d, because they
+/// are quadratic. If that is a visible part of them, the sums have lost the digits that the residual consists of.
 bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
                  const TileRange& block, Eigen::MatrixXd& B, double& squares) {
   const NumeratorSums gram = gram_sums(problem, group, pairs, block);
@@ -136,9 +136,8 @@ bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairR
   const Eigen::MatrixXd refinement = solve(rest.FE);
   B += refinement;
   const double gain = refinement.cwiseProduct(rest.FE.transpose()).sum();
-  const bool slight = std::abs(gain) < kSlightGain * rest.squares;
-  squares = slight ? rest.squares - gain : residual_sums(problem, group, block, B).squares;
-  return true;
+  squares = rest.squares - gain;
+  return std::abs(gain) < kSlightGain * rest.squares;
 }
 
 /// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M. C_i is the block of M^-1 of the
@@ -188,13 +187,16 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
 }  // namespace
 
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, double& cost) {
+                      Eigen::MatrixXd& B, double& cost, bool& factored) {
   B.setZero(problem.channels(), problem.functions());
   double sum = 0.0;
   Eigen::MatrixXd of_block;
   const auto solve = [&](const auto& group, const auto& pairs, const auto& block) {
     double squares = 0.0;
-    if (!solve_block(problem, group, pairs, block, of_block, squares)) return false;
+    if (factored || !solve_block(problem, group, pairs, block, of_block, squares)) {
+      factored = true;
+      if (!factored_numerators(problem, group, block, of_block, squares)) return false;
+    }
     sum += squares;
     for (Eigen::Index r = 0; r < block.members; ++r)
       B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
@@ -205,35 +207,10 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
   return std::isfinite(cost);
 }
 
-void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                       Eigen::MatrixXd& B, double& cost) {
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(problem.channels());
-  Eigen::MatrixXd polished = B;
-  for (const BasisGroup& group : groups)
-    for_each_task(problem.threads, static_cast<int>(group.channels.size()), [&](int member) {
-      const Eigen::Index c = group.channels[static_cast<std::size_t>(member)];
-      const Eigen::Index N = problem.size();
-      const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
-      Eigen::MatrixXd A(2 * N, problem.functions());
-      A << root.asDiagonal() * group.F.re, root.asDiagonal() * group.F.im;
-      Eigen::VectorXd rest(2 * N);
-      rest << root.cwiseProduct(problem.G->row(c).real().transpose()),
-          root.cwiseProduct(problem.G->row(c).imag().transpose());
-      const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-      A *= scale.asDiagonal();
-      const auto factor = qr(A);
-      Eigen::VectorXd x = least_squares(factor, rest);
-      rest -= A * x;
-      const Eigen::VectorXd refinement = least_squares(factor, rest);
-      x += refinement;
-      rest -= A * refinement;
-      polished.row(c) = scale.cwiseProduct(x).transpose();
-      squares[c] = rest.squaredNorm();
-    });
-  const double polished_cost = squares.sum() / (2.0 * static_cast<double>(problem.size()));
-  if (!(polished_cost < cost)) return;
-  B = std::move(polished);
-  cost = polished_cost;
+bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                      Eigen::MatrixXd& B, double& cost) {
+  bool factored = false;
+  return solve_numerators(problem, groups, B, cost, factored);
 }
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,

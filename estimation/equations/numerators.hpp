@@ -7,15 +7,14 @@
 namespace stageid {
 
 /// Solves the convex problem, numerators for fixed denominators, per channel, by normal equations scaled to unit
-/// diagonal and one step of refinement. Also returns the cost. `B` is overwritten.
+/// diagonal and one step of refinement; by orthogonal factors where the refinement shows that products have too few
+/// digits, as for nearly exact data or modes that cancel each other. Also returns the cost. `B` is overwritten.
+/// @param factored true: all by factors, which takes several times longer; set if some were needed
 /// @returns false if the equations of a channel are singular to rounding.
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+                      Eigen::MatrixXd& B, double& cost, bool& factored);
+bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                       Eigen::MatrixXd& B, double& cost);
-
-/// The same by orthogonal factors instead of normal equations, which lose half the digits; for nearly exact data. `B`
-/// and `cost` change only if the cost falls. Takes tens of times longer with many functions.
-void polish_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                       Eigen::MatrixXd& B, double& cost);
 
 /// Rise of sum W |E|^2 if the numerators of a submodel were removed and the others re-solved; one entry per submodel.
 /// @pre `B` solves the convex problem.

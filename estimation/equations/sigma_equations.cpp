@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimation/equations/triangles.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/products/fraction_gram.hpp"
 #include "excitation/decompositions/decompositions.hpp"
@@ -23,27 +24,6 @@ constexpr double kShift = 1e-13;  // makes Gram matrices of unit columns factori
 
 Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
   return diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-}
-
-/// The triangle R of the stacked matrix [R; further] = Q R.
-void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
-  Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
-  both << R, further;
-  qr_in_place(both);
-  R = both.topRows(R.cols()).triangularView<Eigen::Upper>();
-}
-
-/// The triangle of all triangles stacked, combined in pairs.
-Eigen::MatrixXd combined(std::vector<Eigen::MatrixXd> triangles, int threads) {
-  while (triangles.size() > 1) {
-    const std::size_t pairs = triangles.size() / 2;
-    for_each_task(threads, static_cast<int>(pairs), [&](int pair) {
-      const auto p = static_cast<std::size_t>(pair);
-      append(triangles[p], triangles[triangles.size() - 1 - p]);
-    });
-    triangles.resize(triangles.size() - pairs);
-  }
-  return std::move(triangles.front());
 }
 
 /// Fraction of the path up to each line: kPathShare by the change of log H over all channels, the rest by line index.
@@ -172,14 +152,7 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
     const Eigen::VectorXcd response = H_.row(c)(lines).transpose();
     return factor_of_channel(weight.cwiseProduct(thin_power), response, thin_phi, thin_own);
   };
-  std::vector<Eigen::MatrixXd> shares(
-      static_cast<std::size_t>(std::min<Eigen::Index>(kShares, H_.rows())));
-  for_each_task(threads_, static_cast<int>(shares.size()), [&](int share) {
-    Eigen::MatrixXd& R = shares[static_cast<std::size_t>(share)];
-    R = triangle_of(share);
-    for (Eigen::Index c = share + kShares; c < H_.rows(); c += kShares) append(R, triangle_of(c));
-  });
-  return combined(std::move(shares), threads_) *
+  return stacked_triangle(H_.rows(), threads_, triangle_of) *
          std::sqrt(static_cast<double>(x_.size()) / static_cast<double>(lines.size()));
 }
 

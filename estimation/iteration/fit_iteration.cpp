@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "estimation/equations/arrow_system.hpp"
+#include "estimation/equations/factored_equations.hpp"
 #include "estimation/equations/numerators.hpp"
 #include "estimation/problem/pole_bounds.hpp"
 #include "estimation/problem/search_limit.hpp"
@@ -15,7 +16,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kNearlyExact = 1e-12;  // of the data's power: normal equations lose the residual
 // At rounding level, a step that does not reduce the cost to this share is the last one.
 constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
@@ -31,17 +31,8 @@ constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 struct Trial {
   FitParameters beta;
   double cost = 0.0;
+  bool factored = false;  ///< the numerators, as sums have too few digits
 };
-
-std::optional<Trial> try_step(const FitProblem& problem, const PoleBounds& bounds,
-                              const FitParameters& beta, const Eigen::VectorXd& step) {
-  if (!step.allFinite()) return std::nullopt;
-  Trial trial{stepped(problem, beta, step)};
-  if (!bounds.stabilize(beta, trial.beta)) return std::nullopt;
-  const std::vector<BasisGroup> groups = evaluate_groups(problem, trial.beta, false);
-  if (!solve_numerators(problem, groups, trial.beta.B, trial.cost)) return std::nullopt;
-  return trial;
-}
 
 /// Largest change of a denominator coefficient or delay, relative to its own size.
 double relative_step(const FitProblem& problem, const FitParameters& beta,
@@ -77,11 +68,9 @@ class Iteration {
  private:
   bool begin() {
     bounds_.stabilize(beta_, beta_);
-    const auto solve = [&] {
-      return solve_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
-    };
-    bool solved = solve();
-    if ((!solved || nearly_exact()) && all_digits()) solved = solve();
+    Trial start{beta_};
+    const bool solved = solve(start);
+    take(std::move(start));
     if (!solved)
       return result_.end(
           FitStatus::singular,
@@ -91,11 +80,17 @@ class Iteration {
     return true;
   }
 
-  /// Multiplies products out from here on. @returns false if that is already done or makes no difference
-  bool all_digits() {
-    if (problem_.multiplied_out || !sums_fractions_of_few(problem_)) return false;
-    problem_.multiplied_out = true;
-    return true;
+  /// Numerators and cost of the candidate.
+  bool solve(Trial& trial) {
+    return solve_numerators(problem_, evaluate_groups(problem_, trial.beta, false), trial.beta.B,
+                            trial.cost, trial.factored);
+  }
+
+  std::optional<Trial> try_step(const Eigen::VectorXd& step) {
+    if (!step.allFinite()) return std::nullopt;
+    Trial trial{stepped(problem_, beta_, step), 0.0, factored_};
+    if (!bounds_.stabilize(beta_, trial.beta) || !solve(trial)) return std::nullopt;
+    return trial;
   }
 
   bool go_on() {
@@ -113,9 +108,14 @@ class Iteration {
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
   }
 
-  void accept(Trial&& trial) {
+  void take(Trial&& trial) {
     beta_ = std::move(trial.beta);
     cost_ = trial.cost;
+    factored_ = trial.factored;
+  }
+
+  void accept(Trial&& trial) {
+    take(std::move(trial));
     result_.cost.push_back(cost_);
     ++result_.iterations;
     if (options_.progress) options_.progress(result_.iterations, cost_);
@@ -123,13 +123,13 @@ class Iteration {
 
   double squares() const { return 2.0 * static_cast<double>(problem_.size()) * cost_; }
 
-  void read_gradient(const ArrowSystem& system) {
+  void read_gradient(const auto& system) {
     result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
     gradient_ = scaled_gradient(system.schur(), system.schur_gradient(), result_.frozen, squares());
   }
 
   /// @returns false if the equations show convergence; `result_` is then complete.
-  bool may_continue(const ArrowSystem& system) {
+  bool may_continue(const auto& system) {
     read_gradient(system);
     if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance)
       return result_.end(
@@ -156,38 +156,35 @@ class Iteration {
     return true;
   }
 
-  bool nearly_exact() const { return cost_ < kNearlyExact * signal_cost_; }
   bool at_rounding() const { return cost_ < kNothingLeft * signal_cost_; }
 
   bool descent_step() {
-    // Without a residual, the refined-IV equations equal those of Gauss-Newton, at twice the cost.
-    const FitMethod method = nearly_exact() ? FitMethod::gn : options_.method;
-    if (nearly_exact()) all_digits();
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, method, kGlobalsOnly);
-    if (!system.regular())
-      return all_digits() ||
-             result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
-    if (!may_continue(system)) return false;
-    const double before = cost_;
-    const int tries = at_rounding() ? kTriesAtRounding : kTries;
-    if (attempt(system, method == FitMethod::riv ? kTriesOfRiv : tries)) {
-      if (at_rounding() && cost_ > kGainAtRounding * before) return end_of_descent();
-      return still_moving();
-    }
-    if (method == FitMethod::riv) {
-      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
-      if (attempt(gauss_newton, tries)) return still_moving();
-    }
-    return all_digits() || end_of_descent();
+    return factored_ ? factored_step(groups) : summed_step(groups);
   }
 
-  /// Ends the iteration if no step lowers the cost, or only insignificantly.
-  bool end_of_descent() {
-    if (nearly_exact()) {
-      polish_numerators(problem_, evaluate_groups(problem_, beta_, false), beta_.B, cost_);
-      result_.cost.push_back(cost_);
+  bool summed_step(const std::vector<BasisGroup>& groups) {
+    const ArrowSystem system(problem_, beta_, groups, options_.method, kGlobalsOnly);
+    if (!system.regular())
+      return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
+    if (!may_continue(system)) return false;
+    if (attempt(system, options_.method == FitMethod::riv ? kTriesOfRiv : kTries))
+      return still_moving();
+    if (options_.method == FitMethod::riv) {
+      const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
+      if (attempt(gauss_newton, kTries)) return still_moving();
     }
+    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
+  }
+
+  /// Without a residual, the refined-IV equations equal those of Gauss-Newton.
+  bool factored_step(const std::vector<BasisGroup>& groups) {
+    const FactoredEquations system(problem_, beta_, groups);
+    if (!may_continue(system)) return false;
+    const double before = cost_;
+    if (attempt(system, at_rounding() ? kTriesAtRounding : kTries) &&
+        !(at_rounding() && cost_ > kGainAtRounding * before))
+      return still_moving();
     if (at_rounding())
       return result_.end(
           FitStatus::step_small,
@@ -196,11 +193,11 @@ class Iteration {
   }
 
   /// Tries steps with increasing damping; accepts the first that lowers the cost.
-  bool attempt(const ArrowSystem& system, int tries) {
+  bool attempt(const auto& system, int tries) {
     for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
       const Eigen::VectorXd step = system.solve_globals(levenberg_, result_.frozen);
       step_size_ = relative_step(problem_, beta_, step);
-      std::optional<Trial> trial = try_step(problem_, bounds_, beta_, step);
+      std::optional<Trial> trial = try_step(step);
       if (trial && trial->cost < cost_) {
         accept(std::move(*trial));
         levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
@@ -221,7 +218,7 @@ class Iteration {
   }
 
   bool fixed_point_step() {
-    if (result_.iterations == 0) best_ = Trial{beta_, cost_};
+    if (result_.iterations == 0) best_ = Trial{beta_, cost_, factored_};
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
@@ -231,11 +228,11 @@ class Iteration {
     std::optional<Trial> trial;
     for (int halvings = 0; halvings < 12 && !trial; ++halvings, step *= 0.5) {
       step_size_ = relative_step(problem_, beta_, step);
-      trial = try_step(problem_, bounds_, beta_, step);
+      trial = try_step(step);
     }
     if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
     accept(std::move(*trial));
-    if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
+    if (cost_ < best_.cost) best_ = Trial{beta_, cost_, factored_};
     if (step_size_ < std::max(options_.step_tolerance, 1e-9))
       return end_at_best(
           FitStatus::step_small,
@@ -252,7 +249,7 @@ class Iteration {
     return result_.end(status, std::move(message));
   }
 
-  FitProblem problem_;
+  const FitProblem& problem_;
   FitParameters& beta_;
   const FitOptions& options_;
   PoleBounds bounds_;
@@ -260,6 +257,7 @@ class Iteration {
   IterationResult result_;
   double cost_ = 0.0;  // at beta_
   double levenberg_ = 0.0;
+  bool factored_ = false;  // see Trial; then the equations of the step too
   double gradient_ = 1.0;
   double step_size_ = 0.0;
   Trial best_;

@@ -53,8 +53,7 @@ bool FitProblem::is_held(Eigen::Index global) const noexcept {
 namespace {
 
 bool is_few(const FitProblem& problem, std::size_t channels) {
-  return static_cast<Eigen::Index>(channels) < kFewChannels &&
-         (problem.multiplied_out || problem.functions() < kManyFunctions);
+  return static_cast<Eigen::Index>(channels) < kFewChannels && problem.functions() < kManyFunctions;
 }
 
 }  // namespace
@@ -98,11 +97,6 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
     out.output_delay_s.head(problem.n_outputs - 1) += step.tail(problem.n_outputs - 1);
   }
   return out;
-}
-
-bool sums_fractions_of_few(const FitProblem& problem) {
-  return problem.functions() >= kManyFunctions &&
-         (problem.channels() < kFewChannels || problem.delay == DelayModel::per_channel);
 }
 
 namespace {
@@ -194,6 +188,14 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
       evaluate_submodel(problem, *through[g], beta, i, places[i], wanted, basis, groups[g]);
   });
   return groups;
+}
+
+std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
+                                                  const std::vector<BasisGroup>& groups) {
+  std::vector<const BasisGroup*> out(static_cast<std::size_t>(problem.channels()));
+  for (const BasisGroup& group : groups)
+    for (const Eigen::Index c : group.channels) out[static_cast<std::size_t>(c)] = &group;
+  return out;
 }
 
 }  // namespace stageid

@@ -62,7 +62,6 @@ struct FitProblem {
   std::vector<SubmodelRole> roles;  ///< one per submodel; empty: all searched
   std::vector<Eigen::Index> held;   ///< globals that are known and fixed
   DelayModel delay = DelayModel::fixed;
-  bool multiplied_out = false;  ///< few channels: no sums of fractions; all digits, but slower
   int threads = 1;
   std::shared_ptr<SearchLimit> limit;  ///< each evaluation counts; empty: no limit
 
@@ -114,12 +113,13 @@ std::vector<Eigen::Index> delay_parameters(const FitProblem& problem, Eigen::Ind
 FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
                       const Eigen::Ref<const Eigen::VectorXd>& step);
 
-/// Whether there are groups of few channels with many functions, for which multiplied_out makes a difference.
-bool sums_fractions_of_few(const FitProblem& problem);
-
 /// Evaluates the functions of every group of channels at the parameters.
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives);
+
+/// The group of every channel.
+std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
+                                                  const std::vector<BasisGroup>& groups);
 
 /// The diagonal weights of a fit; for weight matrices, their best diagonal. Variances with few degrees of freedom are
 /// smoothed over neighbouring lines, so that a weight does not depend on the noise of its own line.

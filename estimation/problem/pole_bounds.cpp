@@ -53,11 +53,11 @@ PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start)
   }
 }
 
-bool PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
+void PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
                                 Eigen::VectorXd& a) const {
-  if (!(a[1] > 0.0)) return false;
-  const double move = std::sqrt(before[1] / a[1]);
-  // Held at the bound, not refused: a mode at a bound must not stop all the others.
+  // Limited, not refused: one mode must not stop all the others.
+  constexpr double kMost = kLargestMove * kLargestMove;
+  a[1] = std::clamp(a[1], before[1] / kMost, before[1] * kMost);
   a[1] = std::clamp(a[1], 1.0 / (highest_rad_s_ * highest_rad_s_),
                     1.0 / (lowest_rad_s_[i] * lowest_rad_s_[i]));
   const double root = std::sqrt(a[1]);
@@ -68,7 +68,6 @@ bool PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
   if (slow_damping_[i])
     damping = std::clamp(damping, before[0] / kLargestMove, before[0] * kLargestMove);
   a[0] = 2.0 * root * std::clamp(damping / (2.0 * root), kSmallestDamping, kLargestDamping);
-  return (move < kLargestMove && move > 1.0 / kLargestMove) || before[1] == a[1];
 }
 
 Complex PoleBounds::contained(std::size_t i, Complex pole) const {
@@ -101,7 +100,7 @@ bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) con
   for (std::size_t i = 0; i < beta.a.size(); ++i) {
     Eigen::VectorXd& a = beta.a[i];
     if (a.size() == 2) {
-      if (!stabilize_mode(i, before.a[i], a)) return false;
+      stabilize_mode(i, before.a[i], a);
     } else if (a.size() > 0) {
       if (!stabilize_poles(i, a)) return false;
     }

@@ -17,9 +17,9 @@ class PoleBounds {
   /// (SubmodelRole) may be as low as 1/300 of the lowest line, and real poles are not bounded by Nyquist.
   PoleBounds(const FitProblem& problem, const FitParameters& start);
 
-  /// Moves all poles of `beta` into their bounds; unstable poles of a start are reflected.
-  /// @returns false if it is not acceptable: a mode moved by more than a third since `before`, or coefficients without
-  /// poles.
+  /// Moves all poles of `beta` into their bounds, a mode at most a third away from `before`; unstable poles of a start are
+  /// reflected.
+  /// @returns false if coefficients have no poles
   bool stabilize(const FitParameters& before, FitParameters& beta) const;
 
   /// The denominator coefficients at a bound that a lower cost (`descent`, minus its gradient) would push further, for
@@ -32,7 +32,7 @@ class PoleBounds {
   bool at_bound(std::size_t i, const Eigen::VectorXd& a) const;
 
  private:
-  bool stabilize_mode(std::size_t i, const Eigen::VectorXd& before, Eigen::VectorXd& a) const;
+  void stabilize_mode(std::size_t i, const Eigen::VectorXd& before, Eigen::VectorXd& a) const;
   bool stabilize_poles(std::size_t i, Eigen::VectorXd& a) const;
   std::complex<double> contained(std::size_t i, std::complex<double> pole) const;
 

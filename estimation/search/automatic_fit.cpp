@@ -57,14 +57,11 @@ class AutomaticFit {
       begin_relocated_from(model);
   }
 
-  /// Modes to add at the peaks of the residual, of which the least worthy are then dropped, so that misplaced ones are
-  /// exchanged; 0 if that is of no use.
-  int surplus() const {
-    if (selection_.exactly == 0 || selection_.keep_modes || best_.status == FitStatus::singular ||
-        at_rounding() || limit_reached() || !misses_a_mode())
-      return 0;
-    return std::min(affordable_modes() - selection_.exactly,
-                    1 + selection_.exactly / static_cast<int>(kShareAtOnce));
+  /// Whether modes may be misplaced: the residual still shows one.
+  bool may_exchange() const {
+    return selection_.exactly > 0 && !selection_.keep_modes &&
+           best_.status != FitStatus::singular && !at_rounding() && !limit_reached() &&
+           misses_a_mode();
   }
 
   /// @param surplus modes to grow beyond the requested number
@@ -77,6 +74,7 @@ class AutomaticFit {
       if (restructure()) reduce();
     }
     grow();
+    if (surplus > 0) restructure();
     reduce();
     if (selection_.exactly == 0) {
       for (bool changed = restructure(); grow() || changed; changed = restructure()) reduce();
@@ -268,6 +266,11 @@ class AutomaticFit {
 
   int affordable_modes() const { return static_cast<int>(most_modes(frf_, structure_)); }
 
+  /// Modes to add together.
+  std::size_t at_once() const {
+    return std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
+  }
+
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
@@ -291,7 +294,7 @@ class AutomaticFit {
     std::vector<StructureMove> moves =
         structure_moves(sample.data.frf, sample.data.options, sample.data.model, structure_.open);
     std::erase_if(moves, [&](const StructureMove& move) {
-      return selection_.exactly > 0 && count_modes(move.model) != count_modes(best_.model);
+      return count_modes(move.model) < selection_.exactly;
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
     // A trial of delays per channel takes longer than all others.
@@ -332,7 +335,12 @@ class AutomaticFit {
     explicit Sample(const AutomaticFit& search)
         : data(part_of_data(search.frf_, search.quick_, search.best_.model)),
           worth(data.frf, search.structure_, data.options.user_weights) {
-      const FitResult fit = fit_additive_model(data.frf, data.model, data.options);
+      FitResult fit = fit_additive_model(data.frf, data.model, data.options);
+      if (worth.at_rounding(fit) && !search.at_rounding()) {  // then the part decides nothing
+        data = {search.frf_, search.quick_, search.best_.model, true};
+        worth = search.worth_;
+        fit = search.best_;
+      }
       now = worth.criterion(fit);
     }
     PartOfData data;
@@ -393,10 +401,8 @@ class AutomaticFit {
     for (int round = 0; wanted_more(); ++round) {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
-      const std::size_t most =
-          std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
       const std::vector<ResidualMode> candidates =
-          residual_modes(frf_, best_.model, quick_.user_weights, most, quick_.threads);
+          residual_modes(frf_, best_.model, quick_.user_weights, at_once(), quick_.threads);
       FitResult before = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
@@ -485,14 +491,17 @@ class AutomaticFit {
       // A refit regains part of the removal cost, so the limit is twice the price here, and BIC decides afterwards.
       const double limit =
           surplus > 0 ? std::numeric_limits<double>::infinity() : 2.0 * worth_.price(best_);
-      const std::size_t most = surplus > 0 ? static_cast<std::size_t>((surplus + 1) / 2) : at_once;
+      const std::size_t most =
+          surplus > 0 ? std::min(at_once, static_cast<std::size_t>((surplus + 1) / 2)) : at_once;
       const std::vector<std::size_t> out = least_worthy(best_, limit, most);
       if (out.empty()) return;
       AdditiveModel model = best_.model;
       for (const std::size_t i : std::views::reverse(out))
         model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
       FitResult without = fit_additive_model(frf_, model, quick_);
-      if (surplus <= 0 && !(worth_.criterion(without) < worth_.criterion(best_))) {
+      const bool worse = surplus > 0 ? out.size() > 1 && !is_predicted(without, out)
+                                     : !(worth_.criterion(without) < worth_.criterion(best_));
+      if (worse) {
         at_once = out.size() / 2;
         continue;
       }
@@ -502,6 +511,15 @@ class AutomaticFit {
             without.model.fit.cost);
       adopt(std::move(without));
     }
+  }
+
+  /// Whether the squares rise by no more than the removal costs of these modes together. They rise by more if the modes
+  /// stood in for each other.
+  bool is_predicted(const FitResult& without, const std::vector<std::size_t>& out) const {
+    double predicted = 0.0;
+    for (const std::size_t i : out) predicted += best_.removal_cost[i];
+    const double lines = static_cast<double>(frf_.lines());
+    return 2.0 * lines * (without.model.fit.cost - best_.model.fit.cost) <= predicted;
   }
 
   void reduce() {
@@ -565,13 +583,14 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
   std::optional<AutomaticFit> best(std::in_place, frf, structure, selection, options);
   best->begin();
   best->search(0);
-  for (double before = HUGE_VAL; best->is_clearly_below(before);) {
-    const int surplus = best->surplus();
-    if (surplus <= 0) break;
-    before = best->score();
+  // Misplaced modes are exchanged: more are added at the peaks of the residual, and the least worthy are dropped.
+  const int fifth = 1 + selection.exactly / static_cast<int>(kShareAtOnce);
+  const int most_surplus = std::max(static_cast<int>(kTried), fifth);
+  for (int surplus = fifth; surplus <= most_surplus && best->may_exchange();) {
     AutomaticFit other = *best;
-    other.search(surplus);
-    if (other.score() < before) best.emplace(std::move(other));
+    other.search(std::min(surplus, static_cast<int>(most) - selection.exactly));
+    if (!other.is_clearly_below(best->score())) surplus *= 2;
+    if (other.score() < best->score()) best.emplace(std::move(other));
   }
   return best->finish(evidence);
 }

@@ -15,6 +15,11 @@ bool is_rigid_body(const Submodel& s) {
   return s.role == SubmodelRole::searched && s.integrators == 2 && s.denominator.size() == 1;
 }
 
+/// Or has other integrators than a rigid body.
+bool is_sprung(const Submodel& s) {
+  return s.role == SubmodelRole::suspension || (s.integrators > 0 && !is_rigid_body(s));
+}
+
 bool is_direct_term(const Submodel& s) {
   return s.role == SubmodelRole::searched && s.integrators == 0 && s.denominator.size() == 1;
 }
@@ -69,25 +74,27 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
         }) > 0)
       out.push_back(std::move(direct));
   }
-  if (open.rigid_body && has(model, is_rigid_body)) {
-    for (const double start : {kSuspensionStart, kWeakSpringsStart}) {
-      StructureMove springs{"--rigid-body suspension", model, options};
+  if (open.rigid_body && !has(model, is_sprung)) {
+    const auto below = [&](const Submodel& s) {
+      return is_searched_mode(s) && s.natural_frequency_hz() < frf.frequency_hz[0];
+    };
+    const auto add_springs = [&](double start, bool instead_of_modes) {
+      out.push_back({"--rigid-body suspension", model, options});
+      StructureMove& springs = out.back();
       springs.options.max_iterations *= kFartherAway;
-      std::erase_if(springs.model.submodels, is_rigid_body);
+      std::erase_if(springs.model.submodels, [&](const Submodel& s) {
+        return is_rigid_body(s) || (instead_of_modes && below(s));
+      });
       springs.model.submodels.push_back(suspension_mode(frf, start * frf.frequency_hz[0]));
-      out.push_back(springs);
-      // Instead of the modes below the lines, too.
-      if (start == kSuspensionStart &&
-          std::erase_if(springs.model.submodels, [&](const Submodel& s) {
-            return is_searched_mode(s) && s.natural_frequency_hz() < frf.frequency_hz[0];
-          }) > 0)
-        out.push_back(std::move(springs));
+    };
+    if (has(model, is_rigid_body)) {
+      add_springs(kSuspensionStart, false);
+      add_springs(kWeakSpringsStart, false);
+    } else {
+      out.push_back({"--rigid-body full", model, options});
+      out.back().model.submodels.push_back({2, {1.0}, {zero}, {}, {}});
     }
-  } else if (open.rigid_body && !has(model, [](const Submodel& s) {
-               return s.integrators > 0 || s.role == SubmodelRole::suspension;
-             })) {
-    out.push_back({"--rigid-body full", model, options});
-    out.back().model.submodels.push_back({2, {1.0}, {zero}, {}, {}});
+    if (has(model, below)) add_springs(kSuspensionStart, true);
   }
   if (open.delay && options.delay == DelayModel::fixed) {
     out.push_back({"--delay estimate", model, options});

@@ -232,14 +232,6 @@ Eigen::VectorXd quadratic(const SplitMatrix& X, const Eigen::MatrixXd& C, const 
          (X.im * C).cwiseProduct(Y.im).rowwise().sum();
 }
 
-std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
-                                                  const std::vector<BasisGroup>& groups) {
-  std::vector<const BasisGroup*> out(static_cast<std::size_t>(problem.channels()));
-  for (const BasisGroup& group : groups)
-    for (const Eigen::Index c : group.channels) out[static_cast<std::size_t>(c)] = &group;
-  return out;
-}
-
 ParameterCovariance parameter_covariance(const FitProblem& problem, const FitParameters& beta,
                                          const std::vector<BasisGroup>& groups, double cost,
                                          const DataNoise& noise,

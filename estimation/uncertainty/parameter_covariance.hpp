@@ -85,10 +85,6 @@ void fill_deviations(const FitProblem& problem, const ParameterCovariance& covar
 
 // Parts that are also used for fits with other structures.
 
-/// The group of every channel.
-std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
-                                                  const std::vector<BasisGroup>& groups);
-
 /// S^-1 on the free parameters, zero for frozen ones.
 Eigen::MatrixXd free_inverse(const Eigen::MatrixXd& S, const std::vector<Eigen::Index>& frozen);
 

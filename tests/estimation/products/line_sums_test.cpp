@@ -112,36 +112,6 @@ TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
   EXPECT_NEAR(cost, cost_alone, 1e-12 * cost);
 }
 
-// Two poles that differ in the eighth digit: normal equations leave 1e-9 of exact data, and more.
-TEST(Numerators, PolishedHaveAllDigitsOfExactData) {
-  DenseProblem problem = test::noisy_stage(HoldModel::none, 0.0);
-  Submodel twin = problem.model.submodels[1];
-  twin.denominator[2] *= 1.0 + 1e-8;
-  problem.model.submodels.push_back(twin);
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
-  problem.W = problem.G.cwiseAbs2().cwiseInverse();
-  const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
-  Eigen::MatrixXd B;
-  double cost = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
-  const double plain = cost;
-  polish_numerators(fit, groups, B, cost);
-  EXPECT_LT(cost, 1e-3 * plain);
-  EXPECT_LT(std::sqrt(2.0 * cost / static_cast<double>(fit.channels())), 1e-13);
-  EXPECT_NEAR(residual_cost(fit, groups, B), cost, 0.5 * cost);
-}
-
-TEST(Numerators, PolishingWhatIsBestChangesNothing) {
-  const DenseProblem problem = wide_problem(HoldModel::exact);
-  const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
-  Eigen::MatrixXd B;
-  double cost = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, B, cost));
-  const Eigen::MatrixXd before = B;
-  polish_numerators(fit, groups, B, cost);
-  EXPECT_LT((B - before).cwiseAbs().maxCoeff(), 1e-10 * before.cwiseAbs().maxCoeff());
-}
-
 TEST(WeightedProducts, AreTheSumsTheySay) {
   RandomNumbers random(21);
   const Eigen::Index N = 700;  // more than two tiles

@@ -64,9 +64,10 @@ TEST(StructureSearchFixed, WhatIsRequestedIsNotChanged) {
   EXPECT_THAT(fit.message, HasSubstr("--damping general"));
 }
 
-// A free body with general damping; a suspended one with a mode of rank two; one with both.
+// A free body with general damping; a suspended one with a mode of rank two; one with both; two whose suspension is first
+// taken for one of the modes.
 TEST(StructureSearchFixed, ANumberOfModesLeavesTheStructureOpen) {
-  for (const std::uint64_t seed : {5U, 1U, 15U}) {
+  for (const std::uint64_t seed : {5U, 1U, 15U, 18U, 5012U}) {
     const test::VariedPlant plant = test::draw_varied_plant(seed);
     FitRequest request;
     request.modes.kind = ModesRequest::Kind::count;

@@ -1,0 +1,114 @@
+#include "estimation/equations/factored_equations.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "estimation/equations/triangles.hpp"
+#include "estimation/products/channel_equations.hpp"
+#include "excitation/decompositions/decompositions.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+/// Of columns of unit length: the part of a column that the others do not contain, if it is rounding.
+constexpr double kSingular = 1e-15;
+
+/// Real and imaginary parts of the columns stacked, times `root`.
+void stack(const SplitMatrix& columns, const Eigen::VectorXd& root,
+           Eigen::Ref<Eigen::MatrixXd> out) {
+  out.topRows(root.size()) = root.asDiagonal() * columns.re;
+  out.bottomRows(root.size()) = root.asDiagonal() * columns.im;
+}
+
+Eigen::VectorXd stacked_data(const FitProblem& problem, const Eigen::VectorXd& root,
+                             Eigen::Index c) {
+  Eigen::VectorXd out(2 * root.size());
+  out << root.cwiseProduct(problem.G->row(c).real().transpose()),
+      root.cwiseProduct(problem.G->row(c).imag().transpose());
+  return out;
+}
+
+/// The triangle of one channel for the globals and the data.
+Eigen::MatrixXd triangle_of_channel(const FitProblem& problem, const FitParameters& beta,
+                                    const BasisGroup& group, Eigen::Index c) {
+  const Eigen::Index n_f = problem.functions();
+  const Eigen::Index globals = problem.globals();
+  const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
+  Eigen::MatrixXd A(2 * problem.size(), n_f + globals + 1);
+  stack(group.F, root, A.leftCols(n_f));
+  stack(global_columns(problem, beta, group, c, {0, problem.size()}), root,
+        A.middleCols(n_f, globals));
+  A.rightCols(1) = stacked_data(problem, root, c);
+  qr_in_place(A);
+  return Eigen::MatrixXd(
+      A.block(n_f, n_f, globals + 1, globals + 1).triangularView<Eigen::Upper>());
+}
+
+}  // namespace
+
+FactoredEquations::FactoredEquations(const FitProblem& problem, const FitParameters& beta,
+                                     const std::vector<BasisGroup>& groups) {
+  const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
+  const Eigen::Index globals = problem.globals();
+  const Eigen::MatrixXd whole =
+      stacked_triangle(problem.channels(), problem.threads, [&](Eigen::Index c) {
+        return triangle_of_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c);
+      });
+  R_ = whole.topLeftCorner(globals, globals);
+  r_ = whole.col(globals).head(globals);
+  schur_ = R_.transpose() * R_;
+  schur_e_ = R_.transpose() * r_;
+}
+
+Eigen::VectorXd FactoredEquations::solve_globals(double damping,
+                                                 const std::vector<Eigen::Index>& frozen) const {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < R_.cols(); ++i)
+    if (std::find(frozen.begin(), frozen.end(), i) == frozen.end()) free.push_back(i);
+  const auto n = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(R_.rows() + n, n);
+  A.topRows(R_.rows()) = R_(Eigen::all, free);
+  const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  A *= scale.asDiagonal();
+  A.bottomRows(n).diagonal().setConstant(std::sqrt(damping));
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(A.rows());
+  right.head(r_.size()) = r_;
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(R_.cols());
+  if (n > 0) step(free) = scale.cwiseProduct(least_squares(pivoted_qr(A), right));
+  return step;
+}
+
+bool factored_numerators(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
+                         Eigen::MatrixXd& B, double& squares) {
+  B.setZero(block.members, problem.functions());
+  Eigen::VectorXd of_channel = Eigen::VectorXd::Zero(block.members);
+  std::atomic<bool> regular = true;
+  for_each_task(problem.threads, static_cast<int>(block.members), [&](int member) {
+    const Eigen::Index c = group.channels[static_cast<std::size_t>(block.first_member + member)];
+    const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
+    if (!(root.maxCoeff() > 0.0)) return;
+    Eigen::MatrixXd A(2 * problem.size(), problem.functions());
+    stack(group.F, root, A);
+    Eigen::VectorXd rest = stacked_data(problem, root, c);
+    const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+    A *= scale.asDiagonal();
+    const auto factor = qr(A);
+    if (!(factor.matrixQR().diagonal().cwiseAbs().minCoeff() > kSingular)) {
+      regular = false;
+      return;
+    }
+    Eigen::VectorXd x = least_squares(factor, rest);
+    rest -= A * x;
+    const Eigen::VectorXd refinement = least_squares(factor, rest);
+    x += refinement;
+    rest -= A * refinement;
+    B.row(member) = scale.cwiseProduct(x).transpose();
+    of_channel[member] = rest.squaredNorm();
+  });
+  squares = of_channel.sum();
+  return regular;
+}
+
+}  // namespace stageid

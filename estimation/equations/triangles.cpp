@@ -1,0 +1,43 @@
+#include "estimation/equations/triangles.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "excitation/decompositions/decompositions.hpp"
+#include "excitation/threads/worker_pool.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr Eigen::Index kShares = 8;
+
+/// The triangle R of the stacked matrix [R; further] = Q R.
+void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
+  Eigen::MatrixXd both(R.rows() + further.rows(), R.cols());
+  both << R, further;
+  qr_in_place(both);
+  R = both.topRows(R.cols()).triangularView<Eigen::Upper>();
+}
+
+}  // namespace
+
+Eigen::MatrixXd stacked_triangle(Eigen::Index count, int threads,
+                                 const std::function<Eigen::MatrixXd(Eigen::Index)>& factor) {
+  std::vector<Eigen::MatrixXd> shares(static_cast<std::size_t>(std::min(kShares, count)));
+  for_each_task(threads, static_cast<int>(shares.size()), [&](int share) {
+    Eigen::MatrixXd& R = shares[static_cast<std::size_t>(share)];
+    R = factor(share);
+    for (Eigen::Index i = share + kShares; i < count; i += kShares) append(R, factor(i));
+  });
+  while (shares.size() > 1) {
+    const std::size_t pairs = shares.size() / 2;
+    for_each_task(threads, static_cast<int>(pairs), [&](int pair) {
+      const auto p = static_cast<std::size_t>(pair);
+      append(shares[p], shares[shares.size() - 1 - p]);
+    });
+    shares.resize(shares.size() - pairs);
+  }
+  return std::move(shares.front());
+}
+
+}  // namespace stageid
