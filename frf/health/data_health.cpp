@@ -17,8 +17,6 @@
 #include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
 #include "frf/wiring/excitation_timing.hpp"
-#include "frf/wiring/rigid_body_check.hpp"
-#include "frf/wiring/skew_check.hpp"
 #include "frf/wiring/timing_check.hpp"
 
 namespace stageid {

@@ -1,6 +1,5 @@
 #include "frf/health/health_measures.hpp"
 
-#include <algorithm>
 #include <array>
 #include <complex>
 #include <limits>

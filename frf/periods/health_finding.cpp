@@ -1,7 +1,6 @@
 #include "frf/periods/health_finding.hpp"
 
 #include <algorithm>
-#include <string_view>
 
 #include "acquisition/files/counted.hpp"
 

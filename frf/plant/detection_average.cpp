@@ -1,7 +1,6 @@
 #include "frf/plant/detection_average.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <iterator>
 
 #include "excitation/threads/worker_pool.hpp"

@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/files/counted.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/experiment_noise.hpp"

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "frf/plant/experiment_noise.hpp"
-#include "frf/plant/plant_frf.hpp"
 #include "frf/plant/realization_comparison.hpp"
 #include "frf/plant/realization_scatter.hpp"
 #include "frf/plant/response_drift.hpp"
 #include "frf/plant/zippered_fit.hpp"
 #include "frf/response/frf_estimate.hpp"
+#include "frf/response/frf_options.hpp"
 #include "frf/response/line_estimate.hpp"
 #include "frf/runs/realization_spectra.hpp"
 

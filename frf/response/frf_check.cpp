@@ -1,7 +1,6 @@
 // check(): invariants of every frequency response.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>

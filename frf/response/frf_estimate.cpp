@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
-#include <set>
 #include <stdexcept>
 
 #include "frf/response/channel_positions.hpp"

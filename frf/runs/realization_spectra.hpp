@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "frf/runs/channel_choice.hpp"
-#include "frf/runs/excitation_spectrum.hpp"
 #include "frf/runs/run_spectra.hpp"
 #include "frf/runs/run_table.hpp"
 

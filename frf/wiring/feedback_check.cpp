@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "acquisition/files/counted.hpp"
 #include "frf/runs/channel_choice.hpp"
 #include "frf/statistics/distributions.hpp"
 

@@ -1,9 +1,7 @@
 #include "frf/wiring/plant_lines.hpp"
 
-#include <cmath>
 #include <complex>
 #include <numbers>
-#include <string>
 
 #include "frf/response/line_estimate.hpp"
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/models/estimate_trials.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/stages/closed_loop.hpp"

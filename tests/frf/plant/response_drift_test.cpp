@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <vector>
 
-#include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
