@@ -11,12 +11,6 @@ namespace {
 
 constexpr int kFurthest = 4;
 
-/// First of the ascending `lines` that is not below `line`.
-std::size_t at_or_above(const std::vector<int>& lines, int line) {
-  return static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), line) -
-                                  lines.begin());
-}
-
 }  // namespace
 
 std::vector<int> detection_lines(const std::vector<int>& excited) {
@@ -32,10 +26,10 @@ std::vector<int> detection_lines(const std::vector<int>& excited) {
 
 Eigen::VectorXcd interpolated_response(const std::vector<int>& excited, int line,
                                        const Eigen::MatrixXcd& G) {
-  const std::size_t above = at_or_above(excited, line);
-  const int low = excited[above - 1];
-  const double t = static_cast<double>(line - low) / (excited[above] - low);
-  const auto k = static_cast<Eigen::Index>(above);
+  const auto above = std::ranges::lower_bound(excited, line);
+  const int low = *std::prev(above);
+  const double t = static_cast<double>(line - low) / (*above - low);
+  const Eigen::Index k = above - excited.begin();
   return (1.0 - t) * G.col(k - 1) + t * G.col(k);
 }
 
@@ -61,7 +55,7 @@ void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
   for (std::size_t e = 0; e < axis.size(); ++e) {
     groups.push_back(sum_.groups.size() == 1 ? 0 : static_cast<Eigen::Index>(axis[e]));
     sum_.runs[groups.back()] += 1.0;
-    periods_ += spectra.periods(e);
+    periods_ += spectra.runs()[e].periods;
   }
   for_each_line(workers, std::ssize(detection_),
                 [&](Eigen::Index d) { add_line(spectra, G, groups, d); });
@@ -84,7 +78,7 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
   for (Eigen::Index e = 0; e < E.cols(); ++e) {
     const auto run = static_cast<std::size_t>(e);
     sum_.power.col(d).segment(outputs_ * groups[run], outputs_) +=
-        spectra.periods(run) * E.col(e).cwiseAbs2();
+        spectra.runs()[run].periods * E.col(e).cwiseAbs2();
   }
   const Eigen::MatrixXcd scatter = factor * spectra.scatter(column);
   // The scatter is a sum of squares, but rounding may make it negative.

@@ -25,8 +25,7 @@ constexpr double kRounding = 1e-10;  // of the output's power
 MatrixXd dependence_of(const RealizationSpectra& spectra, Index outputs, Index blocks) {
   MatrixXd common = MatrixXd::Zero(outputs, blocks);
   MatrixXd own = MatrixXd::Zero(outputs, blocks);
-  for (Index e = 0; e < spectra.experiments(); ++e) {
-    const RunSpectra& run = spectra.run(static_cast<std::size_t>(e));
+  for (const RunSpectra& run : spectra.runs()) {
     if (run.common_sum.size() == 0) continue;
     common += run.common_sum;
     own += run.own_sum;
@@ -41,11 +40,11 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
     : spectra_(spectra),
       lines_(std::ssize(lines)),
       outputs_(lines.empty() ? 0 : lines.front().G.rows()) {
+  const std::vector<RunSpectra>& runs = spectra.runs();
   const Index E = spectra.experiments();
   const Index n_y = outputs_;
-  for (Index e = 0; e < E; ++e)
-    if (spectra.run(static_cast<std::size_t>(e)).scatter_dof == 0) return;
-  if (lines_ < kFewestLines) return;
+  if (lines_ < kFewestLines || std::ranges::find(runs, 0, &RunSpectra::scatter_dof) != runs.end())
+    return;
   const Index blocks = noise_blocks(lines_);
 
   MatrixXd log_power(n_y * E, lines_);
@@ -53,10 +52,9 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
     const std::vector<MatrixXcd> C = covariances(lines[static_cast<std::size_t>(k)], k);
     const Eigen::ArrayXd rounding =
         kRounding * spectra.response(k).topRows(n_y).cwiseAbs2().rowwise().maxCoeff();
-    for (Index e = 0; e < E; ++e)
-      log_power.col(k).segment(n_y * e, n_y) =
-          (C[static_cast<std::size_t>(e)].diagonal().real().array() + rounding).log() -
-          mean_of_log_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
+    for (std::size_t e = 0; e < runs.size(); ++e)
+      log_power.col(k).segment(n_y * static_cast<Index>(e), n_y) =
+          (C[e].diagonal().real().array() + rounding).log() - mean_of_log_power(runs[e].dof(k));
   });
   levels_.realization = spectra.realization();
   levels_.log_power.assign(static_cast<std::size_t>(blocks), MatrixXd::Zero(n_y, E));
@@ -70,7 +68,7 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
     levels_.log_power[at(k)] += log_power.col(k).reshaped(n_y, E);
     count[block] += 1.0;
     for (Index e = 0; e < E; ++e)
-      variance(e, block) += variance_of_log_power(spectra.run(static_cast<std::size_t>(e)).dof(k));
+      variance(e, block) += variance_of_log_power(runs[static_cast<std::size_t>(e)].dof(k));
   }
   const MatrixXd dependence = dependence_of(spectra, n_y, blocks);
   for (std::size_t b = 0; b < levels_.log_power.size(); ++b) {
@@ -178,9 +176,8 @@ std::size_t ExperimentNoise::at(Index k) const {
 
 std::vector<MatrixXcd> ExperimentNoise::covariances(const LineEstimate& line, Index k) const {
   std::vector<MatrixXcd> C;
-  for (Index e = 0; e < spectra_.experiments(); ++e)
-    C.push_back(residual_covariance(line.G, spectra_.scatter(static_cast<std::size_t>(e), k),
-                                    spectra_.run(static_cast<std::size_t>(e)).scatter_dof));
+  for (const RunSpectra& run : spectra_.runs())
+    C.push_back(residual_covariance(line.G, run.scatter(k), run.scatter_dof));
   return C;
 }
 
@@ -192,9 +189,10 @@ LineNoise ExperimentNoise::scaled(const LineEstimate& line, const VectorXd& peri
   noise.residual.setZero(line.G.rows(), line.G.rows());
   double dof = 0.0;
   for (Index e = 0; e < share.cols(); ++e) {
-    const double nu = spectra_.run(static_cast<std::size_t>(e)).dof(k);
+    const auto run = static_cast<std::size_t>(e);
+    const double nu = spectra_.runs()[run].dof(k);
     const VectorXd back = share.col(e).cwiseSqrt().cwiseInverse();
-    noise.residual += nu * (back.asDiagonal() * C[static_cast<std::size_t>(e)] * back.asDiagonal());
+    noise.residual += nu * (back.asDiagonal() * C[run] * back.asDiagonal());
     dof += nu;
   }
   noise.residual /= dof;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
 #include "excitation/threads/worker_pool.hpp"
@@ -17,8 +16,7 @@ AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<i
     : excited_(std::move(excited)), outputs_(outputs) {
   std::vector<int> lines = excited_;
   lines.insert(lines.end(), detection.begin(), detection.end());
-  column_.resize(lines.size());
-  std::iota(column_.begin(), column_.end(), 0);
+  column_ = first_indices(lines.size());
   const auto line_of = [&](Eigen::Index column) { return lines[static_cast<std::size_t>(column)]; };
   std::ranges::sort(column_, {}, line_of);
   std::ranges::transform(column_, std::back_inserter(lines_), line_of);
@@ -45,12 +43,9 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
     residual.col(l) = (Z.topRows(outputs_) - at * Z.bottomRows(at.cols())).reshaped();
   });
   for (Eigen::Index e = 0; e < E; ++e) {
-    const Eigen::VectorXd smallest = kPowerRounding * spectra.run(static_cast<std::size_t>(e))
-                                                          .mean.topLeftCorner(outputs_, N)
-                                                          .cwiseAbs2()
-                                                          .rowwise()
-                                                          .maxCoeff();
-    add_run(residual.middleRows(outputs_ * e, outputs_), smallest);
+    const Eigen::MatrixXcd& mean = spectra.runs()[static_cast<std::size_t>(e)].mean;
+    add_run(residual.middleRows(outputs_ * e, outputs_),
+            kPowerRounding * mean.topLeftCorner(outputs_, N).cwiseAbs2().rowwise().maxCoeff());
   }
   first_ = false;
 }

@@ -20,7 +20,7 @@ Eigen::Map<Eigen::MatrixXcd> unvec(Eigen::MatrixXcd& columns, Eigen::Index k, Ei
 
 /// Number of lines with a common scatter, at the middle line; the others have the same number.
 double lines_that_share(const RealizationSpectra& spectra) {
-  const RunSpectra& run = spectra.run(0);
+  const RunSpectra& run = spectra.runs().front();
   if (run.scatter_window == 0) return 1.0;
   const auto N = std::ssize(run.scatter_first);
   double sum = 0.0;
@@ -84,9 +84,7 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   }
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
   Eigen::VectorXd periods(spectra.experiments());
-  for (Eigen::Index e = 0; e < periods.size(); ++e) {
-    periods[e] = spectra.periods(static_cast<std::size_t>(e));
-  }
+  std::ranges::transform(spectra.runs(), periods.data(), &RunSpectra::periods);
   std::vector<LineEstimate> lines(static_cast<std::size_t>(frequency_hz_.size()));
   for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
     LineEstimate& line = lines[static_cast<std::size_t>(k)];
@@ -120,8 +118,8 @@ void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstima
   const std::vector<Eigen::MatrixXcd> C = experiments.covariances(line, k);
   for (Eigen::Index e = 0; e < periods.size(); ++e) {
     const Eigen::VectorXcd q = line.Q.row(e).transpose();
-    add_product(q * q.adjoint() / periods[e], C[static_cast<std::size_t>(e)],
-                spectra.run(static_cast<std::size_t>(e)).dof(k), k);
+    const auto run = static_cast<std::size_t>(e);
+    add_product(q * q.adjoint() / periods[e], C[run], spectra.runs()[run].dof(k), k);
   }
 }
 

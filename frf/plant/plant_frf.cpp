@@ -87,7 +87,7 @@ class PlantEstimation {
         R.push_back(run.spectrum.values(excited_.axes, Eigen::all));
       RealizationSpectra spectra(realization.realization, std::move(R), run_workers_.pool());
       measure(m, excitation, health, spectra);
-      note_spoilt(realization, spectra);
+      note_spoilt(spectra);
       if (leave_out(realization, spectra)) continue;
       refuse_constant_inputs(realization, spectra, channels_);
       note_quality(realization, spectra);
@@ -224,9 +224,8 @@ class PlantEstimation {
       alignment_ = std::make_unique<AlignmentAverage>(excited_.lines, detection, outputs);
   }
 
-  void note_spoilt(const RealizationRuns& realization, const RealizationSpectra& spectra) {
-    for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-      const RunSpectra& run = spectra.run(e);
+  void note_spoilt(const RealizationSpectra& spectra) {
+    for (const RunSpectra& run : spectra.runs()) {
       dropped_.insert(dropped_.end(), run.dropped.begin(), run.dropped.end());
       replaced_.insert(replaced_.end(), run.replaced.begin(), run.replaced.end());
     }
@@ -235,7 +234,7 @@ class PlantEstimation {
   /// Whether a run has no clean period; records it and the realization is skipped.
   bool leave_out(const RealizationRuns& realization, const RealizationSpectra& spectra) {
     for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-      if (spectra.run(e).periods > 0) continue;
+      if (spectra.runs()[e].periods > 0) continue;
       left_out_.push_back(
           {realization.realization, fmt::format("{}: {}", realization.runs[e].place(),
                                                 no_clean_period(realization.runs[e]))});
@@ -248,7 +247,7 @@ class PlantEstimation {
   void note_quality(const RealizationRuns& realization, const RealizationSpectra& spectra) {
     const auto inputs = std::ssize(channels_.estimated);
     for (std::size_t e = 0; e < realization.runs.size(); ++e) {
-      const RunSpectra& run = spectra.run(e);
+      const RunSpectra& run = spectra.runs()[e];
       provenance_->add(realization.runs[e], run.fingerprint);
       fewest_periods_ = std::min(fewest_periods_, run.periods);
       for (Eigen::Index k = 0; k < std::ssize(excited_.lines); ++k) {

@@ -223,15 +223,15 @@ void ResponseDrift::add(const RealizationSpectra& spectra, const LineEstimate& l
                         Index k) {
   counted_sum_.col(k) += static_cast<double>(count) * line.G.reshaped();
   const Index E = spectra.experiments();
-  MatrixXcd slope(spectra.run(0).mean.rows(), E);
+  MatrixXcd slope(spectra.runs().front().mean.rows(), E);
   double variance = 0.0;
-  for (Index e = 0; e < E; ++e) {
-    const RunSpectra& run = spectra.run(static_cast<std::size_t>(e));
+  Index e = 0;
+  for (const RunSpectra& run : spectra.runs()) {
     if (run.slope.size() == 0) {
       variance_sum_[k] = std::numeric_limits<double>::infinity();
       return;
     }
-    slope.col(e) = run.slope.col(k);
+    slope.col(e++) = run.slope.col(k);
     variance += run.periods / run.slope_spread / static_cast<double>(E);
   }
   const MatrixXcd D =

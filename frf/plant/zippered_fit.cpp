@@ -66,6 +66,7 @@ std::vector<Index> ZipperedFit::window(Index k) const {
 }
 
 ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index k) const {
+  const RunSpectra& run = spectra.runs().front();
   const std::vector<Index> window = this->window(k);
   const auto B = std::ssize(window);
   const Index axes = lines_.axes;
@@ -74,10 +75,10 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
     return static_cast<double>(line(window[static_cast<std::size_t>(i)]) - line(k));
   };
   LocalProblem problem;
-  problem.Z.resize(spectra.run(0).mean.rows(), B);
+  problem.Z.resize(run.mean.rows(), B);
   problem.r.resize(B);
   for (Index i = 0; i < B; ++i) {
-    problem.Z.col(i) = spectra.run(0).mean.col(window[static_cast<std::size_t>(i)]);
+    problem.Z.col(i) = run.mean.col(window[static_cast<std::size_t>(i)]);
     problem.r[i] = distance(i);
   }
   problem.r /= problem.r.cwiseAbs().maxCoeff();
@@ -105,7 +106,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   const MatrixXcd left = residual_of_Z(result.line.G) * fit.residual;
   const Eigen::VectorXd left_variance = left.rowwise().squaredNorm() / fit.dof;
   const bool from_periods = spectra.scatter_dof() > 0;
-  const double periods = from_periods ? spectra.periods(0) : 1.0;
+  const double periods = from_periods ? run.periods : 1.0;
   const Eigen::VectorXd effective = periods * fit.leverage.cwiseInverse();
   if (from_periods) {
     MatrixXcd scatter = MatrixXcd::Zero(problem.Z.rows(), problem.Z.rows());
@@ -120,7 +121,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
       scatter += share[i] * spectra.scatter(line);
       for (Index j = 0; j < B; ++j) {
         const Index other = window[static_cast<std::size_t>(j)];
-        scarcity += share[i] * share[j] * common_scatter(spectra.run(0), line, other) /
+        scarcity += share[i] * share[j] * common_scatter(run, line, other) /
                     std::sqrt(spectra.scatter_dof(line) * spectra.scatter_dof(other));
       }
     }

@@ -15,20 +15,14 @@ namespace {
 using Indices = std::vector<Eigen::Index>;
 
 bool contains(const Indices& list, Eigen::Index value) {
-  return std::find(list.begin(), list.end(), value) != list.end();
-}
-
-Indices all_of(const ChannelList& channels) {
-  Indices indices(channels.size());
-  std::iota(indices.begin(), indices.end(), 0);
-  return indices;
+  return std::ranges::find(list, value) != list.end();
 }
 
 /// The actuators with the names of the excited channels; all actuators if a name does not match.
 Indices estimated_actuators(const LogInfo& info, const Indices& excited) {
   Indices found = excited_actuators(info, excited);
-  if (found.empty()) return all_of(info.actuators);
-  std::sort(found.begin(), found.end());
+  if (found.empty()) return first_indices(info.actuators.size());
+  std::ranges::sort(found);
   return found;
 }
 
@@ -75,28 +69,33 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
                               std::size_t experiments, int realization, const FrfOptions& options) {
   ChannelChoice choice;
   choice.outputs = options.outputs.empty()
-                       ? all_of(info.sensors)
+                       ? first_indices(info.sensors.size())
                        : channel_positions(info.sensors, options.outputs, "outputs", "sensor");
   const Indices asked = channel_positions(info.actuators, options.inputs, "inputs", "actuator");
   const Indices by_excitation = estimated_actuators(info, excited);
   const bool part_of_the_excited =
       asked.size() < excited.size() && by_excitation.size() == excited.size() &&
-      std::all_of(asked.begin(), asked.end(),
-                  [&](Eigen::Index i) { return contains(by_excitation, i); });
+      std::ranges::all_of(asked, [&](Eigen::Index i) { return contains(by_excitation, i); });
   choice.estimated = asked.empty() || part_of_the_excited ? by_excitation : asked;
   choice.inputs = pick(info.actuators, asked.empty() ? by_excitation : asked).names;
   check_counts(info, excited, choice.estimated.size(), experiments, realization);
-  for (const Eigen::Index i : all_of(info.actuators)) {
+  for (const Eigen::Index i : first_indices(info.actuators.size())) {
     if (!contains(choice.estimated, i)) choice.excluded.push_back(i);
   }
   return choice;
+}
+
+std::vector<Eigen::Index> first_indices(std::size_t count) {
+  Indices indices(count);
+  std::iota(indices.begin(), indices.end(), 0);
+  return indices;
 }
 
 std::vector<Eigen::Index> actuators_of_excitation(const LogInfo& info) {
   std::vector<Eigen::Index> actuators;
   const auto& names = info.actuators.names;
   for (const std::string& name : info.excitation.names) {
-    const auto at = std::find(names.begin(), names.end(), name);
+    const auto at = std::ranges::find(names, name);
     actuators.push_back(at == names.end() ? -1 : at - names.begin());
   }
   return actuators;
@@ -107,7 +106,7 @@ std::vector<Eigen::Index> excited_actuators(const LogInfo& info,
   const std::vector<Eigen::Index> actuators = actuators_of_excitation(info);
   std::vector<Eigen::Index> found;
   for (const Eigen::Index axis : axes) found.push_back(actuators[static_cast<std::size_t>(axis)]);
-  if (std::find(found.begin(), found.end(), -1) != found.end()) found.clear();
+  if (contains(found, -1)) found.clear();
   return found;
 }
 

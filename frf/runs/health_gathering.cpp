@@ -6,8 +6,6 @@
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
-#include "frf/runs/run_periods.hpp"
-#include "frf/runs/run_steps.hpp"
 
 namespace stageid {
 namespace {
@@ -154,12 +152,11 @@ void HealthPart::forget_deviating(const RunSpectra& run) {
 }
 
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& w,
-                  HealthPart* health, const std::function<void(double bytes)>& read_done,
+                  HealthPart* health, const ReadDone& read_done,
                   const std::function<const KnownSpectra*(int period)>& take,
-                  const std::function<void(int period, const std::string& why)>& leave_out) {
+                  const LeaveOut& leave_out) {
   if (health == nullptr) {
-    for_each_period(
-        run, w, read_done, [&](int p) { take(p); }, leave_out);
+    for_each_period(run, w, read_done, take, leave_out);
     return;
   }
   health->begin(run, excitation);

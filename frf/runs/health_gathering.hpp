@@ -10,6 +10,7 @@
 #include "frf/periods/start_transient.hpp"
 #include "frf/runs/drive_mask.hpp"
 #include "frf/runs/health_record.hpp"
+#include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_spectra.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/runs/run_table.hpp"
@@ -38,11 +39,10 @@ class HealthPart {
 
  private:
   friend class HealthGathering;
-  friend void read_periods(
-      const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& workspace,
-      HealthPart* health, const std::function<void(double bytes)>& read_done,
-      const std::function<const KnownSpectra*(int period)>& take,
-      const std::function<void(int period, const std::string& why)>& leave_out);
+  friend void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation,
+                           RunWorkspace& workspace, HealthPart* health, const ReadDone& read_done,
+                           const std::function<const KnownSpectra*(int period)>& take,
+                           const LeaveOut& leave_out);
   void begin(const UsedRun& run, const Eigen::MatrixXd& excitation);
   /// Adds the clean period in workspace.samples. Channels that are not in `known` are transformed here.
   void take(int period, RunWorkspace& workspace, const KnownSpectra* known);
@@ -70,9 +70,9 @@ class HealthPart {
 /// period, or null.
 /// @param excitation samples x channels, one period
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& workspace,
-                  HealthPart* health, const std::function<void(double bytes)>& read_done,
+                  HealthPart* health, const ReadDone& read_done,
                   const std::function<const KnownSpectra*(int period)>& take,
-                  const std::function<void(int period, const std::string& why)>& leave_out);
+                  const LeaveOut& leave_out);
 
 /// A HealthRecord in progress, filled while the logs are read for another purpose.
 class HealthGathering {

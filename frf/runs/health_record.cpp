@@ -5,7 +5,6 @@
 
 #include "frf/runs/byte_counter.hpp"
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/runs/run_table.hpp"
 
@@ -26,11 +25,9 @@ class RecordReading {
         bytes_(options, realizations_),
         gathering_(realizations_),
         watch_start_(options.method == FrfMethod::periodic),
-        sensors_(realizations_.front().runs.front().log->info().sensors.size()),
+        sensors_(first_indices(realizations_.front().runs.front().log->info().sensors.size())),
         workers_(options.threads, total_runs(realizations_),
-                 realizations_.front().runs.front().log->info().period_samples) {
-    std::iota(sensors_.begin(), sensors_.end(), 0);
-  }
+                 realizations_.front().runs.front().log->info().period_samples) {}
 
   HealthRecord read() {
     const UsedRun* marked = nullptr;

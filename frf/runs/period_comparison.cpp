@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 #include <span>
 
 #include "frf/periods/bridge.hpp"
@@ -100,11 +99,10 @@ void PeriodComparison::bridge(std::size_t place, const std::vector<std::size_t>&
   Eigen::MatrixXd change = -period.cast<double>();
   bridge_samples(w_.record, reference, place, range);
   change += period.cast<double>();
-  std::vector<Index> all(static_cast<std::size_t>(change.cols()));
-  std::iota(all.begin(), all.end(), Index{0});
   Eigen::MatrixXcd& spectra = w_.spectra[place];
   Eigen::MatrixXcd difference(spectra.rows(), spectra.cols());
-  line_spectra(change, all, lines_.lines, 0, w_.dft, difference);
+  line_spectra(change, first_indices(static_cast<std::size_t>(change.cols())), lines_.lines, 0,
+               w_.dft, difference);
   spectra += difference;
 }
 

@@ -29,8 +29,7 @@ class RealizationSpectra {
   Eigen::MatrixXcd excitation(Eigen::Index k) const;
   Eigen::MatrixXcd response(Eigen::Index k) const;
 
-  int periods(std::size_t experiment) const { return runs_[experiment].periods; }
-  const RunSpectra& run(std::size_t experiment) const { return runs_[experiment]; }
+  const std::vector<RunSpectra>& runs() const noexcept { return runs_; }  ///< by experiment
 
   /// Degrees of freedom of scatter(): sum_e (P_e - 1), or those of the transient models. The scatter is scaled for
   /// this number, even if a line has fewer.
@@ -39,7 +38,6 @@ class RealizationSpectra {
   /// sum_e sum_p (Z_pe - Z_e)(Z_pe - Z_e)^H at line k, or the equivalent from the residuals of the transient models;
   /// full Hermitian matrix.
   Eigen::MatrixXcd scatter(Eigen::Index k) const;
-  Eigen::MatrixXcd scatter(std::size_t experiment, Eigen::Index k) const;  ///< of one experiment
 
  private:
   MatrixPool& pool_;

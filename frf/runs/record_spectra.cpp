@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -157,13 +157,10 @@ class RecordMeasurement {
                             Eigen::Index bins) const {
     RealDft dft(static_cast<int>(rows));
     Eigen::MatrixXcd Z(n_, bins);
-    const double scale = 1.0 / static_cast<double>(rows);
-    for (Eigen::Index c = 0; c < n_; ++c) {
-      fill_for_lines(samples.col(c).head(rows), dft);
-      const auto transformed = dft.forward();
-      for (Eigen::Index b = 0; b < bins; ++b)
-        Z(c, b) = scale * transformed[static_cast<std::size_t>(b)];
-    }
+    std::vector<int> all(static_cast<std::size_t>(bins));
+    std::iota(all.begin(), all.end(), 0);
+    line_spectra(samples.topRows(rows), first_indices(static_cast<std::size_t>(n_)), all, 0, dft,
+                 Z);
     return Z;
   }
 
@@ -186,7 +183,7 @@ class RecordMeasurement {
 
 RunSpectra measure_record(const UsedRun& used, const RunExcitation& excitation,
                           const ChannelChoice& channels, PeriodChoice choice, RunWorkspace& w,
-                          HealthPart* health, const std::function<void(double bytes)>& read_done) {
+                          HealthPart* health, const ReadDone& read_done) {
   RecordMeasurement measurement(used, excitation.spectrum, channels, choice, w);
   measurement.add_excitation(excitation.period);
   const auto take = [&](int p) {

@@ -16,7 +16,6 @@ namespace stageid {
 /// LogReader::read().
 RunSpectra measure_record(const UsedRun& run, const RunExcitation& excitation,
                           const ChannelChoice& channels, PeriodChoice choice,
-                          RunWorkspace& workspace, HealthPart* health,
-                          const std::function<void(double bytes)>& read_done);
+                          RunWorkspace& workspace, HealthPart* health, const ReadDone& read_done);
 
 }  // namespace stageid

@@ -104,8 +104,7 @@ class PeriodReading {
 
 /// Calls take(p) with the actuators' steps in the workspace's samples, unless an earlier estimate has left p out.
 void take_or_leave_out(const UsedRun& used, int p, RunWorkspace& w,
-                       const std::function<void(int)>& take,
-                       const std::function<void(int period, const std::string& why)>& leave_out) {
+                       const std::function<void(int)>& take, const LeaveOut& leave_out) {
   if (used.earlier == nullptr) return take(p);
   for (const DroppedPeriod& d : used.earlier->dropped)
     if (d.realization == used.run().realization && d.experiment == used.run().experiment &&
@@ -123,10 +122,10 @@ void take_or_leave_out(const UsedRun& used, int p, RunWorkspace& w,
 // A period is taken only after the next one has been compared with it, because a gap in the first period shows only
 // there. The waiting period is in w.ahead; if there is none, the next period is compared with the last one taken, in
 // w.samples.
-std::vector<SampleSlip> for_each_period(
-    const UsedRun& used, RunWorkspace& w, const std::function<void(double bytes)>& read_done,
-    const std::function<void(int period)>& take,
-    const std::function<void(int period, const std::string& why)>& leave_out) {
+std::vector<SampleSlip> for_each_period(const UsedRun& used, RunWorkspace& w,
+                                        const ReadDone& read_done,
+                                        const std::function<void(int period)>& take,
+                                        const LeaveOut& leave_out) {
   PeriodReading reading(used, w);
   std::vector<SampleSlip> slips;
   std::optional<int> waiting;

@@ -185,7 +185,7 @@ class RunMeasurement {
 RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
                        PeriodChoice choice, RunWorkspace& w, HealthPart* health,
-                       const std::function<void(double bytes)>& read_done) {
+                       const ReadDone& read_done) {
   RunMeasurement measurement(used, lines, channels, choice, w);
   Fingerprint fingerprint;
   add_matrix(fingerprint, excitation_period);
@@ -209,6 +209,19 @@ void RunSpectra::drop(const LogRun& of, int period, std::string reason) {
       std::upper_bound(dropped.begin(), dropped.end(), period,
                        [](int p, const DroppedPeriod& other) { return p < other.period; });
   dropped.insert(at, {of.realization, of.experiment, period, std::move(reason)});
+}
+
+Eigen::MatrixXcd RunSpectra::scatter(Eigen::Index k) const {
+  const Eigen::Index n = mean.rows();
+  Eigen::MatrixXcd full(n, n);
+  Eigen::Index entry = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j, ++entry) {
+      full(i, j) = {scatter_re(entry, k), scatter_im(entry, k)};
+      full(j, i) = std::conj(full(i, j));
+    }
+  }
+  return full;
 }
 
 Eigen::Index noise_blocks(Eigen::Index lines) {

@@ -46,6 +46,8 @@ struct RunSpectra {
   std::vector<int> deviating;
   void drop(const LogRun& of, int period, std::string reason);
   double dof(Eigen::Index k) const { return line_dof.size() > 0 ? line_dof[k] : scatter_dof; }
+  /// The scatter of line k as a full matrix. @pre degrees of freedom
+  Eigen::MatrixXcd scatter(Eigen::Index k) const;
 };
 
 /// Common part of two lines' scatters: the squared correlation of their mean squares; 1 for k = l. For two windows with
@@ -87,15 +89,18 @@ struct RunWorkspace {
 
 class HealthPart;
 
+/// Receives the bytes read, period by period.
+using ReadDone = std::function<void(double bytes)>;
+
 /// Reads a run period by period and averages. Periods with a marked sample are discarded, and with
 /// PeriodChoice::consistent those that find_outliers() finds among about 16 neighbours. If at most a tenth of such a
 /// period deviates, only these samples are replaced (bridge_samples()), and the period is used.
-/// `health`, if not null, receives each period as well; `read_done` receives the bytes read, period by period.
+/// `health`, if not null, receives each period as well.
 /// @returns zero periods and only the dropped ones if none is clean
 /// @throws the same as LogReader::read().
 RunSpectra measure_run(const UsedRun& run, const SpectrumLines& lines,
                        const ChannelChoice& channels, const Eigen::MatrixXd& excitation_period,
                        PeriodChoice choice, RunWorkspace& workspace, HealthPart* health,
-                       const std::function<void(double bytes)>& read_done);
+                       const ReadDone& read_done);
 
 }  // namespace stageid

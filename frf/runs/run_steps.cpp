@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <complex>
 #include <set>
 #include <stdexcept>
 
@@ -11,6 +12,20 @@
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
+namespace {
+
+/// Unscaled DFT of one channel; valid until the next call.
+std::span<const std::complex<double>> transform(const Eigen::Ref<const Eigen::VectorXd>& samples,
+                                                RealDft& dft) {
+  const auto input = dft.input();
+  if (samples.size() > 0 && (samples.array() == samples[0]).all())
+    std::fill_n(input.begin(), samples.size(), 0.0);
+  else
+    std::copy_n(samples.data(), samples.size(), input.begin());
+  return dft.forward();
+}
+
+}  // namespace
 
 RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
   RunExcitation excitation{run.log->excitation(run.index), {}};
@@ -57,25 +72,11 @@ std::vector<RunExcitation> RunWorkers::read_excitation(const std::vector<UsedRun
   return excitation;
 }
 
-std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
-                                                Eigen::Index channel, RealDft& dft) {
-  fill_for_lines(samples.col(channel), dft);
-  return dft.forward();
-}
-
-void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& dft) {
-  const auto input = dft.input();
-  if (samples.size() > 0 && (samples.array() == samples[0]).all())
-    std::fill_n(input.begin(), samples.size(), 0.0);
-  else
-    std::copy_n(samples.data(), samples.size(), input.begin());
-}
-
 // Spectra are stored line by line, so consecutive lines of one channel are far apart. Writing four channels at a time
 // fills a cache line.
-void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
-                  const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
-                  Eigen::MatrixXcd& spectra) {
+void line_spectra(const Eigen::Ref<const Eigen::MatrixXd>& samples,
+                  const std::vector<Eigen::Index>& channels, const std::vector<int>& lines,
+                  Eigen::Index first_row, RealDft& dft, Eigen::MatrixXcd& spectra) {
   constexpr Eigen::Index kTogether = 4;
   const double scale = 1.0 / static_cast<double>(dft.length());
   const auto count = std::ssize(channels);
@@ -83,7 +84,8 @@ void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index
   for (Eigen::Index first = 0; first < count; first += kTogether) {
     const Eigen::Index n = std::min(kTogether, count - first);
     for (Eigen::Index c = 0; c < n; ++c) {
-      const auto spectrum = transform(samples, channels[static_cast<std::size_t>(first + c)], dft);
+      const auto spectrum =
+          transform(samples.col(channels[static_cast<std::size_t>(first + c)]), dft);
       for (Eigen::Index k = 0; k < some.rows(); ++k)
         some(k, c) = scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
     }
@@ -110,7 +112,7 @@ Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWo
   const double scale = 1.0 / (static_cast<double>(w.dft.length()) * periods);
   Eigen::VectorXd power = Eigen::VectorXd::Zero(w.excluded_sum.cols());
   for (Eigen::Index c = 0; c < power.size(); ++c) {
-    const auto spectrum = transform(w.excluded_sum, c, w.dft);
+    const auto spectrum = transform(w.excluded_sum.col(c), w.dft);
     for (const int line : lines)
       power[c] += std::norm(scale * spectrum[static_cast<std::size_t>(line)]);
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <complex>
 #include <functional>
 #include <memory>
 #include <span>
@@ -52,19 +51,12 @@ class RunWorkers {
   std::vector<std::unique_ptr<RunWorkspace>> workspaces_;
 };
 
-/// Unscaled DFT of one column, on lines above zero; valid until the next call. @pre samples.rows() == dft.length()
-std::span<const std::complex<double>> transform(const Eigen::MatrixXd& samples,
-                                                Eigen::Index channel, RealDft& dft);
-
-/// Copies samples into dft.input(), for lines above zero. For a constant channel these are zeros; otherwise,
-/// rounding would cause a response. @pre as many as dft.length()
-void fill_for_lines(const Eigen::Ref<const Eigen::VectorXd>& samples, RealDft& dft);
-
-/// DFT / number of samples of one period of the selected channels, on `lines`, into the rows of `spectra` from
-/// `first_row` on.
-void line_spectra(const Eigen::MatrixXd& samples, const std::vector<Eigen::Index>& channels,
-                  const std::vector<int>& lines, Eigen::Index first_row, RealDft& dft,
-                  Eigen::MatrixXcd& spectra);
+/// DFT / number of samples of the selected channels, on `lines`, into the rows of `spectra` from `first_row` on. A
+/// constant channel gives zeros, also on line zero; otherwise, rounding would cause a response.
+/// @pre samples.rows() == dft.length()
+void line_spectra(const Eigen::Ref<const Eigen::MatrixXd>& samples,
+                  const std::vector<Eigen::Index>& channels, const std::vector<int>& lines,
+                  Eigen::Index first_row, RealDft& dft, Eigen::MatrixXcd& spectra);
 
 /// Adds w d d^H to the packed lower half of one line (RunSpectra::scatter_re, scatter_im). In real arithmetic and
 /// without a reduction, so that the bits do not depend on the compiler's vector width.
