@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <optional>
 
@@ -44,20 +45,20 @@ double power_ratio(const Eigen::MatrixXd& gram, const Periods& core, Index p) {
 /// For one channel, one matrix per band: Re sum over its lines of conj(d_p) d_q. d is the deviation from the mean
 /// over the root of the line's scatter.
 std::vector<Eigen::MatrixXd> line_grams(const ComparedPeriods& periods, Index channel,
-                                        const std::vector<Index>& bands) {
+                                        const std::vector<LineBand>& bands) {
   const auto P = std::ssize(periods.spectra);
   const double smallest =
       kRounding *
       periods.spectra.front().row(channel).head(periods.frequency_hz.size()).cwiseAbs2().maxCoeff();
   std::vector<Eigen::MatrixXd> grams;
   Eigen::MatrixXcd deviation;
-  for (std::size_t b = 0; b + 1 < bands.size(); ++b) {
-    const Index lines = bands[b + 1] - bands[b];
+  for (const LineBand& band : bands) {
+    const Index lines = band.count();
     deviation.resize(lines, P);
     for (Index p = 0; p < P; ++p)
       deviation.col(p) = periods.spectra[static_cast<std::size_t>(p)]
                              .row(channel)
-                             .segment(bands[b], lines)
+                             .segment(band.first, lines)
                              .transpose();
     const Eigen::VectorXcd mean = deviation.rowwise().mean();
     deviation.colwise() -= mean;
@@ -102,7 +103,7 @@ Periods closest_periods(const std::vector<Eigen::MatrixXd>& grams) {
   }
   Periods order(static_cast<std::size_t>(P));
   std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(), [&](Index p, Index q) {
+  std::ranges::sort(order, [&](Index p, Index q) {
     return p != centre && q != centre ? distance(p, centre) < distance(q, centre)
                                       : p == centre && q != centre;
   });
@@ -117,7 +118,7 @@ Periods core_of(const std::vector<Eigen::MatrixXd>& grams) {
     Index next = -1;
     double least = worth_dropping(core.size());
     for (Index p = 0; p < grams.front().rows(); ++p) {
-      if (std::find(core.begin(), core.end(), p) != core.end()) continue;
+      if (std::ranges::find(core, p) != core.end()) continue;
       const double ratio = mean_ratio(grams, core, p);
       if (ratio > least) continue;
       least = ratio;
@@ -126,7 +127,7 @@ Periods core_of(const std::vector<Eigen::MatrixXd>& grams) {
     if (next < 0) break;
     core.push_back(next);
   }
-  std::sort(core.begin(), core.end());
+  std::ranges::sort(core);
   return core;
 }
 
@@ -139,11 +140,10 @@ Periods comparable_positions(const OctaveRecord& octave, const Periods& core, In
   for (Index i = 0; i < octave.detail.rows(); ++i) {
     const Index before = octave.first_period(i);
     const Index after = octave.last_period(i);
-    const bool all =
-        std::isfinite(octave.detail(i, p)) && std::all_of(core.begin(), core.end(), [&](Index q) {
-          return std::isfinite(octave.detail(i, q)) &&
-                 in.segment(q + before, after - before + 1).all();
-        });
+    const bool all = std::isfinite(octave.detail(i, p)) && std::ranges::all_of(core, [&](Index q) {
+                       return std::isfinite(octave.detail(i, q)) &&
+                              in.segment(q + before, after - before + 1).all();
+                     });
     if (all) positions.push_back(i);
   }
   return positions;
@@ -267,7 +267,7 @@ struct Candidate {
 
 /// Outlier candidates of one channel.
 std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
-                                  const std::vector<Index>& bands) {
+                                  const std::vector<LineBand>& bands) {
   const std::vector<Eigen::MatrixXd> grams = line_grams(periods, channel, bands);
   if (grams.empty()) return {};
   const Periods core = core_of(grams);
@@ -283,7 +283,7 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
       log_choices(P, core.size()) + std::log(static_cast<double>(periods.spectra.front().rows()) *
                                              static_cast<double>(octaves.size()));
   for (Index p = 0; p < P; ++p) {
-    if (std::binary_search(core.begin(), core.end(), p)) continue;
+    if (std::ranges::binary_search(core, p)) continue;
     Candidate most;
     most.gain = mean_ratio(grams, core, p);
     double power = 0.0;
@@ -309,7 +309,7 @@ PeriodOutliers find_outliers(const ComparedPeriods& periods) {
   PeriodOutliers result;
   const std::size_t P = periods.spectra.size();
   if (P < 3) return result;
-  const std::vector<Index> bands = octave_bands(periods.frequency_hz, kFewestLinesOfBand);
+  const std::vector<LineBand> bands = octave_bands(periods.frequency_hz);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
     for (const Candidate& candidate : candidates(periods, c, bands)) {
@@ -322,12 +322,10 @@ PeriodOutliers find_outliers(const ComparedPeriods& periods) {
   for (std::size_t p = 0; p < P; ++p)
     if (most[p].gain == 0.0) result.consistent.push_back(p);
   std::erase_if(most, [](const Candidate& candidate) { return candidate.gain == 0.0; });
-  std::sort(most.begin(), most.end(),
-            [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  std::ranges::sort(most, std::ranges::greater(), &Candidate::gain);
   most.resize(std::min(most.size(), (P - 1) / 2));
   for (const Candidate& candidate : most) result.found.push_back(candidate.outlier);
-  std::sort(result.found.begin(), result.found.end(),
-            [](const PeriodOutlier& a, const PeriodOutlier& b) { return a.period < b.period; });
+  std::ranges::sort(result.found, {}, &PeriodOutlier::period);
   return result;
 }
 

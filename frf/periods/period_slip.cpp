@@ -126,23 +126,21 @@ Explained explained_of(const MatrixXd& earlier, const MatrixXd& later, Index c, 
           std::min(independent_samples(before, dft), independent_samples(after, dft)), 1.0};
 }
 
-Explained sum_of(const std::vector<Explained>& channels, Index rows) {
-  Explained sum{ArrayXd::Zero(rows), ArrayXd::Zero(rows)};
-  for (const Explained& one : channels) {
-    sum.before += one.before;
-    sum.after += one.after;
-    sum.freedom += one.freedom;
-    sum.noise += one.noise;
-  }
-  return sum;
-}
-
-std::vector<Explained> explained(const MatrixXd& earlier, const MatrixXd& later, Index shift,
-                                 RealDft& dft) {
+struct ExplainedKind {
   std::vector<Explained> channels;
-  for (Index c = 0; c < later.cols(); ++c)
-    channels.push_back(explained_of(earlier, later, c, shift, dft));
-  return channels;
+  Explained sum;
+};
+
+ExplainedKind explained(const MatrixXd& earlier, const MatrixXd& later, Index shift, RealDft& dft) {
+  ExplainedKind kind{{}, {ArrayXd::Zero(later.rows()), ArrayXd::Zero(later.rows())}};
+  for (Index c = 0; c < later.cols(); ++c) {
+    const Explained& one = kind.channels.emplace_back(explained_of(earlier, later, c, shift, dft));
+    kind.sum.before += one.before;
+    kind.sum.after += one.after;
+    kind.sum.freedom += one.freedom;
+    kind.sum.noise += one.noise;
+  }
+  return kind;
 }
 
 struct Change {
@@ -249,14 +247,10 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
   std::optional<PeriodSlip> of_one;  // of a single channel
   double largest_of_one = 0.0;
   for (const Index shift : shifts_to_try(earlier, later, dft)) {
-    const std::vector<Explained> each_sensor =
-        explained(earlier.sensors, later.sensors, shift, dft);
-    const std::vector<Explained> each_actuator =
-        explained(earlier.actuators, later.actuators, shift, dft);
-    const Explained sensors = sum_of(each_sensor, N);
-    const Explained actuators = sum_of(each_actuator, N);
-    const ArrayXd of_sensors = sensors.before - sensors.after;
-    const ArrayXd of_actuators = actuators.before - actuators.after;
+    const ExplainedKind sensors = explained(earlier.sensors, later.sensors, shift, dft);
+    const ExplainedKind actuators = explained(earlier.actuators, later.actuators, shift, dft);
+    const ArrayXd of_sensors = sensors.sum.before - sensors.sum.after;
+    const ArrayXd of_actuators = actuators.sum.before - actuators.sum.after;
     const std::array<ArrayXd, 3> gains = {of_sensors + of_actuators, of_sensors, of_actuators};
     const bool near = std::abs(shift) <= kNear;
     const auto slip_of = [&](const Change& change, bool y, bool u) {
@@ -267,8 +261,8 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
     for (const ArrayXd& gain : gains) {
       const Change change = best_change(gain);
       if (!of_kind || !(change.gain > largest)) continue;
-      const double y = advantage(sensors, change);
-      const double u = advantage(actuators, change);
+      const double y = advantage(sensors.sum, change);
+      const double u = advantage(actuators.sum, change);
       // A transient or a stuck sensor may look like a long shift. With a wrong period length, every period is
       // displaced as a whole.
       const bool whole = change.first == 0 && change.last == N;
@@ -290,9 +284,9 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       largest_of_one = change.gain;
     };
     for (Index c = 0; c < later.sensors.cols(); ++c)
-      try_one(each_sensor[static_cast<std::size_t>(c)], c, true);
+      try_one(sensors.channels[static_cast<std::size_t>(c)], c, true);
     for (Index c = 0; c < later.actuators.cols(); ++c)
-      try_one(each_actuator[static_cast<std::size_t>(c)], c, false);
+      try_one(actuators.channels[static_cast<std::size_t>(c)], c, false);
   }
   return of_one && largest_of_one > kClearlyMore * largest ? of_one : found;
 }

@@ -85,11 +85,8 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   Eigen::VectorXcd R(B);
   for (Index i = 0; i < B; ++i)
     R[i] = spectra.excitation(window[static_cast<std::size_t>(i)])(i / bins_, 0);
-  problem.K.resize(kRegressors, B);
-  for (Index i = 0; i < B; ++i)
-    for (Index s = 0; s < kRegressors; ++s)
-      problem.K(s, i) = R[i] * std::pow(problem.r[i], static_cast<double>(s));
-  problem.k0 = Eigen::VectorXcd::Unit(kRegressors, 0);
+  set_polynomials(problem, kRegressors - 1);
+  problem.K *= R.asDiagonal();
   problem.groups.assign(static_cast<std::size_t>(axes), bins_);
   problem.independent_noise = outputs_;
   problem.pole_channels = outputs_;

@@ -37,31 +37,28 @@ double relative_distortion(const Eigen::ArrayXd& total, const Eigen::ArrayXd& no
 }  // namespace
 
 DistortionVariance distortion_variance(const FrfEstimate& frf) {
-  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLinesOfBand);
+  const std::vector<LineBand> bands = octave_bands(frf.frequency_hz);
   DistortionVariance out;
   out.variance.resize(frf.response.rows(), frf.lines());
   const Eigen::MatrixXd row = row_power(frf);
   const auto prior_dof = static_cast<double>(kFewestLinesOfBand);  // of the expectation
   out.dof = frf.total_dof + prior_dof;
-  const auto bands = std::ssize(limits) - 1;
-  out.distortion.band_hz.resize(bands, 2);
-  out.distortion.level.resize(frf.response.rows(), bands);
-  for (std::size_t b = 0; b + 1 < limits.size(); ++b) {
-    const Eigen::Index count = limits[b + 1] - limits[b];
-    const auto at = static_cast<Eigen::Index>(b);
-    out.distortion.band_hz.row(at) << frf.frequency_hz[limits[b]],
-        frf.frequency_hz[limits[b + 1] - 1];
+  out.distortion.band_hz.resize(std::ssize(bands), 2);
+  out.distortion.level.resize(frf.response.rows(), std::ssize(bands));
+  for (Eigen::Index b = 0; b < std::ssize(bands); ++b) {
+    const LineBand& lines = bands[static_cast<std::size_t>(b)];
+    out.distortion.band_hz.row(b) << frf.frequency_hz[lines.first], frf.frequency_hz[lines.end - 1];
     for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
       const auto band = [&](const Eigen::MatrixXd& matrix, Eigen::Index i) {
-        return matrix.row(i).segment(limits[b], count).transpose().array().eval();
+        return matrix.row(i).segment(lines.first, lines.count()).transpose().array().eval();
       };
       const Eigen::ArrayXd total = band(frf.total_variance, c);
       const Eigen::ArrayXd noise = band(frf.noise_variance, c);
       const Eigen::ArrayXd power = band(row, c % frf.n_outputs());
       const double alpha = relative_distortion(total, noise, power);
-      out.distortion.level(c, at) = std::sqrt((frf.total_dof + 1.0) * alpha);
+      out.distortion.level(c, b) = std::sqrt((frf.total_dof + 1.0) * alpha);
       const Eigen::ArrayXd expected = noise + alpha * power;
-      out.variance.row(c).segment(limits[b], count) =
+      out.variance.row(c).segment(lines.first, lines.count()) =
           ((frf.total_dof * total + prior_dof * expected) / out.dof).matrix().transpose();
     }
   }

@@ -48,10 +48,10 @@ struct MeanRatio {
   double count = 0.0;  ///< lines and inputs with noise
 };
 
-MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outputs, Index first,
-                     Index end) {
+MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outputs,
+                     const LineBand& band) {
   MeanRatio ratio;
-  for (Index k = first; k < end; ++k)
+  for (Index k = band.first; k < band.end; ++k)
     for (Index c = output; c < scatter.total.rows(); c += outputs) {
       if (!(scatter.noise(c, k) > 0.0)) continue;
       ratio.mean += scatter.total(c, k) / scatter.noise(c, k);
@@ -66,19 +66,19 @@ MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outp
 void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
   if (scatter.total.size() == 0 || scatter.noise_dof < kFewestDof) return;
   const Index n_y = frf.n_outputs();
-  const std::vector<Index> limits =
+  const std::vector<LineBand> bands =
       octave_bands(frf.frequency_hz, std::max(kFewestLinesOfBand, kFewestRatios / frf.n_inputs()));
   const double expected = mean_of_f(scatter.noise_dof);
   const double variance = variance_of_f(frf.total_dof, scatter.noise_dof);
-  const double tests = static_cast<double>(n_y) * static_cast<double>(limits.size() - 1);
-  for (std::size_t band = 0; band + 1 < limits.size(); ++band)
+  const double tests = static_cast<double>(n_y) * static_cast<double>(bands.size());
+  for (const LineBand& band : bands)
     for (Index i = 0; i < n_y; ++i) {
-      const MeanRatio ratio = mean_ratio(scatter, i, n_y, limits[band], limits[band + 1]);
+      const MeanRatio ratio = mean_ratio(scatter, i, n_y, band);
       if (ratio.count == 0.0) continue;
       const double below = (expected - ratio.mean) / std::sqrt(variance / ratio.count);
       if (tail_of_normal(below) * tests >= kByChance) continue;
       const double factor = std::max(kLeast, ratio.mean / expected);
-      for (Index k = limits[band]; k < limits[band + 1]; ++k) scale(frf, i, k, factor);
+      for (Index k = band.first; k < band.end; ++k) scale(frf, i, k, factor);
     }
 }
 

@@ -31,14 +31,7 @@ LocalFit fit_around(const Eigen::VectorXd& frequency_hz, const Eigen::MatrixXcd&
   problem.r = (away / away.abs().maxCoeff()).matrix();
   problem.groups = {kWindow};
   problem.independent_noise = problem.pole_channels = lines.rows();
-  problem.K.resize(kOrder + 1, kWindow);
-  for (Eigen::Index i = 0; i <= kOrder; ++i)
-    problem.K.row(i) = problem.r.array()
-                           .pow(static_cast<double>(i))
-                           .matrix()
-                           .cast<std::complex<double>>()
-                           .transpose();
-  problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
+  set_polynomials(problem, kOrder);
   return fit_locally(problem, kMostPoles);
 }
 

@@ -22,19 +22,19 @@ double evidence(double power, double noise, double linear, int power_dof, double
 }
 
 /// Scatter of the realizations: column b of p_value and distortion.
-void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, Eigen::Index first,
-                  Eigen::Index K, Eigen::Index b, NonlinearityTest& test) {
+void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, const LineBand& band,
+                  Eigen::Index b, NonlinearityTest& test) {
   const int a = static_cast<int>(frf.total_dof);
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
     double sum = 0.0;
     double excess = 0.0;
-    for (Eigen::Index k = first; k < first + K; ++k) {
+    for (Eigen::Index k = band.first; k < band.end; ++k) {
       sum += evidence(scatter.total(c, k), scatter.noise(c, k), std::norm(frf.response(c, k)), a,
                       scatter.noise_dof);
       excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
     }
-    test.p_value(c, b) = tail_of_evidence(sum, K);
-    const double linear = frf.response.row(c).segment(first, K).squaredNorm();
+    test.p_value(c, b) = tail_of_evidence(sum, band.count());
+    const double linear = frf.response.row(c).segment(band.first, band.count()).squaredNorm();
     // A constant output has no response and hence no distortion.
     test.distortion(c, b) = linear > 0.0 ? std::sqrt((a + 1) * excess / linear) : 0.0;
   }
@@ -147,8 +147,8 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence) {
   if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
     throw std::invalid_argument(why);
-  const std::vector<Eigen::Index> limits = octave_bands(frf.frequency_hz, kFewestLinesOfBand);
-  const auto bands = std::ssize(limits) - 1;
+  const std::vector<LineBand> octaves = octave_bands(frf.frequency_hz);
+  const auto bands = std::ssize(octaves);
   const Eigen::Index n_c = frf.response.rows();
   NonlinearityTest test;
   test.band_hz.resize(bands, 2);
@@ -165,15 +165,14 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test.odd = test.even;
   }
   for (Eigen::Index b = 0; b < bands; ++b) {
-    const Eigen::Index first = limits[static_cast<std::size_t>(b)];
-    const Eigen::Index next = limits[static_cast<std::size_t>(b) + 1];
-    test.band_hz.row(b) << frf.frequency_hz[first], frf.frequency_hz[next - 1];
-    test_scatter(frf, scatter, first, next - first, b, test);
+    const LineBand& band = octaves[static_cast<std::size_t>(b)];
+    const double low_hz = frf.frequency_hz[band.first];
+    test.band_hz.row(b) << low_hz, frf.frequency_hz[band.end - 1];
+    test_scatter(frf, scatter, band, b, test);
     if (detection.line.size() == 0) continue;
     const Eigen::VectorXd linear_power =
-        detection.linear_power.middleCols(first, next - first).rowwise().mean();
-    const double low_hz = frf.frequency_hz[first];
-    const double high_hz = frf.frequency_hz[std::min(next, frf.lines() - 1)];
+        detection.linear_power.middleCols(band.first, band.count()).rowwise().mean();
+    const double high_hz = frf.frequency_hz[std::min(band.end, frf.lines() - 1)];
     test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
     test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }

@@ -92,14 +92,9 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   problem.pole_channels = outputs_;  // the inputs repeat their noise
   problem.tested_noise = outputs_;
   problem.chance_of_a_pole = kChanceOfAPole;
-  problem.K.resize(kOrder + 1, window_);
-  for (Eigen::Index i = 0; i < window_; ++i) {
-    const double r = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
-    problem.r[i] = r;
-    for (Eigen::Index q = 0; q <= kOrder; ++q)
-      problem.K(q, i) = std::pow(r, static_cast<double>(q));
-  }
-  problem.k0 = Eigen::VectorXcd::Unit(kOrder + 1, 0);
+  for (Eigen::Index i = 0; i < window_; ++i)
+    problem.r[i] = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
+  set_polynomials(problem, kOrder);
 
   const LocalFit fit = fit_locally(problem, kMostPoles);
   run.scatter_first[static_cast<std::size_t>(k)] =

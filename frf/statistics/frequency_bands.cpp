@@ -2,18 +2,18 @@
 
 namespace stageid {
 
-std::vector<Eigen::Index> octave_bands(const Eigen::VectorXd& frequency_hz,
-                                       Eigen::Index fewest_lines) {
-  std::vector<Eigen::Index> limits = {0};
-  double first_hz = frequency_hz[0];
-  for (Eigen::Index k = 1; k < frequency_hz.size(); ++k) {
-    if (frequency_hz[k] < 2.0 * first_hz || k - limits.back() < fewest_lines) continue;
-    limits.push_back(k);
-    first_hz = frequency_hz[k];
+std::vector<LineBand> octave_bands(const Eigen::VectorXd& frequency_hz, Eigen::Index fewest_lines) {
+  const Eigen::Index N = frequency_hz.size();
+  std::vector<LineBand> bands = {{0, N}};
+  for (Eigen::Index k = 1; k < N; ++k) {
+    const Eigen::Index first = bands.back().first;
+    if (frequency_hz[k] < 2.0 * frequency_hz[first] || k - first < fewest_lines) continue;
+    bands.back().end = k;
+    bands.push_back({k, N});
   }
-  if (limits.size() > 1 && frequency_hz.size() - limits.back() < fewest_lines) limits.pop_back();
-  limits.push_back(frequency_hz.size());
-  return limits;
+  if (bands.size() > 1 && bands.back().count() < fewest_lines) bands.pop_back();
+  bands.back().end = N;
+  return bands;
 }
 
 }  // namespace stageid

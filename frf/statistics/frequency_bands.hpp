@@ -8,10 +8,17 @@ namespace stageid {
 /// Lines of a band that a test or a mean needs at least.
 inline constexpr Eigen::Index kFewestLinesOfBand = 8;
 
-/// First line of each band, and the number of lines at the end. Bands are octaves, starting at the first line, joined
-/// until each has at least `fewest_lines`. The last band includes the remainder.
+/// Neighbouring lines, from `first` to before `end`.
+struct LineBand {
+  Eigen::Index first = 0;
+  Eigen::Index end = 0;
+  Eigen::Index count() const noexcept { return end - first; }
+};
+
+/// Octaves, starting at the first line, joined until each has at least `fewest_lines`. The last band includes the
+/// remainder.
 /// @pre frequency_hz is not empty and increases
-std::vector<Eigen::Index> octave_bands(const Eigen::VectorXd& frequency_hz,
-                                       Eigen::Index fewest_lines);
+std::vector<LineBand> octave_bands(const Eigen::VectorXd& frequency_hz,
+                                   Eigen::Index fewest_lines = kFewestLinesOfBand);
 
 }  // namespace stageid

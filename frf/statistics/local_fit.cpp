@@ -304,6 +304,14 @@ Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitti
 
 }  // namespace
 
+void set_polynomials(LocalProblem& problem, Eigen::Index order) {
+  problem.K.resize(order + 1, problem.r.size());
+  for (Eigen::Index i = 0; i < problem.r.size(); ++i)
+    for (Eigen::Index q = 0; q <= order; ++q)
+      problem.K(q, i) = std::pow(problem.r[i], static_cast<double>(q));
+  problem.k0 = Eigen::VectorXcd::Unit(order + 1, 0);
+}
+
 LocalFit fit_locally(const LocalProblem& problem, int most_poles) {
   const Fitting fitting(problem, most_poles);
   LocalFit best = fitting.polynomial();

@@ -49,6 +49,9 @@ struct LocalProblem {
   double narrowest_pole = 0.0;
 };
 
+/// Sets the regressors of polynomials in problem.r with a value on the line: K = 1, r, ..., r^order.
+void set_polynomials(LocalProblem& problem, Eigen::Index order);
+
 /// Fits with 0, 1, ... `most_poles` poles. A pole is kept only if it lowers the sum of squared residuals more than
 /// noise alone does with the probability chance_of_a_pole.
 /// @pre B > p groups + most_poles; K of each group has full rank p.
