@@ -28,14 +28,11 @@ constexpr double kConfidenceLevel = 0.95;
 
 void write_channels(Hdf5File& file, const std::string& dataset, const ChannelList& channels) {
   file.write_texts(dataset, channels.names);
-  const bool one_unit =
-      std::all_of(channels.units.begin(), channels.units.end(),
-                  [&](const std::string& u) { return u == channels.units.front(); });
-  if (one_unit) {
-    file.write_attribute(dataset, "unit", channels.units.front());
-  } else {
-    file.write_attribute(dataset, "unit", channels.units);
-  }
+  const std::vector<std::string>& units = channels.units;
+  if (std::ranges::all_of(units, [&](const std::string& u) { return u == units.front(); }))
+    file.write_attribute(dataset, "unit", units.front());
+  else
+    file.write_attribute(dataset, "unit", units);
 }
 
 /// Calls use(name, value) for every attribute; a const estimate is written, without those that are usually 1.

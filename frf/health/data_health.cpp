@@ -44,14 +44,12 @@ bool is_of_log(const Finding& f) {
 }  // namespace
 
 const std::string& Examination::name(Index channel) const {
-  return channel < record_.n_y()
-             ? record_.info.sensors.names[static_cast<std::size_t>(channel)]
-             : record_.info.actuators.names[static_cast<std::size_t>(channel - record_.n_y())];
+  return channel < record_.n_y() ? record_.info.sensors.name(channel)
+                                 : record_.info.actuators.name(channel - record_.n_y());
 }
 
 bool Examination::found(Cause cause) const {
-  return std::any_of(findings_.begin(), findings_.end(),
-                     [&](const Finding& f) { return f.cause == cause; });
+  return std::ranges::find(findings_, cause, &Finding::cause) != findings_.end();
 }
 
 void Examination::check_cycles() {
@@ -85,9 +83,8 @@ void Examination::check_samples() {
     if (stuck > std::max({kStuckShare * run_samples, 2.0, expected}) &&
         !(piles_up && scan.returns())) {
       const auto excited = excited_actuators();
-      const bool driven =
-          sensor ? expected_to_respond(c).value_or(true)
-                 : std::find(excited.begin(), excited.end(), c - record_.n_y()) != excited.end();
+      const bool driven = sensor ? expected_to_respond(c).value_or(true)
+                                 : std::ranges::find(excited, c - record_.n_y()) != excited.end();
       if (!driven) continue;
       const std::string figure = fmt::format("{:.3g} s", stuck / record_.info.sample_rate_hz);
       if (scan.is_coarse())
@@ -110,8 +107,8 @@ void Examination::find_clipped(Index c, double log_p) {
   const bool sensor = c < record_.n_y();
   const bool high = scan.log_p_high() <= log_p;
   const bool low = scan.log_p_low() <= log_p;
-  const std::string& unit = (sensor ? record_.info.sensors : record_.info.actuators)
-                                .units[static_cast<std::size_t>(sensor ? c : c - record_.n_y())];
+  const std::string& unit =
+      sensor ? record_.info.sensors.unit(c) : record_.info.actuators.unit(c - record_.n_y());
   find(Severity::fault, Cause::saturated, name(c),
        "clipped: samples accumulate at the end of its range",
        fmt::format("{} at {:.4g} {}",
@@ -157,8 +154,8 @@ void Examination::find_drowned(const std::vector<Index>& sensors) {
     for (const Index s : sensors) names += (names.empty() ? "" : " ") + name(s);
   const std::string figure =
       fmt::format("no line of {} is above its other motion", counted(sensors.size(), "sensor"));
-  const bool hidden = std::none_of(sensors.begin(), sensors.end(),
-                                   [this](Index s) { return expected_above_noise(s); });
+  const bool hidden =
+      std::ranges::none_of(sensors, [this](Index s) { return expected_above_noise(s); });
   // Forces act within the loop: u = r - C y holds in every period. A setpoint enters u beside it.
   if (nominal_ && nominal_->controller && hidden && why_no_nominal(true).empty() &&
       unexplained_motion(record_, *nominal_) < kUnexplained)
@@ -177,7 +174,7 @@ void Examination::find_drowned(const std::vector<Index>& sensors) {
 void Examination::check_responses() {
   std::vector<bool> responding;
   for (Index s = 0; s < record_.n_y(); ++s) responding.push_back(responds(record_, s));
-  const bool none = std::find(responding.begin(), responding.end(), true) == responding.end();
+  const bool none = std::ranges::find(responding, true) == responding.end();
   // Dead sensors have independent noise; what moves the stage moves several.
   const auto moves = [this](Index s) {
     for (Index other = 0; other < record_.n_y(); ++other)
@@ -251,8 +248,7 @@ void Examination::check_arrival() {
       driven = driven || tail_of_evidence(evidence(c, a), lines) < kSignificance / tests;
     if (driven) continue;
     find(Severity::fault, Cause::excitation,
-         record_.info.excitation
-             .names[static_cast<std::size_t>(record_.axes[static_cast<std::size_t>(a)])],
+         record_.info.excitation.name(record_.axes[static_cast<std::size_t>(a)]),
          "the excitation does not reach the stage: no channel responds to it",
          "no line above the noise",
          "check the injection of this axis and measure again, or exclude it with --inputs");
@@ -328,7 +324,7 @@ void Examination::check_excluded() {
       record_.scatter_dof() > 0 ? noise_share(record_) / averaged : kExcludedPower;
   for (Index a = 0; a < record_.n_u(); ++a) {
     const Index c = record_.n_y() + a;
-    if (std::find(excited.begin(), excited.end(), a) != excited.end()) continue;
+    if (std::ranges::find(excited, a) != excited.end()) continue;
     const double share = power(a) / inputs;
     if (share > tolerable && responds(record_, c))  // the bias is about the root of the share
       find(Severity::fault, Cause::excluded, name(c),
@@ -377,11 +373,11 @@ void Examination::add_others(std::vector<Finding>& own) {
     Examination examination(std::move(record), nominal_);
     examination.spoilt_ = spoilt_of_log_;
     const int realization = examination.record_.realization;
-    if (clean && std::find(apart.begin(), apart.end(), realization) == apart.end() &&
+    if (clean && std::ranges::find(apart, realization) == apart.end() &&
         examination.follows_stage())
       continue;
     for (Finding& f : examination.examine_other()) {
-      auto same = std::find_if(own.begin(), own.end(), [&f](const Finding& one) {
+      auto same = std::ranges::find_if(own, [&f](const Finding& one) {
         return one.cause == f.cause && one.channel == f.channel && one.severity == f.severity &&
                one.what == f.what;
       });
@@ -403,10 +399,9 @@ void Examination::check_others(std::vector<Finding> own) {
   };
   // What the recording does not explain is a difference at the stage, or the stage is unknown.
   for (const RealizationChange& change : record_.differences.changes)
-    if (std::none_of(own.begin(), own.end(), [&](const Finding& f) {
+    if (std::ranges::none_of(own, [&](const Finding& f) {
           return f.severity == Severity::fault && !in_all(f) &&
-                 std::find(f.realizations.begin(), f.realizations.end(), change.realization) !=
-                     f.realizations.end();
+                 std::ranges::find(f.realizations, change.realization) != f.realizations.end();
         }))
       findings_.push_back(to_finding(change));
   for (Finding& f : own) {
@@ -428,9 +423,7 @@ std::vector<Finding> Examination::examine() {
   if (!found(Cause::aperiodic)) {  // otherwise no spectrum is valid
     std::vector<Finding> of_log = std::move(findings_);
     findings_.clear();
-    const auto late = std::find_if(of_log.begin(), of_log.end(), [](const Finding& f) {
-      return f.cause == Cause::excitation_timing;
-    });
+    const auto late = std::ranges::find(of_log, Cause::excitation_timing, &Finding::cause);
     if (late != of_log.end()) {
       findings_.push_back(std::move(*late));
       of_log.erase(late);
@@ -443,8 +436,7 @@ std::vector<Finding> Examination::examine() {
       for (Finding& finding : check_start_transient(record_.start))
         if (!found(finding.cause)) findings_.push_back(std::move(finding));
   }
-  std::stable_sort(findings_.begin(), findings_.end(),
-                   [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
+  std::ranges::stable_sort(findings_, {}, rank_of);
   return std::move(findings_);
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 
 #include "frf/health/health_measures.hpp"
@@ -43,9 +44,8 @@ std::vector<Band> doubtful_bands(const FrfEstimate& frf, Eigen::Index axes, Eige
 
 /// "realization 1, experiment 2: 9.8 times ...; ", the largest difference first.
 std::string named(std::vector<NoisyRun> runs) {
-  std::stable_sort(runs.begin(), runs.end(), [](const NoisyRun& a, const NoisyRun& b) {
-    return std::abs(std::log(a.ratio)) > std::abs(std::log(b.ratio));
-  });
+  std::ranges::stable_sort(runs, std::ranges::greater(),
+                           [](const NoisyRun& run) { return std::abs(std::log(run.ratio)); });
   std::string text;
   for (std::size_t i = 0; i < std::min(runs.size(), kMostNamed); ++i)
     text +=
@@ -111,7 +111,7 @@ std::vector<Finding> check_discarded_starts(const FrfEstimate& frf) {
 }
 
 void withdraw_linearity_test(FrfEstimate& frf, const std::vector<Finding>& findings) {
-  const bool explained = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+  const bool explained = std::ranges::any_of(findings, [](const Finding& finding) {
     return finding.cause == Cause::drift || finding.cause == Cause::unsettled ||
            (finding.severity == Severity::fault && !finding.realizations.empty());
   });
@@ -126,8 +126,7 @@ std::vector<Finding> check_interpolation(const FrfEstimate& frf) {
   Eigen::Index lines = 0;
   std::vector<Band> bands = doubtful_bands(frf, frf.n_inputs(), lines);
   if (bands.empty()) return {};
-  std::stable_sort(bands.begin(), bands.end(),
-                   [](const Band& a, const Band& b) { return a.largest > b.largest; });
+  std::ranges::stable_sort(bands, std::ranges::greater(), &Band::largest);
   std::string figure;
   for (std::size_t i = 0; i < std::min(bands.size(), kMostNamed); ++i)
     figure += fmt::format("{}{:.2g} times the noise at {:.4g} ... {:.4g} Hz", i == 0 ? "" : ", ",

@@ -23,15 +23,15 @@ std::vector<Finding> to_findings(const std::vector<ActuatorStep>& steps,
                                  const ChannelList& actuators) {
   std::vector<Finding> findings;
   for (const ActuatorStep& s : steps) {
-    const auto at = static_cast<std::size_t>(s.actuator);
+    const std::string& name = actuators.name(s.actuator);
     const std::string figure =
-        fmt::format("{:.4g} {}, {}", s.step, actuators.units[at], to_string(s.rounding));
+        fmt::format("{:.4g} {}, {}", s.step, actuators.unit(s.actuator), to_string(s.rounding));
     if (!findings.empty() && findings.back().figure == figure) {
-      findings.back().channel += " " + actuators.names[at];
+      findings.back().channel += " " + name;
       continue;
     }
     findings.push_back(
-        {Severity::doubt, Cause::actuator_step, actuators.names[at],
+        {Severity::doubt, Cause::actuator_step, name,
          "applies its command in steps, as a coarse converter does; the response is that to the "
          "steps, not to the recorded command",
          figure, "use a finer converter, or record what it applies"});

@@ -22,8 +22,7 @@ int rank_of(const Finding& finding) noexcept {
 }
 
 bool any_fault(const std::vector<Finding>& findings) noexcept {
-  return std::any_of(findings.begin(), findings.end(),
-                     [](const Finding& f) { return f.severity == Severity::fault; });
+  return std::ranges::find(findings, Severity::fault, &Finding::severity) != findings.end();
 }
 
 }  // namespace stageid

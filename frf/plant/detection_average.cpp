@@ -47,13 +47,13 @@ DetectionAverage::DetectionAverage(const std::vector<int>& lines,
 }
 
 void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
-                           const std::vector<std::size_t>& axis, int workers) {
+                           const std::vector<Eigen::Index>& axis, int workers) {
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
   if (!noise_known_ || detection_.empty()) return;
   sum_.noise_dof += spectra.scatter_dof();
   std::vector<Eigen::Index> groups;
   for (std::size_t e = 0; e < axis.size(); ++e) {
-    groups.push_back(sum_.groups.size() == 1 ? 0 : static_cast<Eigen::Index>(axis[e]));
+    groups.push_back(sum_.groups.size() == 1 ? 0 : axis[e]);
     sum_.runs[groups.back()] += 1.0;
     periods_ += spectra.runs()[e].periods;
   }

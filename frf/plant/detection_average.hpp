@@ -30,7 +30,7 @@ class DetectionAverage {
   /// `G`: (n_y n_u) x excited lines, the current estimate of the response; `axis`: of each experiment, its first
   /// excited one as an index into the list of axes. Does nothing if the noise is unknown.
   void add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G,
-           const std::vector<std::size_t>& axis, int workers);
+           const std::vector<Eigen::Index>& axis, int workers);
 
   /// `resolution_hz`: distance of neighbouring lines. Empty if nothing was added.
   DetectionLines finish(double resolution_hz) const;

@@ -124,7 +124,7 @@ VectorXd ExperimentNoise::level(Index k) const {
 std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
   std::vector<OddRun> found;
   const auto note = [&found](const OddRun& run) {
-    const auto known = std::find_if(found.begin(), found.end(), [&run](const OddRun& other) {
+    const auto known = std::ranges::find_if(found, [&run](const OddRun& other) {
       return other.realization == run.realization && other.experiment == run.experiment;
     });
     if (known == found.end())
@@ -138,8 +138,7 @@ std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
   if (known.empty()) return found;
   for (Index b = 0; b < known.front()->differs.cols(); ++b)
     for (Index i = 0; i < known.front()->differs.rows(); ++i) {
-      if (std::none_of(known.begin(), known.end(),
-                       [i, b](const NoiseLevels* one) { return one->differs(i, b); }))
+      if (std::ranges::none_of(known, [&](const NoiseLevels* one) { return one->differs(i, b); }))
         continue;
       std::vector<double> values;
       for (const NoiseLevels* one : known)

@@ -14,8 +14,7 @@ FrfProvenance::FrfProvenance(const LogInfo& info, const FrfOptions& options,
     : info_(info), options_(options), channels_(channels) {}
 
 void FrfProvenance::add(const UsedRun& run, const std::string& fingerprint) {
-  auto at =
-      std::find_if(logs_.begin(), logs_.end(), [&](const Log& l) { return l.log == run.log; });
+  auto at = std::ranges::find(logs_, run.log, &Log::log);
   if (at == logs_.end()) at = logs_.insert(logs_.end(), Log{run.log, {}, {}});
   at->runs.emplace_back(run.run().realization, run.run().experiment);
   at->fingerprints += fingerprint;
@@ -48,13 +47,11 @@ std::string with_steps(const std::string& provenance_json, const std::vector<Act
                        const ChannelList& actuators) {
   using Json = nlohmann::ordered_json;
   Json provenance = Json::parse(provenance_json);
-  for (const ActuatorStep& s : steps) {
-    const auto at = static_cast<std::size_t>(s.actuator);
-    provenance["actuator_steps"].push_back({{"actuator", actuators.names[at]},
+  for (const ActuatorStep& s : steps)
+    provenance["actuator_steps"].push_back({{"actuator", actuators.name(s.actuator)},
                                             {"step", s.step},
-                                            {"unit", actuators.units[at]},
+                                            {"unit", actuators.unit(s.actuator)},
                                             {"rounding", to_string(s.rounding)}});
-  }
   return provenance.dump();
 }
 

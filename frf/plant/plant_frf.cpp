@@ -49,10 +49,9 @@ struct ExcitedPart {
 };
 
 std::size_t most_runs(const std::vector<RealizationRuns>& realizations) {
-  std::size_t most = 0;
-  for (const RealizationRuns& realization : realizations)
-    most = std::max(most, realization.runs.size());
-  return most;
+  return std::ranges::max_element(realizations, {},
+                                  [](const RealizationRuns& one) { return one.runs.size(); })
+      ->runs.size();
 }
 
 /// An estimate in progress: reads realization by realization, with threads over its runs.
@@ -118,6 +117,11 @@ class PlantEstimation {
   const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }
 
  private:
+  /// Index of an excited channel in the list of axes.
+  Eigen::Index axis_of(Eigen::Index channel) const {
+    return std::ranges::lower_bound(excited_.axes, channel) - excited_.axes.begin();
+  }
+
   ExcitedPart excited_part(const RealizationRuns& realization,
                            const std::vector<RunExcitation>& excitation) const {
     ExcitedPart part{excitation.front().spectrum.lines, {}};
@@ -127,9 +131,8 @@ class PlantEstimation {
           realization.runs.front().place()));
     }
     part.axes = excited_axes(excitation);
-    part.single_axis =
-        std::all_of(excitation.begin(), excitation.end(),
-                    [](const RunExcitation& run) { return run.spectrum.channels.size() == 1; });
+    part.single_axis = std::ranges::all_of(
+        excitation, [](const RunExcitation& run) { return run.spectrum.channels.size() == 1; });
     const ExcitationSpectrum& first = excitation.front().spectrum;
     if (excitation.size() == 1 && first.is_zippered()) part.only = first.only;
     return part;
@@ -147,9 +150,8 @@ class PlantEstimation {
                         place, excited_.lines.size(), realizations_.front().runs.front().place()));
       if (spectrum.lines != excited_.lines) {
         std::vector<int> differing;
-        std::set_symmetric_difference(spectrum.lines.begin(), spectrum.lines.end(),
-                                      excited_.lines.begin(), excited_.lines.end(),
-                                      std::back_inserter(differing));
+        std::ranges::set_symmetric_difference(spectrum.lines, excited_.lines,
+                                              std::back_inserter(differing));
         const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
         throw std::invalid_argument(fmt::format(
             "{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
@@ -165,7 +167,7 @@ class PlantEstimation {
                         place, realizations_.front().runs.front().place()));
       }
       for (const Eigen::Index axis : spectrum.channels) {
-        if (std::binary_search(excited_.axes.begin(), excited_.axes.end(), axis)) continue;
+        if (std::ranges::binary_search(excited_.axes, axis)) continue;
         throw std::invalid_argument(fmt::format(
             "{}: channel {} is excited here but not in realization {} (counted from 1); "
             "all realizations must excite the same axes",
@@ -209,9 +211,7 @@ class PlantEstimation {
     const std::vector<std::string> axes = pick(info_.excitation, excited_.axes).names;
     if (zippered) {
       ZipperedLines lines{excited_.lines, {}, std::ssize(axes)};
-      for (const Eigen::Index channel : excited_.only)
-        lines.axis.push_back(std::lower_bound(excited_.axes.begin(), excited_.axes.end(), channel) -
-                             excited_.axes.begin());
+      for (const Eigen::Index channel : excited_.only) lines.axis.push_back(axis_of(channel));
       require_enough_lines(lines, axes, realization.runs.front().place() + "/excitation");
       zippered_ = std::make_unique<ZipperedFit>(std::move(lines), outputs);
     }
@@ -264,12 +264,9 @@ class PlantEstimation {
     average_->add(spectra, workers_, zippered_.get());
     if (!detection_) return;
     if (alignment_) alignment_->add(spectra, G_before, average_->mean_response(), workers_);
-    std::vector<std::size_t> axis;
-    for (const RunExcitation& run : excitation) {
-      const auto at = std::lower_bound(excited_.axes.begin(), excited_.axes.end(),
-                                       run.spectrum.channels.front());
-      axis.push_back(static_cast<std::size_t>(at - excited_.axes.begin()));
-    }
+    std::vector<Eigen::Index> axis;
+    for (const RunExcitation& run : excitation)
+      axis.push_back(axis_of(run.spectrum.channels.front()));
     detection_->add(spectra, average_->mean_response(), axis, workers_);
   }
 
@@ -284,9 +281,8 @@ class PlantEstimation {
     frf.method = options_.method;
     frf.dropped_periods = dropped_;
     frf.replaced_samples = replaced_;
-    std::merge(incomplete_.begin(), incomplete_.end(), left_out_.begin(), left_out_.end(),
-               std::back_inserter(frf.left_out_realizations),
-               [](const auto& a, const auto& b) { return a.realization < b.realization; });
+    std::ranges::merge(incomplete_, left_out_, std::back_inserter(frf.left_out_realizations), {},
+                       &LeftOutRealization::realization, &LeftOutRealization::realization);
     frf.periods = fewest_periods_;
     frf.experiments = static_cast<int>(realizations_.front().runs.size());
     return frf;
@@ -297,8 +293,7 @@ class PlantEstimation {
     EstimateResults results;
     for (const OddRun& odd : average_->odd_runs()) {
       const auto of =
-          std::find_if(realizations_.begin(), realizations_.end(),
-                       [&odd](const auto& r) { return r.realization == odd.realization; });
+          std::ranges::find(realizations_, odd.realization, &RealizationRuns::realization);
       results.noisy_runs.push_back(
           {odd.realization, of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
            frf.outputs.name(odd.output), odd.ratio});
@@ -399,8 +394,7 @@ std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, Fr
     earlier = std::move(next);
     frf = std::move(better);
   }
-  std::sort(earlier.steps.begin(), earlier.steps.end(),
-            [](const ActuatorStep& a, const ActuatorStep& b) { return a.actuator < b.actuator; });
+  std::ranges::sort(earlier.steps, {}, &ActuatorStep::actuator);
   return earlier.steps;
 }
 

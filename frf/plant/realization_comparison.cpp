@@ -69,8 +69,7 @@ class Comparison {
     std::vector<Candidate> found;
     const double before = misfit();
     if (!(before > kWorthSearching) &&
-        std::none_of(channels_.begin(), channels_.end(),
-                     [this](const Part& part) { return exceeds_noise(part); }))
+        std::ranges::none_of(channels_, [this](const Part& part) { return exceeds_noise(part); }))
       return found;
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       std::optional<Candidate> best;
@@ -131,7 +130,7 @@ class Comparison {
 
   /// A part that is changed twice in the same way is changed by both together; they may cancel.
   static void include(const Candidate& change, std::vector<Candidate>& found) {
-    const auto same = std::find_if(found.begin(), found.end(), [&](const Candidate& other) {
+    const auto same = std::ranges::find_if(found, [&](const Candidate& other) {
       return other.kind == change.kind && other.part == change.part;
     });
     if (same == found.end() || change.kind == Kind::swap)

@@ -135,9 +135,8 @@ class DriftFit {
     if (drifting.empty()) return std::nullopt;
     Index most = 0;
     covered.cwiseProduct(change_).maxCoeff(&most);
-    const Index middle = *std::min_element(
-        drifting.begin(), drifting.end(),
-        [most](Index a, Index b) { return std::abs(a - most) < std::abs(b - most); });
+    const Index middle =
+        std::ranges::min(drifting, {}, [most](Index a) { return std::abs(a - most); });
     const Index first = middle - kWindow / 2;
     const WindowFit window = fit(first);
     // What the drift leaves unexplained is an error of X, and makes the drift as uncertain as noise of that size.

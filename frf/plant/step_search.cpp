@@ -118,9 +118,7 @@ class StepSearch {
   };
   using Members = std::vector<const Tested*>;
 
-  const std::string& unit(Index actuator) const {
-    return info_.actuators.units[static_cast<std::size_t>(actuator)];
-  }
+  const std::string& unit(Index actuator) const { return info_.actuators.unit(actuator); }
   std::vector<char> excited_by(const UsedRun& run, RealDft& dft) const;
   void find_largest_commands();
   void collect();
@@ -158,8 +156,7 @@ StepSearch::StepSearch(const std::vector<RealizationRuns>& realizations, const F
     for (const UsedRun& run : realization.runs) runs_.push_back(&run);
   if (runs_.front()->earlier != nullptr) known_ = runs_.front()->earlier->steps;
   for (std::size_t j = 0; j < inputs_.size(); ++j)
-    if (std::none_of(known_.begin(), known_.end(),
-                     [&](const ActuatorStep& s) { return s.actuator == inputs_[j]; }))
+    if (std::ranges::find(known_, inputs_[j], &ActuatorStep::actuator) == known_.end())
       tested_.push_back({static_cast<Index>(j), inputs_[j], 0.0, {}});
   std::vector<int> excited;
   for (const double f : frf.frequency_hz)
@@ -167,7 +164,7 @@ StepSearch::StepSearch(const std::vector<RealizationRuns>& realizations, const F
         static_cast<int>(std::lround(f * info_.period_samples / info_.sample_rate_hz)));
   lines_ = detection_lines(excited);
   lines_.insert(lines_.end(), excited.begin() + 1, excited.end());  // the first has none below it
-  std::sort(lines_.begin(), lines_.end());
+  std::ranges::sort(lines_);
   for (const int line : lines_) {
     const Eigen::VectorXcd g = interpolated_response(excited, line, frf.response);
     G_.push_back(Eigen::Map<const Eigen::MatrixXcd>(g.data(), frf.n_outputs(), frf.n_inputs()));
@@ -177,14 +174,12 @@ StepSearch::StepSearch(const std::vector<RealizationRuns>& realizations, const F
 /// Whether the run excites each tested actuator; true if this is unknown.
 std::vector<char> StepSearch::excited_by(const UsedRun& run, RealDft& dft) const {
   const std::vector<std::string>& axes = info_.excitation.names;
-  const RunExcitation excitation = read_run_excitation(run, dft);
+  const std::vector<Index> channels = read_run_excitation(run, dft).spectrum.channels;
   std::vector<char> excited;
   for (const Tested& t : tested_) {
-    const auto axis = std::find(axes.begin(), axes.end(),
-                                info_.actuators.names[static_cast<std::size_t>(t.actuator)]);
-    const std::vector<Index>& channels = excitation.spectrum.channels;
-    excited.push_back(axis == axes.end() || std::find(channels.begin(), channels.end(),
-                                                      axis - axes.begin()) != channels.end());
+    const auto axis = std::ranges::find(axes, info_.actuators.name(t.actuator));
+    excited.push_back(axis == axes.end() ||
+                      std::ranges::find(channels, axis - axes.begin()) != channels.end());
   }
   return excited;
 }
@@ -400,7 +395,7 @@ std::vector<ActuatorStep> StepSearch::find() {
   collect();
   std::vector<std::string> units;
   for (const Tested& t : tested_)
-    if (std::find(units.begin(), units.end(), unit(t.actuator)) == units.end())
+    if (std::ranges::find(units, unit(t.actuator)) == units.end())
       units.push_back(unit(t.actuator));
   for (const std::string& one : units) {
     Members members;

@@ -17,7 +17,7 @@ std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
   const std::vector<std::string>& names = channels.names;
   std::vector<Eigen::Index> found;
   for (const std::string& name : wanted) {
-    const auto at = std::find(names.begin(), names.end(), name);
+    const auto at = std::ranges::find(names, name);
     if (at == names.end()) {
       const std::string nearest = nearest_word(name, names);
       throw std::invalid_argument(fmt::format(

@@ -33,8 +33,7 @@ Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) 
 }  // namespace
 
 bool ExcitationSpectrum::is_zippered() const {
-  return channels.size() > 1 &&
-         std::all_of(only.begin(), only.end(), [](Eigen::Index c) { return c >= 0; });
+  return channels.size() > 1 && std::ranges::all_of(only, [](Eigen::Index c) { return c >= 0; });
 }
 
 ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft) {

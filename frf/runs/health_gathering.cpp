@@ -22,8 +22,7 @@ std::vector<int> thinned(const std::vector<int>& lines) {
     const double share = static_cast<double>(i) / (half - 1);
     for (const double wanted :
          {first * std::pow(last / first, share), first + share * (last - first)}) {
-      const auto at =
-          std::lower_bound(lines.begin(), lines.end(), static_cast<int>(std::lround(wanted)));
+      const auto at = std::ranges::lower_bound(lines, static_cast<int>(std::lround(wanted)));
       chosen.insert(at == lines.end() ? lines.back() : *at);
     }
   }
@@ -143,7 +142,7 @@ void HealthPart::forget_deviating(const RunSpectra& run) {
   int of_start = 0;
   for (const int period : run.deviating) {
     if (period == of_start) ++of_start;
-    const auto at = std::find(numbers_.begin(), numbers_.end(), period);
+    const auto at = std::ranges::find(numbers_, period);
     if (at == numbers_.end() || periods_.size() == 1) continue;
     periods_.erase(periods_.begin() + (at - numbers_.begin()));
     numbers_.erase(at);
@@ -185,8 +184,7 @@ HealthGathering::HealthGathering(const std::vector<RealizationRuns>& realization
 
 std::size_t HealthGathering::Realization::first_without_spectra() const {
   const auto missing = [](const HealthPart& part) { return part.periods_.empty(); };
-  return static_cast<std::size_t>(std::find_if(parts.begin(), parts.end(), missing) -
-                                  parts.begin());
+  return static_cast<std::size_t>(std::ranges::find_if(parts, missing) - parts.begin());
 }
 
 std::size_t HealthGathering::first_without_spectra() const {
@@ -194,8 +192,7 @@ std::size_t HealthGathering::first_without_spectra() const {
 }
 
 bool HealthGathering::complete() const {
-  return std::any_of(realizations_.begin(), realizations_.end(),
-                     [](const Realization& one) { return one.complete(); });
+  return std::ranges::any_of(realizations_, &Realization::complete);
 }
 
 void HealthGathering::excite(std::size_t realization, const std::vector<RunExcitation>& runs) {
@@ -218,7 +215,7 @@ void HealthGathering::excite(std::size_t realization, const std::vector<RunExcit
     at.R.setZero(std::ssize(record_.info.excitation), std::ssize(runs));
     for (std::size_t e = 0; e < runs.size(); ++e) {
       const ExcitationSpectrum& spectrum = runs[e].spectrum;
-      const auto found = std::lower_bound(spectrum.lines.begin(), spectrum.lines.end(), line);
+      const auto found = std::ranges::lower_bound(spectrum.lines, line);
       if (found != spectrum.lines.end() && *found == line)
         at.R.col(static_cast<Eigen::Index>(e)) =
             spectrum.values.col(found - spectrum.lines.begin());

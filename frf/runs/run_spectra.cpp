@@ -205,9 +205,7 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
 }
 
 void RunSpectra::drop(const LogRun& of, int period, std::string reason) {
-  const auto at =
-      std::upper_bound(dropped.begin(), dropped.end(), period,
-                       [](int p, const DroppedPeriod& other) { return p < other.period; });
+  const auto at = std::ranges::upper_bound(dropped, period, {}, &DroppedPeriod::period);
   dropped.insert(at, {of.realization, of.experiment, period, std::move(reason)});
 }
 

@@ -72,7 +72,7 @@ RunsByRealization complete_runs(const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options) {
   const auto wanted = [&options](int realization) {
     const std::vector<int>& list = options.realizations;
-    return list.empty() || std::find(list.begin(), list.end(), realization) != list.end();
+    return list.empty() || std::ranges::find(list, realization) != list.end();
   };
   RunsByRealization table;
   for (const LogReader* log : logs) {
@@ -125,9 +125,8 @@ void check_realizations_asked_for(const RunsByRealization& table, const FrfOptio
 /// number of the most complete realization suffices.
 std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun,
                                const FrfOptions& options, const std::string& log) {
-  const auto best = std::max_element(table.begin(), table.end(), [](const auto& a, const auto& b) {
-    return a.second.size() < b.second.size();
-  });
+  const auto best = std::ranges::max_element(
+      table, {}, [](const auto& realization) { return realization.second.size(); });
   const std::size_t most = best->second.size();
   if (most < begun && options.inputs.empty()) {
     throw std::invalid_argument(

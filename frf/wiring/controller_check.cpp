@@ -58,7 +58,7 @@ bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
 /// are not comparable exactly, and an exchange and its inverse could alternate forever.
 bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChange>& changes) {
   return change.kind == ChannelChange::Kind::swap &&
-         std::any_of(changes.begin(), changes.end(), [&](const ChannelChange& earlier) {
+         std::ranges::any_of(changes, [&](const ChannelChange& earlier) {
            return earlier.kind == change.kind && earlier.of_sensors == change.of_sensors &&
                   earlier.a == change.a && earlier.b == change.b;
          });

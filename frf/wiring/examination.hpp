@@ -51,7 +51,7 @@ class Examination {
   }
   const std::string& name(Eigen::Index channel) const;  // of [sensors; actuators]
   bool spoilt(Eigen::Index channel) const {
-    return std::find(spoilt_.begin(), spoilt_.end(), channel) != spoilt_.end();
+    return std::ranges::find(spoilt_, channel) != spoilt_.end();
   }
   bool found(Cause cause) const;
   void find_clipped(Eigen::Index channel, double log_p);

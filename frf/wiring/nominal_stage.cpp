@@ -9,7 +9,7 @@ std::vector<Eigen::Index> positions_in(const std::vector<std::string>& nominal,
                                        std::string* missing) {
   std::vector<Eigen::Index> found;
   for (const std::string& name : names) {
-    const auto at = std::find(nominal.begin(), nominal.end(), name);
+    const auto at = std::ranges::find(nominal, name);
     if (at == nominal.end()) {
       if (missing != nullptr) *missing = name;
       return {};

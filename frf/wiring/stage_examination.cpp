@@ -144,8 +144,7 @@ void Examination::check_recording() {
   for (const ControllerMisfit& misfit : check.misfits) {
     if (find_suspected(record_.n_y() + misfit.actuator, 1)) continue;
     const std::vector<Index> excited = excited_actuators();
-    const bool is_input =
-        std::find(excited.begin(), excited.end(), misfit.actuator) != excited.end();
+    const bool is_input = std::ranges::find(excited, misfit.actuator) != excited.end();
     find(Severity::fault, Cause::unrecorded, name(record_.n_y() + misfit.actuator),
          is_input ? "moves more than r - C y: an excitation, or a moving setpoint, was not recorded"
                   : "moves independently of the sub-plant: its excitation was not recorded",
