@@ -156,13 +156,8 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
   frf.residual_covariance_re = residual.real();
   frf.residual_covariance_im = residual.imag();
   frf.input_factor = read_columns<Complex>(file, "/input_factor", N, n_u, n_u);
-  const auto read = [&](const std::string& dataset, hsize_t size, Eigen::VectorXd& values) {
-    if (!file.exists(dataset)) return;
-    require_shape(file, dataset, {size});
-    values = read_vector(file, dataset);
-  };
-  read("/input_condition", size_of(N), frf.input_condition);
-  read("/interpolation_misfit", size_of(N), frf.interpolation_misfit);
+  frf.input_condition = read_known(file, "/input_condition", N);
+  frf.interpolation_misfit = read_known(file, "/interpolation_misfit", N);
   if (file.exists("/excluded_channels")) {
     frf.excluded_channels = file.read_texts("/excluded_channels");
     require_shape(file, "/excluded_power", {frf.excluded_channels.size()});

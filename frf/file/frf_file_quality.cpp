@@ -16,12 +16,11 @@ void write_detection(Hdf5File& file, const DetectionLines& lines, Eigen::Index n
   if (lines.line.size() == 0) return;
   const std::vector<long long> line(lines.line.begin(), lines.line.end());
   write_known(file, "/detection_frequency_hz", lines.frequency_hz);
-  file.write_integers("/detection_line", {line.size()}, line.data());
+  write_vector(file, "/detection_line", line);
   file.write_texts("/detection_groups", lines.groups);
   write_known(file, "/detection_runs", lines.runs);
   write_columns(file, "/detection_power", lines.power, n_y);
-  file.write_reals("/detection_noise", {size_of(lines.noise.cols()), size_of(n_y)},
-                   lines.noise.data());
+  write_matrix(file, "/detection_noise", lines.noise.transpose());
   file.write_attribute("/detection_noise", "dof", lines.noise_dof);
   write_columns(file, "/detection_linear_power", lines.linear_power, n_y);
 }
@@ -52,8 +51,7 @@ void read_detection(const Hdf5File& file, FrfEstimate& frf) {
 
 void write_nonlinearity(Hdf5File& file, const NonlinearityTest& test, Eigen::Index n_y) {
   if (test.band_hz.size() == 0) return;
-  file.write_reals("/nonlinearity_band_hz", {size_of(test.band_hz.rows()), 2},
-                   Eigen::MatrixXd(test.band_hz.transpose()).data());
+  write_matrix(file, "/nonlinearity_band_hz", test.band_hz);
   write_columns(file, "/nonlinearity_p_value", test.p_value, n_y);
   write_columns(file, "/nonlinearity_distortion", test.distortion, n_y);
   write_known(file, "/nonlinearity_settled_p_value", test.settled_p_value);
@@ -79,10 +77,7 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   const auto n_g = std::ssize(frf.detection.groups);
   test.p_value = read_columns(file, "/nonlinearity_p_value", bands, n_y, n_u);
   test.distortion = read_columns(file, "/nonlinearity_distortion", bands, n_y, n_u);
-  if (file.exists("/nonlinearity_settled_p_value")) {
-    require_shape(file, "/nonlinearity_settled_p_value", {size_of(bands)});
-    test.settled_p_value = read_vector(file, "/nonlinearity_settled_p_value");
-  }
+  test.settled_p_value = read_known(file, "/nonlinearity_settled_p_value", bands);
   if (n_g == 0) return;
   test.even.p_value = read_columns(file, "/nonlinearity_even_p_value", bands, n_y, n_g);
   test.even.level = read_columns(file, "/nonlinearity_even_level", bands, n_y, n_g);

@@ -7,7 +7,13 @@
 namespace stageid {
 
 void write_known(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values) {
-  if (values.size() > 0) file.write_reals(dataset, {size_of(values.size())}, values.data());
+  if (values.size() > 0) write_vector(file, dataset, values);
+}
+
+Eigen::VectorXd read_known(const Hdf5File& file, const std::string& dataset, Eigen::Index size) {
+  if (!file.exists(dataset)) return {};
+  require_shape(file, dataset, {size_of(size)});
+  return read_vector(file, dataset);
 }
 
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {

@@ -61,6 +61,9 @@ VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset
 /// Writes a list of numbers; nothing if it is empty, which means unknown here.
 void write_known(Hdf5File& file, const std::string& dataset, const Eigen::VectorXd& values);
 
+/// The inverse; empty if the dataset is missing. @throws FormatError unless it has `size` numbers
+Eigen::VectorXd read_known(const Hdf5File& file, const std::string& dataset, Eigen::Index size);
+
 /// @throws FormatError unless it is a list of numbers
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset);
 

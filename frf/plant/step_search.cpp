@@ -103,6 +103,113 @@ class CommandHistogram {
   double power_ = 0.0;
 };
 
+/// An actuator without a known step.
+struct Tested {
+  Index input = 0;       ///< of the response
+  Index actuator = 0;    ///< of the log
+  double largest = 0.0;  ///< command of all actuators with its unit
+  CommandHistogram histogram;
+};
+using Members = std::vector<const Tested*>;
+
+/// How well a converter explains the residuals of these actuators.
+double explained(const ActuatorStep& candidate, const Members& members) {
+  const double end = members.front()->largest * (1.0 - 1.0 / static_cast<double>(kBins));
+  const Eigen::VectorXd commands = Eigen::VectorXd::LinSpaced(kBins, -end, end);  // middles of bins
+  const Eigen::VectorXd error =
+      commands.unaryExpr([&](double u) { return candidate.applied(u) - u; });
+  double sum = 0.0;
+  for (const Tested* t : members) sum += t->histogram.explained(error, commands);
+  return sum;
+}
+
+/// The step for one actuator, with another rounding if that clearly explains more.
+ActuatorStep with_own_rounding(ActuatorStep step, const Tested& t) {
+  double most = explained(step, {&t}) + kOwnCertainty;
+  step.actuator = t.actuator;
+  for (const Rounding rounding : kRoundings) {
+    const double now = explained({0, step.step, rounding}, {&t});
+    if (now <= most) continue;
+    most = now;
+    step.rounding = rounding;
+  }
+  return step;
+}
+
+/// The steps near `position` of the spectrum that explain the residuals best: one step for all, and the same rounding
+/// unless an actuator clearly has another one.
+std::vector<ActuatorStep> refined(double position, const Members& members) {
+  ActuatorStep common;
+  double most = 0.0;
+  for (int shift = -kRefinement; shift <= kRefinement; ++shift)
+    for (const Rounding rounding : kRoundings) {
+      const double cycles = (position + static_cast<double>(shift) / kRefinement) / kPadding;
+      const ActuatorStep candidate{0, 2.0 * members.front()->largest / cycles, rounding};
+      const double now = explained(candidate, members);
+      if (now <= most) continue;
+      most = now;
+      common = candidate;
+    }
+  std::vector<ActuatorStep> steps;
+  if (!(most > 0.0)) return steps;
+  for (const Tested* t : members) steps.push_back(with_own_rounding(common, *t));
+  return steps;
+}
+
+Eigen::MatrixXd spectra_of(const Members& members) {
+  RealDft dft(kPadding * static_cast<int>(kBins));
+  Eigen::MatrixXd spectra(kPoints, static_cast<Index>(members.size()));
+  for (std::size_t m = 0; m < members.size(); ++m)
+    spectra.col(static_cast<Index>(m)) =
+        members[m]->histogram.spectrum(dft).segment(kFirstPoint, kPoints);
+  return spectra;
+}
+
+/// Adds the members for which no step of their own explains clearly more than that of others: with commands of a few
+/// steps, a spectrum has several peaks, and the errors of the other converters hide the own one.
+void add_those_explained_by(const ActuatorStep& step, Members& members,
+                            std::vector<ActuatorStep>& found) {
+  if (members.empty()) return;
+  const Eigen::MatrixXd spectra = spectra_of(members);
+  Members others;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    const Tested* t = members[m];
+    Index peak = 0;
+    spectra.col(static_cast<Index>(m)).maxCoeff(&peak);
+    const ActuatorStep common = with_own_rounding(step, *t);
+    const double by_common = explained(common, {t});
+    const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
+    const double by_own = own.empty() ? 0.0 : explained(own.front(), {t});
+    if (by_common > kOwnPower && by_common + std::min(kOwnCertainty, by_common) > by_own)
+      found.push_back(common);
+    else
+      others.push_back(t);
+  }
+  members = std::move(others);
+}
+
+/// Whether an actuator with these powers has the step at `point`: there is power, and no stronger one at another step.
+bool has_step_at(Index point, const Eigen::Ref<const Eigen::VectorXd>& powers) {
+  const Index first = std::clamp<Index>(point - kPadding, 0, kPoints - 1);
+  const Index number = std::clamp<Index>(point + kPadding + 1, 1, kPoints) - first;
+  if (powers.segment(first, number).maxCoeff() < kOwnPower) return false;
+  Index own = 0;
+  if (powers.maxCoeff(&own) < kOwnCertainty) return true;
+  const double ratio =
+      static_cast<double>(own + kFirstPoint) / static_cast<double>(point + kFirstPoint);
+  return std::abs(ratio - std::round(ratio)) < kHarmonic * ratio && ratio > 0.5;
+}
+
+/// Moves the members that have the step at `point` of the spectrum to the result.
+Members take_those_at(Index point, const Eigen::MatrixXd& spectra, Members& members) {
+  Members with;
+  Members without;
+  for (std::size_t m = 0; m < members.size(); ++m)
+    (has_step_at(point, spectra.col(static_cast<Index>(m))) ? with : without).push_back(members[m]);
+  members = std::move(without);
+  return with;
+}
+
 class StepSearch {
  public:
   StepSearch(const std::vector<RealizationRuns>& realizations, const FrfEstimate& frf,
@@ -110,28 +217,13 @@ class StepSearch {
   std::vector<ActuatorStep> find();
 
  private:
-  struct Tested {
-    Index input = 0;       ///< of the response
-    Index actuator = 0;    ///< of the log
-    double largest = 0.0;  ///< command of all actuators with its unit
-    CommandHistogram histogram;
-  };
-  using Members = std::vector<const Tested*>;
-
   const std::string& unit(Index actuator) const { return info_.actuators.unit(actuator); }
   std::vector<char> excited_by(const UsedRun& run, RealDft& dft) const;
   void find_largest_commands();
   void collect();
   void collect(const UsedRun& run, RunWorkspace& w, std::vector<CommandHistogram>& own);
   Eigen::MatrixXcd residual(RunWorkspace& w) const;
-  static Eigen::MatrixXd spectra_of(const Members& members);
-  static Members take_those_at(Index point, const Eigen::MatrixXd& spectra, Members& members);
   void find(Members members, std::vector<ActuatorStep>& found) const;
-  static double explained(const ActuatorStep& candidate, const Members& members);
-  static std::vector<ActuatorStep> refined(double position, const Members& members);
-  static ActuatorStep with_own_rounding(ActuatorStep step, const Tested& t);
-  static void add_those_explained_by(const ActuatorStep& step, Members& members,
-                                     std::vector<ActuatorStep>& found);
 
   const LogInfo& info_;
   int workers_;
@@ -262,105 +354,6 @@ void StepSearch::collect() {
     for (const auto& of_run : own)
       for (std::size_t a = 0; a < tested_.size(); ++a) tested_[a].histogram.add(of_run[a]);
   }
-}
-
-/// How well a converter explains the residuals of these actuators.
-double StepSearch::explained(const ActuatorStep& candidate, const Members& members) {
-  const double end = members.front()->largest * (1.0 - 1.0 / static_cast<double>(kBins));
-  const Eigen::VectorXd commands = Eigen::VectorXd::LinSpaced(kBins, -end, end);  // middles of bins
-  const Eigen::VectorXd error =
-      commands.unaryExpr([&](double u) { return candidate.applied(u) - u; });
-  double sum = 0.0;
-  for (const Tested* t : members) sum += t->histogram.explained(error, commands);
-  return sum;
-}
-
-/// The steps near `position` of the spectrum that explain the residuals best: one step for all, and the same rounding
-/// unless an actuator clearly has another one.
-std::vector<ActuatorStep> StepSearch::refined(double position, const Members& members) {
-  ActuatorStep common;
-  double most = 0.0;
-  for (int shift = -kRefinement; shift <= kRefinement; ++shift)
-    for (const Rounding rounding : kRoundings) {
-      const double cycles = (position + static_cast<double>(shift) / kRefinement) / kPadding;
-      const ActuatorStep candidate{0, 2.0 * members.front()->largest / cycles, rounding};
-      const double now = explained(candidate, members);
-      if (now <= most) continue;
-      most = now;
-      common = candidate;
-    }
-  std::vector<ActuatorStep> steps;
-  if (!(most > 0.0)) return steps;
-  for (const Tested* t : members) steps.push_back(with_own_rounding(common, *t));
-  return steps;
-}
-
-/// The step for one actuator, with another rounding if that clearly explains more.
-ActuatorStep StepSearch::with_own_rounding(ActuatorStep step, const Tested& t) {
-  double most = explained(step, {&t}) + kOwnCertainty;
-  step.actuator = t.actuator;
-  for (const Rounding rounding : kRoundings) {
-    const double now = explained({0, step.step, rounding}, {&t});
-    if (now <= most) continue;
-    most = now;
-    step.rounding = rounding;
-  }
-  return step;
-}
-
-/// Adds the members for which no step of their own explains clearly more than that of others: with commands of a few
-/// steps, a spectrum has several peaks, and the errors of the other converters hide the own one.
-void StepSearch::add_those_explained_by(const ActuatorStep& step, Members& members,
-                                        std::vector<ActuatorStep>& found) {
-  if (members.empty()) return;
-  const Eigen::MatrixXd spectra = spectra_of(members);
-  Members others;
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    const Tested* t = members[m];
-    Index peak = 0;
-    spectra.col(static_cast<Index>(m)).maxCoeff(&peak);
-    const ActuatorStep common = with_own_rounding(step, *t);
-    const double by_common = explained(common, {t});
-    const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
-    const double by_own = own.empty() ? 0.0 : explained(own.front(), {t});
-    if (by_common > kOwnPower && by_common + std::min(kOwnCertainty, by_common) > by_own)
-      found.push_back(common);
-    else
-      others.push_back(t);
-  }
-  members = std::move(others);
-}
-
-Eigen::MatrixXd StepSearch::spectra_of(const Members& members) {
-  RealDft dft(kPadding * static_cast<int>(kBins));
-  Eigen::MatrixXd spectra(kPoints, static_cast<Index>(members.size()));
-  for (std::size_t m = 0; m < members.size(); ++m)
-    spectra.col(static_cast<Index>(m)) =
-        members[m]->histogram.spectrum(dft).segment(kFirstPoint, kPoints);
-  return spectra;
-}
-
-/// Whether an actuator with these powers has the step at `point`: there is power, and no stronger one at another step.
-bool has_step_at(Index point, const Eigen::Ref<const Eigen::VectorXd>& powers) {
-  const Index first = std::clamp<Index>(point - kPadding, 0, kPoints - 1);
-  const Index number = std::clamp<Index>(point + kPadding + 1, 1, kPoints) - first;
-  if (powers.segment(first, number).maxCoeff() < kOwnPower) return false;
-  Index own = 0;
-  if (powers.maxCoeff(&own) < kOwnCertainty) return true;
-  const double ratio =
-      static_cast<double>(own + kFirstPoint) / static_cast<double>(point + kFirstPoint);
-  return std::abs(ratio - std::round(ratio)) < kHarmonic * ratio && ratio > 0.5;
-}
-
-/// Moves the members that have the step at `point` of the spectrum to the result.
-StepSearch::Members StepSearch::take_those_at(Index point, const Eigen::MatrixXd& spectra,
-                                              Members& members) {
-  Members with;
-  Members without;
-  for (std::size_t m = 0; m < members.size(); ++m)
-    (has_step_at(point, spectra.col(static_cast<Index>(m))) ? with : without).push_back(members[m]);
-  members = std::move(without);
-  return with;
 }
 
 /// Finds steps of `members`, all of one unit. First those of known actuators, then common ones.

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <functional>
 #include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -6,25 +6,26 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 
 namespace stageid {
 namespace {
 
+/// A fault of the channels that to_finding() names.
+Finding fault(Cause cause, std::string what, std::string figure, std::string remedy) {
+  return {Severity::fault, cause, "", std::move(what), std::move(figure), std::move(remedy)};
+}
+
 Finding swap_finding(bool in_recording, bool of_sensors) {
   if (in_recording)
-    return {Severity::fault,
-            Cause::swapped,
-            "",
-            "recorded under each other's name: u = r - C y is satisfied if the two are exchanged",
-            "exchanged",
-            "exchange the two names in the channel list of the recorder"};
-  return {Severity::fault,
-          Cause::swapped,
-          "",
-          "cables exchanged: the rigid body fits if the two are exchanged",
-          "exchanged",
-          of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
-                     : "exchange the two amplifiers' cables, or their positions in the stage file"};
+    return fault(
+        Cause::swapped,
+        "recorded under each other's name: u = r - C y is satisfied if the two are exchanged",
+        "exchanged", "exchange the two names in the channel list of the recorder");
+  return fault(
+      Cause::swapped, "cables exchanged: the rigid body fits if the two are exchanged", "exchanged",
+      of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"
+                 : "exchange the two amplifiers' cables, or their positions in the stage file");
 }
 
 Finding gain_finding(const ChannelChange& change, bool in_recording) {
@@ -33,35 +34,28 @@ Finding gain_finding(const ChannelChange& change, bool in_recording) {
   const std::string figure =
       fmt::format("factor {}", with_deviation(change.value, change.deviation, 3));
   if (change.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3))
-    return {Severity::fault,
-            Cause::sign,
-            "",
-            fmt::format("sign flipped {}", where),
-            figure,
-            in_recording
-                ? "change the sign of the channel in the scaling of the recorder"
-                : "change the polarity of the channel, or its direction in the stage file"};
-  return {Severity::fault,
-          Cause::scale,
-          "",
-          fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where),
-          figure,
-          fmt::format("divide the channel by the factor; check its unit and {}",
-                      in_recording ? "the scaling of the recorder"
-                                   : "its gain, or the mass in the stage file")};
+    return fault(Cause::sign, fmt::format("sign flipped {}", where), figure,
+                 in_recording
+                     ? "change the sign of the channel in the scaling of the recorder"
+                     : "change the polarity of the channel, or its direction in the stage file");
+  return fault(
+      Cause::scale,
+      fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where),
+      figure,
+      fmt::format("divide the channel by the factor; check its unit and {}",
+                  in_recording ? "the scaling of the recorder"
+                               : "its gain, or the mass in the stage file"));
 }
 
 Finding skew_finding(const ChannelChange& change, bool in_recording) {
-  return {
-      Severity::fault,
+  return fault(
       Cause::skew,
-      "",
       fmt::format("{} {} than the other channels", in_recording ? "recorded" : "acts or samples",
                   change.value > 0.0 ? "later" : "earlier"),
       fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
                                           kMicroseconds * change.deviation, 3)),
       in_recording ? "sample all channels simultaneously, or shift this one back"
-                   : "sample all channels simultaneously, or fit with --delay per_channel"};
+                   : "sample all channels simultaneously, or fit with --delay per_channel");
 }
 
 }  // namespace
@@ -102,10 +96,10 @@ std::string channel_names(const ChannelChange& change, const LogInfo& info) {
 }
 
 Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording) {
-  Finding finding = change.kind == ChannelChange::Kind::swap
-                        ? swap_finding(in_recording, change.of_sensors)
-                    : change.kind == ChannelChange::Kind::gain ? gain_finding(change, in_recording)
-                                                               : skew_finding(change, in_recording);
+  using Kind = ChannelChange::Kind;
+  Finding finding = change.kind == Kind::swap   ? swap_finding(in_recording, change.of_sensors)
+                    : change.kind == Kind::gain ? gain_finding(change, in_recording)
+                                                : skew_finding(change, in_recording);
   finding.channel = channel_names(change, info);
   return finding;
 }
