@@ -26,7 +26,7 @@ Point mean_point(const Eigen::VectorXf& deviation, Index first, Index count) {
 }  // namespace
 
 void bridge_samples(std::span<Eigen::MatrixXf> periods, std::span<const std::size_t> reference,
-                    std::size_t period, SampleRange gap) {
+                    std::size_t period, IndexRange gap) {
   Eigen::MatrixXf& own = periods[period];
   const Index count = gap.count();
   const auto most = static_cast<Index>(std::ceil(kEndShare * static_cast<double>(count)));

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "frf/periods/sample_range.hpp"
+#include "frf/statistics/index_range.hpp"
 
 namespace stageid {
 
@@ -16,6 +16,6 @@ namespace stageid {
 /// @param reference  indices of the other periods to compare with, at least one
 /// @pre at least one sample of the period before and after
 void bridge_samples(std::span<Eigen::MatrixXf> periods, std::span<const std::size_t> reference,
-                    std::size_t period, SampleRange gap);
+                    std::size_t period, IndexRange gap);
 
 }  // namespace stageid

@@ -20,6 +20,7 @@ using Periods = std::vector<Index>;
 
 constexpr double kRounding = 1e-26;  // of the largest line's power: scatter without noise
 constexpr Index kFewestPositions = 4;
+constexpr double kDropByChance = 1e-3;  // largest probability that a clean run loses a period
 
 /// Noise ratio g at which including one more period leaves the variance of the mean of n periods unchanged.
 double worth_dropping(std::size_t n) { return 2.0 + 1.0 / static_cast<double>(n); }
@@ -45,14 +46,14 @@ double power_ratio(const Eigen::MatrixXd& gram, const Periods& core, Index p) {
 /// For one channel, one matrix per band: Re sum over its lines of conj(d_p) d_q. d is the deviation from the mean
 /// over the root of the line's scatter.
 std::vector<Eigen::MatrixXd> line_grams(const ComparedPeriods& periods, Index channel,
-                                        const std::vector<LineBand>& bands) {
+                                        const std::vector<IndexRange>& bands) {
   const auto P = std::ssize(periods.spectra);
   const double smallest =
       kRounding *
       periods.spectra.front().row(channel).head(periods.frequency_hz.size()).cwiseAbs2().maxCoeff();
   std::vector<Eigen::MatrixXd> grams;
   Eigen::MatrixXcd deviation;
-  for (const LineBand& band : bands) {
+  for (const IndexRange& band : bands) {
     const Index lines = band.count();
     deviation.resize(lines, P);
     for (Index p = 0; p < P; ++p)
@@ -193,15 +194,14 @@ double log_tail(double ratio, const DegreesOfFreedom& dof) {
 struct Excess {
   double ratio = 0.0;  ///< power of the period over that of the core
   double power = 0.0;  ///< of the period's deviation
-  SampleRange where;   ///< the coefficients that cannot be noise
+  IndexRange where;    ///< the coefficients that cannot be noise
 };
 
 /// The samples of the coefficients whose square has a probability below `log_chance` as that of normal noise.
-SampleRange deviating_samples(const OctaveRecord& octave, const Periods& positions,
-                              const Eigen::VectorXd& deviation, double variance,
-                              double log_chance) {
+IndexRange deviating_samples(const OctaveRecord& octave, const Periods& positions,
+                             const Eigen::VectorXd& deviation, double variance, double log_chance) {
   const double least = -2.0 * (log_chance - std::log(static_cast<double>(positions.size())));
-  SampleRange range;
+  IndexRange range;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const double here = deviation[static_cast<Index>(i)];
     if (!(here * here > least * variance)) continue;
@@ -267,7 +267,7 @@ struct Candidate {
 
 /// Outlier candidates of one channel.
 std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
-                                  const std::vector<LineBand>& bands) {
+                                  const std::vector<IndexRange>& bands) {
   const std::vector<Eigen::MatrixXd> grams = line_grams(periods, channel, bands);
   if (grams.empty()) return {};
   const Periods core = core_of(grams);
@@ -287,7 +287,7 @@ std::vector<Candidate> candidates(const ComparedPeriods& periods, Index channel,
     Candidate most;
     most.gain = mean_ratio(grams, core, p);
     double power = 0.0;
-    SampleRange where;
+    IndexRange where;
     for (const OctaveRecord& octave : octaves) {
       const std::optional<Excess> here =
           excess(octave, periods.number, core, p, std::log(kDropByChance) - log_tests);
@@ -309,12 +309,12 @@ PeriodOutliers find_outliers(const ComparedPeriods& periods) {
   PeriodOutliers result;
   const std::size_t P = periods.spectra.size();
   if (P < 3) return result;
-  const std::vector<LineBand> bands = octave_bands(periods.frequency_hz);
+  const std::vector<IndexRange> bands = octave_bands(periods.frequency_hz);
   std::vector<Candidate> most(P);  // of each period
   for (Index c = 0; c < periods.spectra.front().rows(); ++c)
     for (const Candidate& candidate : candidates(periods, c, bands)) {
       Candidate& of_period = most[candidate.outlier.period];
-      SampleRange where = of_period.outlier.where;
+      IndexRange where = of_period.outlier.where;
       where.include(candidate.outlier.where);
       if (candidate.gain > of_period.gain) of_period = candidate;
       of_period.outlier.where = where;

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "frf/periods/sample_range.hpp"
+#include "frf/statistics/index_range.hpp"
 
 namespace stageid {
 
@@ -25,16 +25,13 @@ struct PeriodOutlier {
   double high_hz = 0.0;
   double ratio = 0.0;  ///< its power there over that of the other periods
   /// The samples that deviate, of any channel, in the highest octave with a significant deviation. None: all of them.
-  SampleRange where{};
+  IndexRange where{};
 };
 
 struct PeriodOutliers {
   std::vector<PeriodOutlier> found;     ///< ascending periods
   std::vector<std::size_t> consistent;  ///< periods without a deviation in any channel, ascending
 };
-
-/// Largest probability that a clean run loses a period.
-inline constexpr double kDropByChance = 1e-3;
 
 /// Finds periods with a glitch, a disturbance or a transient (docs/theory.md, section 3), at most (P - 1) / 2 of P.
 ///
@@ -46,7 +43,7 @@ inline constexpr double kDropByChance = 1e-3;
 /// The deviation must also be significant. The lines cannot decide this: different values at the start and end of
 /// a period, caused by slow noise, leak into all lines at once. The record is therefore divided into octaves in
 /// time (octave_records()), without leakage. In some octave the power of the period over that of the core must
-/// have a probability below kDropByChance, divided by the number of channels, octaves and ways to choose the core
+/// have a probability below 1e-3 (that a clean run loses a period), divided by the number of channels, octaves and ways to choose the core
 /// and the period. For Gaussian noise the ratio is F distributed. Its degrees of freedom follow from the core's
 /// spectrum S,
 ///   nu = (sum S)^2 / sum S^2  over its lines of both signs,

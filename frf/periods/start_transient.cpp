@@ -52,9 +52,8 @@ RunStart StartRecorder::finish() {
   if (count_ == 2) noise = scale * W.cwiseAbs2();
   // One scale per sensor makes the units comparable and keeps the colour over the lines.
   for (Eigen::Index c = 0; c < noise.rows(); ++c) {
-    std::vector<double> values(noise.cols());
-    for (Eigen::Index k = 0; k < noise.cols(); ++k)
-      values[static_cast<std::size_t>(k)] = noise(c, k);
+    const Eigen::VectorXd of_sensor = noise.row(c);
+    std::vector<double> values(of_sensor.begin(), of_sensor.end());
     const double power = mean.row(c).squaredNorm() / static_cast<double>(mean.cols());
     const double level = std::max(order_statistic(values, 0.5), kPowerRounding * power);
     const double weight = level > 0.0 ? 1.0 / level : 0.0;

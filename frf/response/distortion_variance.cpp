@@ -37,7 +37,7 @@ double relative_distortion(const Eigen::ArrayXd& total, const Eigen::ArrayXd& no
 }  // namespace
 
 DistortionVariance distortion_variance(const FrfEstimate& frf) {
-  const std::vector<LineBand> bands = octave_bands(frf.frequency_hz);
+  const std::vector<IndexRange> bands = octave_bands(frf.frequency_hz);
   DistortionVariance out;
   out.variance.resize(frf.response.rows(), frf.lines());
   const Eigen::MatrixXd row = row_power(frf);
@@ -46,7 +46,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   out.distortion.band_hz.resize(std::ssize(bands), 2);
   out.distortion.level.resize(frf.response.rows(), std::ssize(bands));
   for (Eigen::Index b = 0; b < std::ssize(bands); ++b) {
-    const LineBand& lines = bands[static_cast<std::size_t>(b)];
+    const IndexRange& lines = bands[static_cast<std::size_t>(b)];
     out.distortion.band_hz.row(b) << frf.frequency_hz[lines.first], frf.frequency_hz[lines.end - 1];
     for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
       const auto band = [&](const Eigen::MatrixXd& matrix, Eigen::Index i) {

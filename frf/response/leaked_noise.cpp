@@ -49,7 +49,7 @@ struct MeanRatio {
 };
 
 MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outputs,
-                     const LineBand& band) {
+                     const IndexRange& band) {
   MeanRatio ratio;
   for (Index k = band.first; k < band.end; ++k)
     for (Index c = output; c < scatter.total.rows(); c += outputs) {
@@ -66,12 +66,12 @@ MeanRatio mean_ratio(const RealizationScatter& scatter, Index output, Index outp
 void lower_leaked_noise(const RealizationScatter& scatter, FrfEstimate& frf) {
   if (scatter.total.size() == 0 || scatter.noise_dof < kFewestDof) return;
   const Index n_y = frf.n_outputs();
-  const std::vector<LineBand> bands =
+  const std::vector<IndexRange> bands =
       octave_bands(frf.frequency_hz, std::max(kFewestLinesOfBand, kFewestRatios / frf.n_inputs()));
   const double expected = mean_of_f(scatter.noise_dof);
   const double variance = variance_of_f(frf.total_dof, scatter.noise_dof);
   const double tests = static_cast<double>(n_y) * static_cast<double>(bands.size());
-  for (const LineBand& band : bands)
+  for (const IndexRange& band : bands)
     for (Index i = 0; i < n_y; ++i) {
       const MeanRatio ratio = mean_ratio(scatter, i, n_y, band);
       if (ratio.count == 0.0) continue;

@@ -22,7 +22,7 @@ double evidence(double power, double noise, double linear, int power_dof, double
 }
 
 /// Scatter of the realizations: column b of p_value and distortion.
-void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, const LineBand& band,
+void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, const IndexRange& band,
                   Eigen::Index b, NonlinearityTest& test) {
   const int a = static_cast<int>(frf.total_dof);
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
@@ -147,7 +147,7 @@ std::string why_linearity_cannot_be_tested(const FrfEstimate& frf) {
 NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEvidence& evidence) {
   if (const std::string why = why_linearity_cannot_be_tested(frf); !why.empty())
     throw std::invalid_argument(why);
-  const std::vector<LineBand> octaves = octave_bands(frf.frequency_hz);
+  const std::vector<IndexRange> octaves = octave_bands(frf.frequency_hz);
   const auto bands = std::ssize(octaves);
   const Eigen::Index n_c = frf.response.rows();
   NonlinearityTest test;
@@ -165,7 +165,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test.odd = test.even;
   }
   for (Eigen::Index b = 0; b < bands; ++b) {
-    const LineBand& band = octaves[static_cast<std::size_t>(b)];
+    const IndexRange& band = octaves[static_cast<std::size_t>(b)];
     const double low_hz = frf.frequency_hz[band.first];
     test.band_hz.row(b) << low_hz, frf.frequency_hz[band.end - 1];
     test_scatter(frf, scatter, band, b, test);

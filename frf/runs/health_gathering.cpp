@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -46,13 +47,17 @@ std::vector<Eigen::Index> columns_of(const std::vector<int>& wanted, const Spect
   return columns;
 }
 
-/// Indices with is_known = 0 among `count` channels, relative to `first`.
-std::vector<Eigen::Index> unknown_channels(const std::vector<char>& is_known, Eigen::Index first,
-                                           Eigen::Index count) {
-  std::vector<Eigen::Index> channels;
-  for (Eigen::Index c = 0; c < count; ++c)
-    if (is_known[static_cast<std::size_t>(first + c)] == 0) channels.push_back(c);
-  return channels;
+/// Transforms the channels that are not `known`, into the rows of Z from `first` on.
+void transform_others(const Eigen::MatrixXd& samples, std::vector<Eigen::Index> known,
+                      const std::vector<int>& lines, Eigen::Index first, RealDft& dft,
+                      Eigen::MatrixXcd& Z) {
+  std::ranges::sort(known);
+  std::vector<Eigen::Index> others;
+  std::ranges::set_difference(first_indices(static_cast<std::size_t>(samples.cols())), known,
+                              std::back_inserter(others));
+  Eigen::MatrixXcd spectra(std::ssize(others), Z.cols());
+  line_spectra(samples, others, lines, 0, dft, spectra);
+  Z.middleRows(first, samples.cols())(others, Eigen::all) = spectra;
 }
 
 }  // namespace
@@ -107,30 +112,19 @@ void HealthPart::take(int period, RunWorkspace& w, const KnownSpectra* known) {
   if (lines_.empty() || periods_.size() >= most_periods_) return;
   const Eigen::Index n_y = w.samples.sensors.cols();
   Eigen::MatrixXcd Z(n_y + w.samples.actuators.cols(), std::ssize(lines_));
-  std::vector<char> is_known(static_cast<std::size_t>(Z.rows()), 0);
+  std::vector<Eigen::Index> sensors;
+  std::vector<Eigen::Index> actuators;
   if (known != nullptr) {
-    std::vector<Eigen::Index> rows = known->sensors;
-    for (const Eigen::Index a : known->actuators) rows.push_back(n_y + a);
-    for (const Eigen::Index row : rows) is_known[static_cast<std::size_t>(row)] = 1;
+    sensors = known->sensors;
+    actuators = known->actuators;
+    std::vector<Eigen::Index> rows = sensors;
+    for (const Eigen::Index a : actuators) rows.push_back(n_y + a);
     Z(rows, Eigen::all) = known->values(Eigen::all, columns_of(lines_, known->lines));
   }
-  transform_others(w, is_known, Z);
+  transform_others(w.samples.sensors, std::move(sensors), lines_, 0, w.dft, Z);
+  transform_others(w.samples.actuators, std::move(actuators), lines_, n_y, w.dft, Z);
   periods_.push_back(std::move(Z));
   numbers_.push_back(period);
-}
-
-void HealthPart::transform_others(RunWorkspace& w, const std::vector<char>& is_known,
-                                  Eigen::MatrixXcd& Z) const {
-  const Eigen::Index n_y = w.samples.sensors.cols();
-  const std::vector<Eigen::Index> sensors = unknown_channels(is_known, 0, n_y);
-  const std::vector<Eigen::Index> actuators =
-      unknown_channels(is_known, n_y, w.samples.actuators.cols());
-  const auto some = std::ssize(sensors);
-  Eigen::MatrixXcd others(some + std::ssize(actuators), Z.cols());
-  line_spectra(w.samples.sensors, sensors, lines_, 0, w.dft, others);
-  line_spectra(w.samples.actuators, actuators, lines_, some, w.dft, others);
-  Z(sensors, Eigen::all) = others.topRows(some);
-  Z.bottomRows(Z.rows() - n_y)(actuators, Eigen::all) = others.bottomRows(others.rows() - some);
 }
 
 void HealthPart::leave_out() {

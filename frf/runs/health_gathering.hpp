@@ -47,8 +47,6 @@ class HealthPart {
   void take(int period, RunWorkspace& workspace, const KnownSpectra* known);
   void leave_out();
   void end();
-  void transform_others(RunWorkspace& workspace, const std::vector<char>& is_known,
-                        Eigen::MatrixXcd& Z) const;
 
   std::vector<int> lines_;  // empty: no spectra of this run are needed
   std::size_t most_periods_ = std::numeric_limits<std::size_t>::max();  // whose spectra are kept

@@ -41,7 +41,7 @@ std::vector<char> PeriodComparison::settle(const std::vector<int>& numbers, RunS
                                  std::span<const Eigen::MatrixXf>(w_.record).first(P), numbers,
                                  frequencies_hz(used_.log->info(), lines_.excited_lines()),
                                  used_.log->info().sample_rate_hz};
-  std::vector<SampleRange> replaced(P);
+  std::vector<IndexRange> replaced(P);
   std::vector<std::string> reasons(P);  // before anything was replaced
   PeriodOutliers outliers;
   bool changed = true;
@@ -53,7 +53,7 @@ std::vector<char> PeriodComparison::settle(const std::vector<int>& numbers, RunS
       if (reasons[p].empty()) reasons[p] = reason(outlier);
       // As with dropped ones, the others must be the majority.
       const auto others = std::count_if(replaced.begin(), replaced.end(),
-                                        [](const SampleRange& range) { return !range.empty(); });
+                                        [](const IndexRange& range) { return !range.empty(); });
       if (!replaced[p].empty() || others < (std::ssize(numbers) - 1) / 2)
         changed |= replace(outlier, outliers.consistent, replaced[p]);
     }
@@ -78,9 +78,9 @@ std::vector<char> PeriodComparison::settle(const std::vector<int>& numbers, RunS
 /// Replaces the samples that deviate. If this is not enough, the next call replaces at least twice as many.
 /// @returns false if there would be too many, or if they reach an end of the period; nothing has changed then
 bool PeriodComparison::replace(const PeriodOutlier& outlier,
-                               const std::vector<std::size_t>& reference, SampleRange& replaced) {
+                               const std::vector<std::size_t>& reference, IndexRange& replaced) {
   const auto N = static_cast<Index>(w_.dft.length());
-  SampleRange range = outlier.where;
+  IndexRange range = outlier.where;
   if (range.empty() || reference.empty()) return false;
   if (!replaced.empty()) {
     const Index more = (replaced.count() + 1) / 2;
@@ -94,7 +94,7 @@ bool PeriodComparison::replace(const PeriodOutlier& outlier,
 }
 
 void PeriodComparison::bridge(std::size_t place, const std::vector<std::size_t>& reference,
-                              SampleRange range) {
+                              IndexRange range) {
   Eigen::MatrixXf& period = w_.record[place];
   Eigen::MatrixXd change = -period.cast<double>();
   bridge_samples(w_.record, reference, place, range);

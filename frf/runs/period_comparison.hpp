@@ -29,8 +29,8 @@ class PeriodComparison {
 
  private:
   bool replace(const PeriodOutlier& outlier, const std::vector<std::size_t>& reference,
-               SampleRange& replaced);
-  void bridge(std::size_t place, const std::vector<std::size_t>& reference, SampleRange range);
+               IndexRange& replaced);
+  void bridge(std::size_t place, const std::vector<std::size_t>& reference, IndexRange range);
   std::string reason(const PeriodOutlier& outlier) const;
 
   const UsedRun& used_;

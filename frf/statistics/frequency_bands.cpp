@@ -2,9 +2,10 @@
 
 namespace stageid {
 
-std::vector<LineBand> octave_bands(const Eigen::VectorXd& frequency_hz, Eigen::Index fewest_lines) {
+std::vector<IndexRange> octave_bands(const Eigen::VectorXd& frequency_hz,
+                                     Eigen::Index fewest_lines) {
   const Eigen::Index N = frequency_hz.size();
-  std::vector<LineBand> bands = {{0, N}};
+  std::vector<IndexRange> bands = {{0, N}};
   for (Eigen::Index k = 1; k < N; ++k) {
     const Eigen::Index first = bands.back().first;
     if (frequency_hz[k] < 2.0 * frequency_hz[first] || k - first < fewest_lines) continue;

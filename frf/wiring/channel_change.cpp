@@ -11,6 +11,14 @@
 namespace stageid {
 namespace {
 
+/// "a3", "a3 a7", "all sensors".
+std::string channel_names(const ChannelChange& change, const LogInfo& info) {
+  const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
+  if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";
+  const std::string& a = list.name(change.a);
+  return change.b < 0 ? a : a + " " + list.name(change.b);
+}
+
 /// A fault of the channels that to_finding() names.
 Finding fault(Cause cause, std::string what, std::string figure, std::string remedy) {
   return {Severity::fault, cause, "", std::move(what), std::move(figure), std::move(remedy)};
@@ -86,13 +94,6 @@ ChannelChange inverse(ChannelChange change) {
   if (change.kind == ChannelChange::Kind::gain) change.value = 1.0 / change.value;
   if (change.kind == ChannelChange::Kind::skew) change.value = -change.value;
   return change;
-}
-
-std::string channel_names(const ChannelChange& change, const LogInfo& info) {
-  const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
-  if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";
-  const std::string& a = list.name(change.a);
-  return change.b < 0 ? a : a + " " + list.name(change.b);
 }
 
 Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording) {

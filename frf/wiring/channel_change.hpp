@@ -27,9 +27,6 @@ void undo(const ChannelChange& change, HealthRecord& record);
 /// undo() of it restores what undo() of the change altered.
 ChannelChange inverse(ChannelChange change);
 
-/// "a3", "a3 a7", "all sensors".
-std::string channel_names(const ChannelChange& change, const LogInfo& info);
-
 /// The change as a finding. `in_recording`: between the recorded signals; otherwise between recorder and stage.
 Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording);
 
