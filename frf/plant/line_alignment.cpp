@@ -16,7 +16,7 @@ AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<i
     : excited_(std::move(excited)), outputs_(outputs) {
   std::vector<int> lines = excited_;
   lines.insert(lines.end(), detection.begin(), detection.end());
-  column_ = first_indices(lines.size());
+  column_ = first_indices(std::ssize(lines));
   const auto line_of = [&](Eigen::Index column) { return lines[static_cast<std::size_t>(column)]; };
   std::ranges::sort(column_, {}, line_of);
   std::ranges::transform(column_, std::back_inserter(lines_), line_of);

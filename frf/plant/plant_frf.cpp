@@ -140,6 +140,7 @@ class PlantEstimation {
 
   void check_excitation(const RealizationRuns& realization,
                         const std::vector<RunExcitation>& excitation) const {
+    const std::string first = realizations_.front().runs.front().place();
     for (std::size_t e = 0; e < excitation.size(); ++e) {
       const ExcitationSpectrum& spectrum = excitation[e].spectrum;
       const std::string place = realization.runs[e].place() + "/excitation";
@@ -147,7 +148,7 @@ class PlantEstimation {
         throw std::invalid_argument(
             fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
                         "axis (--inputs with the other axes), or measure the run again",
-                        place, excited_.lines.size(), realizations_.front().runs.front().place()));
+                        place, excited_.lines.size(), first));
       if (spectrum.lines != excited_.lines) {
         std::vector<int> differing;
         std::ranges::set_symmetric_difference(spectrum.lines, excited_.lines,
@@ -156,15 +157,14 @@ class PlantEstimation {
         throw std::invalid_argument(fmt::format(
             "{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
             "of them. All runs must excite the same lines",
-            place, spectrum.lines.size(), excited_.lines.size(),
-            realizations_.front().runs.front().place(), differing.front(),
+            place, spectrum.lines.size(), excited_.lines.size(), first, differing.front(),
             differing.front() * resolution_hz));
       }
       if (!excited_.only.empty() && spectrum.only != excited_.only) {
         throw std::invalid_argument(
             fmt::format("{}: the axes have different lines than in {}; in a zippered experiment an "
                         "axis must have the same lines in all realizations",
-                        place, realizations_.front().runs.front().place()));
+                        place, first));
       }
       for (const Eigen::Index axis : spectrum.channels) {
         if (std::ranges::binary_search(excited_.axes, axis)) continue;

@@ -53,12 +53,11 @@ ZipperedFit::ZipperedFit(ZipperedLines lines, Index outputs)
 
 /// The nearest lines of each axis, axis by axis, ascending.
 std::vector<Index> ZipperedFit::window(Index k) const {
-  const auto at = [this](Index i) { return lines_.lines[static_cast<std::size_t>(i)]; };
   std::vector<Index> window;
   for (const std::vector<Index>& own : of_axis_) {
     auto first = own.begin();
     while (own.end() - first > bins_ &&
-           std::abs(at(first[bins_]) - at(k)) < std::abs(at(*first) - at(k)))
+           std::abs(line(first[bins_]) - line(k)) < std::abs(line(*first) - line(k)))
       ++first;
     window.insert(window.end(), first, first + bins_);
   }
@@ -70,21 +69,17 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   const std::vector<Index> window = this->window(k);
   const auto B = std::ssize(window);
   const Index axes = lines_.axes;
-  const auto distance = [&](Index i) {
-    const auto line = [this](Index at) { return lines_.lines[static_cast<std::size_t>(at)]; };
-    return static_cast<double>(line(window[static_cast<std::size_t>(i)]) - line(k));
-  };
   LocalProblem problem;
   problem.Z.resize(run.mean.rows(), B);
   problem.r.resize(B);
+  Eigen::VectorXcd R(B);
   for (Index i = 0; i < B; ++i) {
-    problem.Z.col(i) = run.mean.col(window[static_cast<std::size_t>(i)]);
-    problem.r[i] = distance(i);
+    const Index at = window[static_cast<std::size_t>(i)];
+    problem.Z.col(i) = run.mean.col(at);
+    problem.r[i] = line(at) - line(k);
+    R[i] = spectra.excitation(at)(i / bins_, 0);
   }
   problem.r /= problem.r.cwiseAbs().maxCoeff();
-  Eigen::VectorXcd R(B);
-  for (Index i = 0; i < B; ++i)
-    R[i] = spectra.excitation(window[static_cast<std::size_t>(i)])(i / bins_, 0);
   set_polynomials(problem, kRegressors - 1);
   problem.K *= R.asDiagonal();
   problem.groups.assign(static_cast<std::size_t>(axes), bins_);

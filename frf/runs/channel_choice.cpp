@@ -21,7 +21,7 @@ bool contains(const Indices& list, Eigen::Index value) {
 /// The actuators with the names of the excited channels; all actuators if a name does not match.
 Indices estimated_actuators(const LogInfo& info, const Indices& excited) {
   Indices found = excited_actuators(info, excited);
-  if (found.empty()) return first_indices(info.actuators.size());
+  if (found.empty()) return first_indices(std::ssize(info.actuators));
   std::ranges::sort(found);
   return found;
 }
@@ -69,7 +69,7 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
                               std::size_t experiments, int realization, const FrfOptions& options) {
   ChannelChoice choice;
   choice.outputs = options.outputs.empty()
-                       ? first_indices(info.sensors.size())
+                       ? first_indices(std::ssize(info.sensors))
                        : channel_positions(info.sensors, options.outputs, "outputs", "sensor");
   const Indices asked = channel_positions(info.actuators, options.inputs, "inputs", "actuator");
   const Indices by_excitation = estimated_actuators(info, excited);
@@ -79,14 +79,14 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
   choice.estimated = asked.empty() || part_of_the_excited ? by_excitation : asked;
   choice.inputs = pick(info.actuators, asked.empty() ? by_excitation : asked).names;
   check_counts(info, excited, choice.estimated.size(), experiments, realization);
-  for (const Eigen::Index i : first_indices(info.actuators.size())) {
+  for (const Eigen::Index i : first_indices(std::ssize(info.actuators))) {
     if (!contains(choice.estimated, i)) choice.excluded.push_back(i);
   }
   return choice;
 }
 
-std::vector<Eigen::Index> first_indices(std::size_t count) {
-  Indices indices(count);
+std::vector<Eigen::Index> first_indices(Eigen::Index count) {
+  Indices indices(static_cast<std::size_t>(count));
   std::iota(indices.begin(), indices.end(), 0);
   return indices;
 }

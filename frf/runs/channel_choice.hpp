@@ -31,7 +31,7 @@ ChannelChoice choose_channels(const LogInfo& info, const std::vector<Eigen::Inde
                               std::size_t experiments, int realization, const FrfOptions& options);
 
 /// 0, 1, ..., count - 1.
-std::vector<Eigen::Index> first_indices(std::size_t count);
+std::vector<Eigen::Index> first_indices(Eigen::Index count);
 
 /// For every excitation channel the actuator of its name, or -1.
 std::vector<Eigen::Index> actuators_of_excitation(const LogInfo& info);

@@ -53,8 +53,7 @@ void transform_others(const Eigen::MatrixXd& samples, std::vector<Eigen::Index> 
                       Eigen::MatrixXcd& Z) {
   std::ranges::sort(known);
   std::vector<Eigen::Index> others;
-  std::ranges::set_difference(first_indices(static_cast<std::size_t>(samples.cols())), known,
-                              std::back_inserter(others));
+  std::ranges::set_difference(first_indices(samples.cols()), known, std::back_inserter(others));
   Eigen::MatrixXcd spectra(std::ssize(others), Z.cols());
   line_spectra(samples, others, lines, 0, dft, spectra);
   Z.middleRows(first, samples.cols())(others, Eigen::all) = spectra;

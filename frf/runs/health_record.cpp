@@ -25,7 +25,7 @@ class RecordReading {
         bytes_(options, realizations_),
         gathering_(realizations_),
         watch_start_(options.method == FrfMethod::periodic),
-        sensors_(first_indices(realizations_.front().runs.front().log->info().sensors.size())),
+        sensors_(first_indices(std::ssize(realizations_.front().runs.front().log->info().sensors))),
         workers_(options.threads, total_runs(realizations_),
                  realizations_.front().runs.front().log->info().period_samples) {}
 

@@ -101,8 +101,7 @@ void PeriodComparison::bridge(std::size_t place, const std::vector<std::size_t>&
   change += period.cast<double>();
   Eigen::MatrixXcd& spectra = w_.spectra[place];
   Eigen::MatrixXcd difference(spectra.rows(), spectra.cols());
-  line_spectra(change, first_indices(static_cast<std::size_t>(change.cols())), lines_.lines, 0,
-               w_.dft, difference);
+  line_spectra(change, first_indices(change.cols()), lines_.lines, 0, w_.dft, difference);
   spectra += difference;
 }
 

@@ -159,8 +159,7 @@ class RecordMeasurement {
     Eigen::MatrixXcd Z(n_, bins);
     std::vector<int> all(static_cast<std::size_t>(bins));
     std::iota(all.begin(), all.end(), 0);
-    line_spectra(samples.topRows(rows), first_indices(static_cast<std::size_t>(n_)), all, 0, dft,
-                 Z);
+    line_spectra(samples.topRows(rows), first_indices(n_), all, 0, dft, Z);
     return Z;
   }
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "excitation/multisine/dft.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
 namespace test_shared_data {
@@ -75,9 +75,7 @@ double median_error(const Eigen::MatrixXcd& response, const Eigen::MatrixXcd& tr
     if (frequency_hz[k] < low_hz || frequency_hz[k] >= high_hz) continue;
     errors.push_back((response.col(k) - truth.col(k)).norm() / truth.col(k).norm());
   }
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
-                   errors.end());
-  return errors[errors.size() / 2];
+  return order_statistic(errors, 0.5);
 }
 
 TEST(SharedData, TheForeignLogGivesThePlantItWasMadeWith) {

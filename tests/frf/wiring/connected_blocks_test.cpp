@@ -6,8 +6,8 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <numeric>
 
+#include "frf/runs/channel_choice.hpp"
 #include "frf/wiring/skew_check.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
@@ -72,12 +72,6 @@ std::vector<PlantLine> decoupled_plant(std::uint64_t seed,
   return lines;
 }
 
-std::vector<Index> positions(Index n) {
-  std::vector<Index> all(static_cast<std::size_t>(n));
-  std::iota(all.begin(), all.end(), 0);
-  return all;
-}
-
 TEST(ConnectedBlocks, AreFoundWhateverTheUnits) {
   std::vector<PlantLine> lines = decoupled_plant(1, {{4, 5}, {3, 4}}, {0.0, 0.0});
   for (PlantLine& line : lines) {
@@ -106,7 +100,7 @@ TEST(ConnectedBlocks, AChannelOfNoiseBelongsToNone) {
 TEST(SkewOfBlocks, ADelayBetweenBlocksIsNotACharge) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const auto lines = decoupled_plant(seed, {{4, 5}, {3, 4}}, {0.0, 20e-6});
-    const SkewCheck check = check_skew(lines, positions(7), positions(9));
+    const SkewCheck check = check_skew(lines, first_indices(7), first_indices(9));
     EXPECT_TRUE(check.changes.empty()) << seed << ": " << check.changes.front().value;
   }
 }
@@ -115,7 +109,7 @@ TEST(SkewOfBlocks, AChannelThatIsLateInItsBlockIsFound) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     auto lines = decoupled_plant(seed, {{4, 5}, {5, 4}}, {0.0, 20e-6});
     for (PlantLine& line : lines) line.G.row(5) *= std::polar(1.0, -line.omega_rad_s * 12e-6);
-    const SkewCheck check = check_skew(lines, positions(9), positions(9));
+    const SkewCheck check = check_skew(lines, first_indices(9), first_indices(9));
     ASSERT_EQ(check.changes.size(), 1U) << seed;
     EXPECT_TRUE(check.changes[0].of_sensors);
     EXPECT_EQ(check.changes[0].a, 5);
@@ -125,10 +119,10 @@ TEST(SkewOfBlocks, AChannelThatIsLateInItsBlockIsFound) {
 
 TEST(SkewOfBlocks, ABlockOfTwoSaysWhatItNeeds) {
   const SkewCheck none =
-      check_skew(decoupled_plant(1, {{2, 2}}, {0.0}), positions(2), positions(2));
+      check_skew(decoupled_plant(1, {{2, 2}}, {0.0}), first_indices(2), first_indices(2));
   EXPECT_NE(none.unchecked.find("three sensors and three actuators"), std::string::npos);
-  const SkewCheck one =
-      check_skew(decoupled_plant(1, {{4, 4}, {1, 2}}, {0.0, 0.0}), positions(5), positions(6));
+  const SkewCheck one = check_skew(decoupled_plant(1, {{4, 4}, {1, 2}}, {0.0, 0.0}),
+                                   first_indices(5), first_indices(6));
   EXPECT_NE(one.unchecked.find("decoupled"), std::string::npos);
 }
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <numeric>
 
+#include "frf/runs/channel_choice.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
@@ -82,11 +82,8 @@ std::vector<PlantLine> random_plant(const PlantRequest& request) {
 }
 
 SkewCheck checked(const PlantRequest& request) {
-  std::vector<Index> outputs(static_cast<std::size_t>(request.sensors));
-  std::vector<Index> inputs(static_cast<std::size_t>(request.actuators));
-  std::iota(outputs.begin(), outputs.end(), 0);
-  std::iota(inputs.begin(), inputs.end(), 0);
-  return check_skew(random_plant(request), outputs, inputs);
+  return check_skew(random_plant(request), first_indices(request.sensors),
+                    first_indices(request.actuators));
 }
 
 TEST(SkewCheck, TellsTheLateChannelToAMicrosecond) {
