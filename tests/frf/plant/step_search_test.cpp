@@ -48,6 +48,13 @@ SampledPlant stepped_plant(double first, double second) {
   return plant;
 }
 
+/// Steps and noise relative to the rms command.
+MemoryLog stepped_log(double first, double second, std::uint64_t seed, double noise = 1e-4) {
+  const double rms = command_rms();
+  return test::simulate_sampled_log(stepped_plant(first * rms, second * rms), experiment(seed),
+                                    noise * rms);
+}
+
 /// Mean of |G - truth|^2 / total variance.
 double misfit(const FrfEstimate& frf, const SampledPlant& plant) {
   double sum = 0.0;
@@ -69,8 +76,7 @@ std::vector<ActuatorStep> steps_in(const MemoryLog& log) {
 TEST(StepSearch, FindsStepAndRoundingOfEachActuator) {
   const double rms = command_rms();
   for (const auto& [first, second] : {std::pair{0.2, 0.2}, {0.1, 0.33}, {0.5, 0.07}}) {
-    const MemoryLog log = test::simulate_sampled_log(stepped_plant(first * rms, second * rms),
-                                                     experiment(5), 1e-4 * rms);
+    const MemoryLog log = stepped_log(first, second, 5);
     const std::vector<ActuatorStep> found = estimate_plant_frf_and_health({&log}).health.steps;
     SCOPED_TRACE(testing::Message() << first << ", " << second);
     ASSERT_EQ(found.size(), 2U);
@@ -87,9 +93,7 @@ TEST(StepSearch, EqualConvertersAreFoundEqual) {
   int found = 0;
   for (const double step : {0.6, 0.9, 1.2})
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      const MemoryLog log = test::simulate_sampled_log(stepped_plant(step * rms, step * rms),
-                                                       experiment(seed), 1e-4 * rms);
-      const std::vector<ActuatorStep> steps = steps_in(log);
+      const std::vector<ActuatorStep> steps = steps_in(stepped_log(step, step, seed));
       for (const ActuatorStep& one : steps) {
         EXPECT_EQ(one.step, steps.front().step) << "seed " << seed;
         EXPECT_NEAR(one.step / rms, step, (step < 1.0 ? 0.01 : 0.05) * step) << "seed " << seed;
@@ -123,13 +127,10 @@ TEST(StepSearch, TwelveEqualConvertersAreAllFound) {
 
 // The idle actuator of an experiment moves by less than a step: its command is recorded, its force is zero.
 TEST(StepSearch, TheResponseIsThatOfThePlant) {
-  const double rms = command_rms();
   double sum = 0.0;
   constexpr int kLogs = 10;
   for (int seed = 1; seed <= kLogs; ++seed) {
-    const MemoryLog log =
-        test::simulate_sampled_log(stepped_plant(0.3 * rms, 0.3 * rms),
-                                   experiment(static_cast<std::uint64_t>(seed)), 1e-4 * rms);
+    const MemoryLog log = stepped_log(0.3, 0.3, static_cast<std::uint64_t>(seed));
     sum += misfit(estimate_plant_frf({&log}), linear_plant());
   }
   // 2 degrees of freedom: the expectation of F(2, 4) is 2.
@@ -150,8 +151,7 @@ TEST(StepSearch, FindsNothingWithoutSteps) {
 // The recorder has the same converter: the record is what is applied.
 TEST(StepSearch, FindsNothingInARecordOfTheSteps) {
   const double rms = command_rms();
-  MemoryLog log =
-      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(3), 1e-4 * rms);
+  MemoryLog log = stepped_log(0.2, 0.2, 3);
   for (LogSamples& record : log.records) {
     for (double& u : record.actuators.col(0)) u = 0.2 * rms * std::round(u / (0.2 * rms));
     for (double& u : record.actuators.col(1)) u = 0.2 * rms * std::trunc(u / (0.2 * rms));
@@ -161,9 +161,7 @@ TEST(StepSearch, FindsNothingInARecordOfTheSteps) {
 
 // Lost samples and steps are both found, and the period with the gap is dropped.
 TEST(StepSearch, LostSamplesAreStillFound) {
-  const double rms = command_rms();
-  MemoryLog log =
-      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(7), 1e-4 * rms);
+  MemoryLog log = stepped_log(0.2, 0.2, 7);
   LogSamples& record = log.records[1];
   const Eigen::Index rows = record.sensors.rows();
   for (Eigen::MatrixXd* samples : {&record.sensors, &record.actuators})
@@ -177,9 +175,7 @@ TEST(StepSearch, LostSamplesAreStillFound) {
 
 // Steps are undone in the records as they are, so a period of which samples were replaced is dropped then.
 TEST(StepSearch, AGlitchCostsItsPeriod) {
-  const double rms = command_rms();
-  MemoryLog log =
-      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.2 * rms), experiment(7), 1e-4 * rms);
+  MemoryLog log = stepped_log(0.2, 0.2, 7);
   MemoryLog marked = log;
   marked.records[1].marked[2300] = 1;
   const FrfEstimate by_mark = estimate_plant_frf({&marked});
@@ -194,14 +190,9 @@ TEST(StepSearch, AGlitchCostsItsPeriod) {
 }
 
 TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
-  const double rms = command_rms();
-  const MemoryLog log =
-      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.3 * rms), experiment(2), 1e-3 * rms);
-  FrfOptions options;
-  options.threads = 1;
-  const FrfEstimate one = estimate_plant_frf({&log}, options);
-  options.threads = 4;
-  EXPECT_EQ(one.response, estimate_plant_frf({&log}, options).response);
+  const MemoryLog log = stepped_log(0.2, 0.3, 2, 1e-3);
+  EXPECT_EQ(estimate_plant_frf({&log}, {.threads = 1}).response,
+            estimate_plant_frf({&log}, {.threads = 4}).response);
 }
 
 // An interrupt comes as an exception of the progress function.
@@ -220,9 +211,7 @@ TEST(StepSearch, TheSearchTellsItsProgressAndCanBeInterrupted) {
 
 // The provenance lists step and rounding of each actuator.
 TEST(StepSearch, TheProvenanceTellsTheSteps) {
-  const double rms = command_rms();
-  const MemoryLog log =
-      test::simulate_sampled_log(stepped_plant(0.2 * rms, 0.3 * rms), experiment(2), 1e-4 * rms);
+  const MemoryLog log = stepped_log(0.2, 0.3, 2);
   EXPECT_THAT(estimate_plant_frf({&log}).provenance_json,
               testing::AllOf(testing::HasSubstr("actuator_steps"),
                              testing::HasSubstr("rounded towards zero")));

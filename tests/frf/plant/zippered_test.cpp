@@ -43,6 +43,18 @@ LoopExperiment zippered_experiment(int periods) {
   return x;
 }
 
+/// Of logs with the seeds 1, 2, ...
+std::vector<FrfEstimate> estimates(const SampledPlant& plant, LoopExperiment x,
+                                   const FrfOptions& options, int seeds) {
+  std::vector<FrfEstimate> all;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    x.seed = static_cast<std::uint64_t>(seed);
+    const MemoryLog log = test::simulate_sampled_log(plant, x, kNoise);
+    all.push_back(estimate_plant_frf({&log}, options));
+  }
+  return all;
+}
+
 double largest_error(const FrfEstimate& frf, const SampledPlant& plant) {
   double largest = 0.0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
@@ -116,17 +128,14 @@ class ZipperedDof : public testing::TestWithParam<Measured> {};
 TEST_P(ZipperedDof, IsThatOfTheScatterOverSeeds) {
   // var(estimate) / mean^2 = 1 / nu for a variance with nu complex degrees of freedom.
   constexpr int kSeeds = 60;
-  LoopExperiment x = zippered_experiment(GetParam().periods);
+  const LoopExperiment x = zippered_experiment(GetParam().periods);
   Eigen::ArrayXXd sum, squares;
   double dof = 0.0;
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    x.seed = static_cast<std::uint64_t>(seed);
-    const MemoryLog log = test::simulate_sampled_log(smooth_stage(), x, kNoise);
-    const FrfEstimate frf = estimate_plant_frf({&log}, GetParam().options);
+  for (const FrfEstimate& frf : estimates(smooth_stage(), x, GetParam().options, kSeeds)) {
     const Eigen::Index n_y = 2;
     const Eigen::ArrayXXd power =
         frf.residual_covariance_re(std::vector<Eigen::Index>{0, n_y + 1}, Eigen::all).array();
-    if (seed == 1) sum = squares = Eigen::ArrayXXd::Zero(power.rows(), power.cols());
+    if (sum.size() == 0) sum = squares = Eigen::ArrayXXd::Zero(power.rows(), power.cols());
     sum += power;
     squares += power.square();
     dof += frf.noise_dof / kSeeds;
@@ -142,16 +151,13 @@ INSTANTIATE_TEST_SUITE_P(Records, ZipperedDof, testing::ValuesIn(kMeasured), nam
 // The mean of a smooth function of the lines, as in a fit, has the variance predicted by correlated_lines.
 TEST(Zippered, CorrelatedLinesSayWhatTheMeanOverTheBandIsWorth) {
   constexpr int kSeeds = 150;
-  LoopExperiment x = zippered_experiment(2);
   Eigen::Array4cd sum = Eigen::Array4cd::Zero();
   Eigen::Array4d squares = Eigen::Array4d::Zero();
   Eigen::Array4d stated = Eigen::Array4d::Zero();
   Eigen::MatrixXd weights;  // the same for all seeds: their mean is of a linear function
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    x.seed = static_cast<std::uint64_t>(seed);
-    const MemoryLog log = test::simulate_sampled_log(smooth_stage(), x, kNoise);
-    const FrfEstimate frf = estimate_plant_frf({&log}, {.transient_periods = 1});
-    if (seed == 1) weights = frf.response.cwiseAbs2().cwiseInverse();
+  for (const FrfEstimate& frf :
+       estimates(smooth_stage(), zippered_experiment(2), {.transient_periods = 1}, kSeeds)) {
+    if (weights.size() == 0) weights = frf.response.cwiseAbs2().cwiseInverse();
     for (Eigen::Index c = 0; c < 4; ++c) {
       const Eigen::ArrayXd w = weights.row(c).transpose().array() / weights.row(c).sum();
       const std::complex<double> mean =
@@ -175,18 +181,14 @@ struct InputCovariance {
       0.0;  ///< the same with the stated one's conjugate, as a transpose too many has it
 };
 
-InputCovariance covariance_between_inputs(const SampledPlant& plant, const LoopExperiment& wanted,
-                                          double low_hz, double high_hz) {
+InputCovariance covariance_between_inputs(const SampledPlant& plant, double low_hz,
+                                          double high_hz) {
   constexpr int kSeeds = 60;
-  LoopExperiment x = wanted;
+  const FrfOptions options{.transient_periods = 1, .covariance = CovarianceKind::full};
   Eigen::MatrixXcd found, stated;  // vec of Cov(vec G), one column per line, summed over the seeds
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    x.seed = static_cast<std::uint64_t>(seed);
-    const MemoryLog log = test::simulate_sampled_log(plant, x, kNoise);
-    const FrfEstimate frf = select_band(
-        estimate_plant_frf({&log}, {.transient_periods = 1, .covariance = CovarianceKind::full}),
-        low_hz, high_hz);
-    if (seed == 1) found = stated = Eigen::MatrixXcd::Zero(16, frf.lines());
+  for (const FrfEstimate& whole : estimates(plant, zippered_experiment(2), options, kSeeds)) {
+    const FrfEstimate frf = select_band(whole, low_hz, high_hz);
+    if (found.size() == 0) found = stated = Eigen::MatrixXcd::Zero(16, frf.lines());
     for (Eigen::Index k = 0; k < frf.lines(); ++k) {
       const Eigen::VectorXcd error =
           (frf.at(k) - plant.response(frf.omega_rad_s()[k], kSampleRateHz)).reshaped();
@@ -213,7 +215,7 @@ InputCovariance covariance_between_inputs(const SampledPlant& plant, const LoopE
 TEST(Zippered, TheCovarianceBetweenInputsIsThatOverSeeds) {
   SampledPlant plant = smooth_stage();
   plant.K << 0.0, 6.0, 6.0, 0.0;  // each input follows the other; the loop's poles are below 0.92
-  const InputCovariance found = covariance_between_inputs(plant, zippered_experiment(2), 9.0, 41.0);
+  const InputCovariance found = covariance_between_inputs(plant, 9.0, 41.0);
   // Correlations of about 0.5, products with a scatter of 1: 246 entries, one of four independent, of 60 seeds: 3.3 %.
   EXPECT_NEAR(found.straight, 1.0, 0.13);
   EXPECT_LT(found.conjugated, 0.5);
@@ -287,17 +289,14 @@ SampledPlant sharp_stage(double width) {
 // The poles of the local model follow a resonance as narrow as the lines, which a polynomial cannot.
 TEST(Zippered, ResonancesAsNarrowAsTheLinesAreFollowed) {
   for (const double width : {1.0, 2.0}) {
-    LoopExperiment x = zippered_experiment(2);
     const SampledPlant plant = sharp_stage(width);
     constexpr int kSeeds = 40;
     Eigen::MatrixXcd sum;
     Eigen::ArrayXXd stated;
-    for (int seed = 1; seed <= kSeeds; ++seed) {
-      x.seed = static_cast<std::uint64_t>(seed);
-      const MemoryLog log = test::simulate_sampled_log(plant, x, kNoise);
-      const FrfEstimate frf = select_band(estimate_plant_frf({&log}, {.transient_periods = 1}),
-                                          24.3 - 0.5 * width, 24.3 + 0.5 * width);
-      if (seed == 1) {
+    for (const FrfEstimate& whole :
+         estimates(plant, zippered_experiment(2), {.transient_periods = 1}, kSeeds)) {
+      const FrfEstimate frf = select_band(whole, 24.3 - 0.5 * width, 24.3 + 0.5 * width);
+      if (sum.size() == 0) {
         sum.setZero(4, frf.lines());
         stated.setZero(4, frf.lines());
       }
@@ -316,8 +315,7 @@ TEST(Zippered, ResonancesAsNarrowAsTheLinesAreFollowed) {
 TEST(Zippered, NotKnowingThePoleCorrelatesInputsByTheirResidues) {
   SampledPlant plant = sharp_stage(1.0);
   for (Eigen::Index i = 0; i < plant.A.rows(); i += 2) plant.B.col(1).segment(i, 2) << 0.0, 0.1;
-  const InputCovariance found =
-      covariance_between_inputs(plant, zippered_experiment(2), 23.8, 24.8);
+  const InputCovariance found = covariance_between_inputs(plant, 23.8, 24.8);
   EXPECT_GT(found.straight, 0.5);
   EXPECT_LT(found.conjugated, 0.0);
 }
