@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"
-#include "frf/statistics/mean_around.hpp"
+#include "frf/statistics/frequency_bands.hpp"
 
 namespace stageid {
 namespace {

@@ -14,7 +14,7 @@
 #include "frf/runs/run_periods.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/statistics/distributions.hpp"
-#include "frf/statistics/mean_around.hpp"
+#include "frf/statistics/frequency_bands.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {

@@ -1,5 +1,7 @@
 #include "frf/statistics/frequency_bands.hpp"
 
+#include <algorithm>
+
 namespace stageid {
 
 std::vector<IndexRange> octave_bands(const Eigen::VectorXd& frequency_hz,
@@ -15,6 +17,12 @@ std::vector<IndexRange> octave_bands(const Eigen::VectorXd& frequency_hz,
   if (bands.size() > 1 && bands.back().count() < fewest_lines) bands.pop_back();
   bands.back().end = N;
   return bands;
+}
+
+Eigen::VectorXd mean_around(const Eigen::MatrixXd& columns, Eigen::Index k, Eigen::Index reach) {
+  const Eigen::Index first = std::max<Eigen::Index>(0, k - reach);
+  const Eigen::Index end = std::min(columns.cols(), k + reach + 1);
+  return columns.middleCols(first, end - first).rowwise().mean();
 }
 
 }  // namespace stageid

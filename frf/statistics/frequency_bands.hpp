@@ -16,4 +16,7 @@ inline constexpr Eigen::Index kFewestLinesOfBand = 8;
 std::vector<IndexRange> octave_bands(const Eigen::VectorXd& frequency_hz,
                                      Eigen::Index fewest_lines = kFewestLinesOfBand);
 
+/// Mean over column k and up to `reach` columns on each side, fewer at the ends.
+Eigen::VectorXd mean_around(const Eigen::MatrixXd& columns, Eigen::Index k, Eigen::Index reach);
+
 }  // namespace stageid

@@ -297,8 +297,8 @@ TEST(Feedback, SaysWhatItNeeds) {
 
 /// Faults of a log in which the loop moves a3, which is not excited. @param coupling from a1 and a2 to a3
 std::vector<Finding> excluded(double coupling, std::uint64_t seed) {
-  LoopExperiment x{.axes = 2, .realizations = 2, .periods = 4, .transient_periods = 0};
-  x.seed = seed;
+  LoopExperiment x{
+      .axes = 2, .realizations = 2, .periods = 4, .transient_periods = 0, .seed = seed};
   test::ClosedLoop loop = test::small_stage();
   loop.controller = [weak = loop.controller, coupling](double omega_rad_s) {
     Eigen::MatrixXcd C = weak(omega_rad_s);

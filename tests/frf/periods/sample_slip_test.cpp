@@ -22,15 +22,10 @@ using test::MemoryLog;
 using test::text;
 
 test::LoopExperiment experiment(std::uint64_t seed) {
-  test::LoopExperiment x;
-  x.sample_rate_hz = 2000.0;
-  x.period_samples = 2000;
+  test::LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 2000, .axes = 2, .seed = seed};
   x.lines = test::line_range(3, 401, 2);
-  x.axes = 2;
   x.realizations = 2;
   x.periods = 4;
-  x.transient_periods = 1;
-  x.seed = seed;
   return x;
 }
 

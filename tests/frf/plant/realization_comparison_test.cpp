@@ -30,11 +30,8 @@ struct Spec {
 };
 
 MemoryLog recorded(const Spec& spec) {
-  test::LoopExperiment x;
-  x.sample_rate_hz = 2000.0;
-  x.period_samples = 1000;
+  test::LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 1000, .axes = 2};
   x.lines = test::line_range(3, 301, 2);
-  x.axes = 2;
   x.realizations = spec.realizations;
   x.periods = 4;
   x.transient_periods = 3;

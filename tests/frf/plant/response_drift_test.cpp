@@ -34,11 +34,8 @@ double first_hz(const Spec& spec) {
 /// The loop of simulate_sampled_log() with a first mode whose frequency changes linearly from the first sample to the
 /// last.
 MemoryLog drifting_log(const Spec& spec) {
-  test::LoopExperiment x;
-  x.sample_rate_hz = 2000.0;
-  x.period_samples = 2000;
+  test::LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 2000, .axes = 2};
   x.lines = test::line_range(3, 601, 2);
-  x.axes = 2;
   x.realizations = spec.realizations;
   x.periods = 4;
   x.transient_periods = static_cast<int>(spec.settled);

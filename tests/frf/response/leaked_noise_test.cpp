@@ -122,12 +122,8 @@ double error_over_variance(std::uint64_t seed) {
     force = 0.999 * force + 0.5 * test::real_gaussian(random);
     return command + force;
   };
-  LoopExperiment x;
-  x.period_samples = 500;
+  LoopExperiment x{.period_samples = 500, .axes = 2, .realizations = 4, .periods = 4};
   x.lines = test::line_range(10, 150, 1);
-  x.axes = 2;
-  x.realizations = 4;
-  x.periods = 4;
   x.transient_periods = 2;
   x.seed = seed;
   const MemoryLog log = test::simulate_sampled_log(plant, x, 1e-3);

@@ -18,11 +18,8 @@ using test::MemoryLog;
 
 struct Case {
   explicit Case(std::uint64_t seed) {
-    test::LoopExperiment x;
-    x.sample_rate_hz = 2000.0;
-    x.period_samples = 2000;
+    test::LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 2000, .axes = 2};
     x.lines = test::line_range(3, 801, 2);
-    x.axes = 2;
     x.periods = 3;
     x.seed = seed;
     test::ComplexNoise random(seed + 100);
