@@ -52,8 +52,7 @@ std::vector<char> PeriodComparison::settle(const std::vector<int>& numbers, RunS
       const std::size_t p = outlier.period;
       if (reasons[p].empty()) reasons[p] = reason(outlier);
       // As with dropped ones, the others must be the majority.
-      const auto others = std::count_if(replaced.begin(), replaced.end(),
-                                        [](const IndexRange& range) { return !range.empty(); });
+      const auto others = std::ranges::count(replaced, false, &IndexRange::empty);
       if (!replaced[p].empty() || others < (std::ssize(numbers) - 1) / 2)
         changed |= replace(outlier, outliers.consistent, replaced[p]);
     }

@@ -71,17 +71,16 @@ TransientModel::TransientModel(int period_samples, int periods,
   }
 }
 
-std::vector<Eigen::Index> TransientModel::window(Eigen::Index bin) const {
-  const auto above = std::lower_bound(usable_.begin(), usable_.end(), bin) - usable_.begin();
-  const auto last_first = std::ssize(usable_) - window_;
-  const Eigen::Index first = std::clamp<Eigen::Index>(above - window_ / 2, 0, last_first);
-  return {usable_.begin() + first, usable_.begin() + first + window_};
+Eigen::Index TransientModel::first_of_window(Eigen::Index bin) const {
+  const auto above = std::ranges::lower_bound(usable_, bin) - usable_.begin();
+  return std::clamp<Eigen::Index>(above - window_ / 2, 0, std::ssize(usable_) - window_);
 }
 
 void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
                                    RunSpectra& run) const {
   const Eigen::Index bin = periods_ * excitation_.lines[static_cast<std::size_t>(k)];
-  const std::vector<Eigen::Index> bins = window(bin);
+  const auto first = usable_.begin() + first_of_window(bin);
+  const std::vector<Eigen::Index> bins(first, first + window_);
   const double reach =
       static_cast<double>(std::max(std::abs(bins.front() - bin), std::abs(bins.back() - bin)));
   LocalProblem problem;
@@ -97,8 +96,7 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   set_polynomials(problem, kOrder);
 
   const LocalFit fit = fit_locally(problem, kMostPoles);
-  run.scatter_first[static_cast<std::size_t>(k)] =
-      std::lower_bound(usable_.begin(), usable_.end(), bins.front()) - usable_.begin();
+  run.scatter_first[static_cast<std::size_t>(k)] = first - usable_.begin();
   run.mean.col(k) = Z.col(bin) - fit.value.col(0);
   run.line_dof[k] = static_cast<double>(kDof) * fit.dof / static_cast<double>(kResidualDof);
   // Scaled for single periods. The line's own noise is the mean of the bins'; that of T is the sum of |weight|^2 times

@@ -34,7 +34,7 @@ class TransientModel {
 
  private:
   void separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k, RunSpectra& run) const;
-  std::vector<Eigen::Index> window(Eigen::Index bin) const;
+  Eigen::Index first_of_window(Eigen::Index bin) const;  ///< index in usable_
 
   int periods_;
   Eigen::Index bins_;

@@ -57,8 +57,7 @@ std::vector<Finding> health_of(const MemoryLog& log,
 }
 
 const Finding* first_with(const std::vector<Finding>& findings, Cause cause) {
-  const auto at = std::find_if(findings.begin(), findings.end(),
-                               [&](const Finding& f) { return f.cause == cause; });
+  const auto at = std::ranges::find(findings, cause, &Finding::cause);
   return at == findings.end() ? nullptr : &*at;
 }
 
@@ -84,9 +83,7 @@ TEST(MappedExcitation, IsNamedAndNotCalledDead) {
       EXPECT_THAT(first_with(found, Cause::injection)->remedy,
                   HasSubstr("after the summation point"));
       EXPECT_EQ(first_with(found, Cause::dead), nullptr);
-      EXPECT_EQ(std::count_if(found.begin(), found.end(),
-                              [](const Finding& f) { return f.severity == Severity::fault; }),
-                1);
+      EXPECT_EQ(std::ranges::count(found, Severity::fault, &Finding::severity), 1);
     }
   }
 }
