@@ -1,11 +1,9 @@
 #include "hal/can/can_bus_load.hpp"
 
-#include <fmt/format.h>
-
 #include <limits>
-#include <stdexcept>
 
 #include "hal/can/can_encoding.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 
@@ -41,14 +39,12 @@ std::vector<LinkLoad> can_bus_load(const CanSpec& spec, const CanLayout& layout,
 }
 
 void require_bus_carries(const CanSpec& spec, const CanLayout& layout, double sample_rate_hz) {
-  for (const LinkLoad& load : can_bus_load(spec, layout, sample_rate_hz)) {
-    if (load.load <= spec.largest_load) continue;
-    throw std::invalid_argument(
-        fmt::format("can: {} would have a load of {:.0f} % at {:g} Hz ({:.0f} us per cycle); the "
-                    "limit is {:.0f} %. Use at most {:.0f} Hz, more buses, or mode: resident",
-                    load.link, 100.0 * load.load, sample_rate_hz, 1e6 * load.cycle_s,
-                    100.0 * spec.largest_load, load.most_hz));
-  }
+  for (const LinkLoad& load : can_bus_load(spec, layout, sample_rate_hz))
+    require(load.load <= spec.largest_load,
+            "can: {} would have a load of {:.0f} % at {:g} Hz ({:.0f} us per cycle); the limit is "
+            "{:.0f} %. Use at most {:.0f} Hz, more buses, or mode: resident",
+            load.link, 100.0 * load.load, sample_rate_hz, 1e6 * load.cycle_s,
+            100.0 * spec.largest_load, load.most_hz);
 }
 
 }  // namespace stageid

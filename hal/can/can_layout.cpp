@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <stdexcept>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -15,25 +16,22 @@ constexpr std::size_t kLargestFrameCount = 128;  // identifiers between 0x100 an
 bool is_positive(double value) { return value > 0.0 && std::isfinite(value); }
 
 void check_bus(const CanBusSpec& bus) {
-  if (bus.interface.empty())
-    throw std::invalid_argument("can: a bus has no interface; set its interface");
-  if (!is_positive(bus.nominal_bit_rate_hz) || !is_positive(bus.data_bit_rate_hz))
-    throw std::invalid_argument(
-        fmt::format("can: bus {}: the bit rates must be positive", bus.interface));
+  require(!bus.interface.empty(), "can: a bus has no interface; set its interface");
+  require(is_positive(bus.nominal_bit_rate_hz) && is_positive(bus.data_bit_rate_hz),
+          "can: bus {}: the bit rates must be positive", bus.interface);
 }
 
 void check_times(const CanSpec& spec) {
-  if (spec.buses.empty()) throw std::invalid_argument("can: at least one bus is required");
+  require(!spec.buses.empty(), "can: at least one bus is required");
   std::set<std::string> interfaces;
   for (const CanBusSpec& bus : spec.buses) {
     check_bus(bus);
-    if (!interfaces.insert(bus.interface).second)
-      throw std::invalid_argument(fmt::format("can: duplicate interface {}", bus.interface));
+    require(interfaces.insert(bus.interface).second, "can: duplicate interface {}", bus.interface);
   }
-  if (!is_positive(spec.reply_timeout_s) || !is_positive(spec.watchdog_s))
-    throw std::invalid_argument("can: reply_timeout_s and watchdog_s must be positive");
-  if (!(spec.largest_load > 0.0 && spec.largest_load <= 1.0))
-    throw std::invalid_argument("can: largest_load must be between 0 and 1");
+  require(is_positive(spec.reply_timeout_s) && is_positive(spec.watchdog_s),
+          "can: reply_timeout_s and watchdog_s must be positive");
+  require(spec.largest_load > 0.0 && spec.largest_load <= 1.0,
+          "can: largest_load must be between 0 and 1");
 }
 
 void check_once(const CanSpec& spec, const std::vector<Channel>& channels,
@@ -41,33 +39,27 @@ void check_once(const CanSpec& spec, const std::vector<Channel>& channels,
   std::vector<std::string> place(channels.size());
   for (const CanBusSpec& bus : spec.buses)
     for (const int channel : bus.*of_bus) {
-      if (channel < 0 || static_cast<std::size_t>(channel) >= channels.size())
-        throw std::invalid_argument(
-            fmt::format("can: bus {}: unknown channel number {}", bus.interface, channel));
-      std::string& known = place[static_cast<std::size_t>(channel)];
-      if (!known.empty())
-        throw std::invalid_argument(
-            fmt::format("can: channel '{}' is assigned to both {} and {}; assign it to one bus",
-                        channels[static_cast<std::size_t>(channel)].name, known, bus.interface));
-      known = bus.interface;
+      const auto index = static_cast<std::size_t>(channel);
+      require(index < channels.size(), "can: bus {}: unknown channel number {}", bus.interface,
+              channel);
+      require(place[index].empty(),
+              "can: channel '{}' is assigned to both {} and {}; assign it to one bus",
+              channels[index].name, place[index], bus.interface);
+      place[index] = bus.interface;
     }
   for (std::size_t i = 0; i < place.size(); ++i)
-    if (place[i].empty())
-      throw std::invalid_argument(
-          fmt::format("can: channel '{}' is not assigned to a bus", channels[i].name));
+    require(!place[i].empty(), "can: channel '{}' is not assigned to a bus", channels[i].name);
 }
 
 std::vector<CanScale> scales(const std::vector<double>& ranges,
                              const std::vector<Channel>& channels) {
-  if (ranges.size() != channels.size())
-    throw std::invalid_argument(
-        fmt::format("can: {} ranges for {} channels; give one range per channel", ranges.size(),
-                    channels.size()));
+  require(ranges.size() == channels.size(),
+          "can: {} ranges for {} channels; give one range per channel", ranges.size(),
+          channels.size());
   std::vector<CanScale> list;
   for (std::size_t i = 0; i < ranges.size(); ++i) {
-    if (!is_positive(ranges[i]))
-      throw std::invalid_argument(fmt::format(
-          "can: channel '{}': the range must be positive; got {}", channels[i].name, ranges[i]));
+    require(is_positive(ranges[i]), "can: channel '{}': the range must be positive; got {}",
+            channels[i].name, ranges[i]);
     list.push_back({ranges[i] / kCanCountsOfRange});
   }
   return list;
@@ -79,9 +71,8 @@ std::vector<CanValueFrame> frames(const CanSpec& spec, std::vector<int> CanBusSp
   for (std::size_t bus = 0; bus < spec.buses.size(); ++bus) {
     const std::vector<int>& channels = spec.buses[bus].*of_bus;
     for (std::size_t at = 0; at < channels.size(); at += kCanValuesOfFrame) {
-      if (list.size() == kLargestFrameCount)
-        throw std::invalid_argument(
-            "can: too many frames for the available identifiers; use fewer buses");
+      require(list.size() < kLargestFrameCount,
+              "can: too many frames for the available identifiers; use fewer buses");
       const auto from = channels.begin() + static_cast<std::ptrdiff_t>(at);
       const auto count = std::min(kCanValuesOfFrame, channels.size() - at);
       list.push_back({static_cast<std::uint16_t>(first_id + list.size()),

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <stdexcept>
 
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -34,8 +34,7 @@ CanNode::CanNode(StageNode& stage, const CanLayout& layout, CanTransport& transp
       ticks_(stage.info().sample_rate_hz, 1.0),
       own_clock_(own_clock),
       boot_(std::random_device()() | 1U) {
-  if (layout_.setpoints.size() > 64)
-    throw std::invalid_argument("can: a node supports at most 64 setpoint frames");
+  require(layout_.setpoints.size() <= 64, "can: a node supports at most 64 setpoint frames");
   inbox_.resize(kCanInboxFrames);
   command_.assign(stage.info().actuators.size(), 0.0);
   y_.assign(stage.info().sensors.size(), 0.0);

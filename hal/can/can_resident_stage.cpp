@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "hal/can/can_player.hpp"
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -32,8 +32,7 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
       link_(*transport_, layout_.fingerprint, options.interrupted),
       reset_fault_(options.reset_fault),
       token_(static_cast<std::uint8_t>(link_.host())) {
-  if (info_.actuators.size() > 64)
-    throw std::invalid_argument("can: resident experiments support at most 64 actuators");
+  require(info_.actuators.size() <= 64, "can: resident experiments support at most 64 actuators");
   info_.backend = "can";
   info_.clock = Clock::virtual_time;  // this side does not wait for samples
 }
@@ -55,11 +54,11 @@ void CanResidentStage::connect() {
 /// Stores the columns that are not zero, as float32.
 void CanResidentStage::pack(const Waveforms& waveforms) {
   const Eigen::MatrixXd& samples = waveforms.samples;
-  if (samples.cols() != static_cast<Eigen::Index>(info_.actuators.size()) || samples.rows() == 0 ||
-      !samples.allFinite() || waveforms.periods < 1 || waveforms.transient_periods < 0)
-    throw std::invalid_argument(
-        "can: waveforms must be finite, with at least one sample, one period and one column per "
-        "actuator");
+  require(samples.cols() == static_cast<Eigen::Index>(info_.actuators.size()) &&
+              samples.rows() > 0 && samples.allFinite() && waveforms.periods >= 1 &&
+              waveforms.transient_periods >= 0,
+          "can: waveforms must be finite, with at least one sample, one period and one column per "
+          "actuator");
   std::vector<Eigen::Index> columns;
   mask_ = 0;
   for (Eigen::Index column = 0; column < samples.cols(); ++column) {
@@ -67,15 +66,13 @@ void CanResidentStage::pack(const Waveforms& waveforms) {
     columns.push_back(column);
     mask_ |= std::uint64_t{1} << column;
   }
-  if (columns.empty())
-    throw std::invalid_argument("can: all waveforms are zero; excite at least one actuator");
+  require(!columns.empty(), "can: all waveforms are zero; excite at least one actuator");
   period_samples_ = static_cast<std::uint32_t>(samples.rows());
   samples_ = std::uint64_t{period_samples_} *
              static_cast<std::uint64_t>(waveforms.periods + waveforms.transient_periods);
-  if (samples_ > depth_samples())
-    throw std::invalid_argument(fmt::format(
-        "can: {} samples per run, but the node records at most {}; lower the number of periods",
-        samples_, depth_samples()));
+  require(samples_ <= depth_samples(),
+          "can: {} samples per run, but the node records at most {}; lower the number of periods",
+          samples_, depth_samples());
   waveform_.clear();
   for (Eigen::Index n = 0; n < samples.rows(); ++n)
     for (const Eigen::Index column : columns) append_can_float(waveform_, samples(n, column));
@@ -125,10 +122,10 @@ JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
   send_all();
   std::vector<std::uint8_t> back(waveform_.size());
   std::size_t chunks = 0;
-  if (!read(CanMemory::waveform, back, chunks) || back != waveform_)
-    throw StageError(
-        fmt::format("can: {}: the waveform in the node differs from the one sent; upload it again",
-                    transport_->name(0)));
+  require<StageError>(
+      read(CanMemory::waveform, back, chunks) && back == waveform_,
+      "can: {}: the waveform in the node differs from the one sent; upload it again",
+      transport_->name(0));
   trace_.clear();
   trace_chunks_ = 0;
   rows_given_ = 0;
@@ -138,9 +135,7 @@ JobProgress CanResidentStage::upload(const Waveforms& waveforms) {
 JobProgress CanResidentStage::arm(const Trigger& trigger) {
   connect();
   const double ramp = std::round(trigger.ramp_s * info_.sample_rate_hz);
-  if (!(ramp >= 0.0 && ramp < 1e9))
-    throw std::invalid_argument(
-        fmt::format("can: ramp_s must be 0 or more; got {}", trigger.ramp_s));
+  require(ramp >= 0.0 && ramp < 1e9, "can: ramp_s must be 0 or more; got {}", trigger.ramp_s);
   link_.command({.code = CanCommandCode::arm,
                  .a = trigger.run_seed,
                  .b = samples_,
@@ -216,10 +211,11 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
   const CanState node = link_.command({CanCommandCode::hello});
   const std::uint64_t rows = std::min(node.sample, samples_);
   trace_.resize(rows * row_bytes());
-  if (!read(CanMemory::trace, trace_, trace_chunks_))
-    throw StageError(fmt::format(
-        "can: {}: the download stopped after {} of {} chunks; repeat it when the bus works again",
-        transport_->name(0), trace_chunks_, can_chunks(trace_.size())));
+  const bool complete = read(CanMemory::trace, trace_, trace_chunks_);
+  require<StageError>(
+      complete,
+      "can: {}: the download stopped after {} of {} chunks; repeat it when the bus works again",
+      transport_->name(0), trace_chunks_, can_chunks(trace_.size()));
   const std::size_t columns = info_.actuators.size() + info_.sensors.size();
   std::vector<double> values;
   std::vector<Outcome> outcomes;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "hal/can/can_bus_load.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -25,9 +26,8 @@ StageInfo info_of(StageInfo info, const CanSpec& spec, const CanLayout& layout, 
   info.pace = pace > 0.0 ? pace : 1.0;
   info.stamps = pace > 0.0;
   info.sets_pace = spec.node_clock;
-  if (spec.node_clock && pace != 1.0)
-    throw std::invalid_argument(
-        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
+  require(!spec.node_clock || pace == 1.0,
+          "can: clock: node needs the wall clock; set pace: 1, or clock: host");
   return info;
 }
 

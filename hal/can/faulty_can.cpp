@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 #include <regex>
-#include <stdexcept>
 #include <utility>
 
 #include "hal/can/can_layout.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -26,10 +26,8 @@ CanFault parse_can_fault(const std::string& text) {
   std::smatch part;
   const bool formed = std::regex_match(text, part, form);
   const auto kind = formed ? from_word<CanFaultKind>(part[1].str()) : std::nullopt;
-  if (!kind)
-    throw std::invalid_argument(
-        fmt::format("'{}': expected KIND@FRAME[xCOUNT][:SECONDS], where KIND is one of {}", text,
-                    fmt::join(kWords<CanFaultKind>, ", ")));
+  require(kind.has_value(), "'{}': expected KIND@FRAME[xCOUNT][:SECONDS], where KIND is one of {}",
+          text, fmt::join(kWords<CanFaultKind>, ", "));
   CanFault fault;
   fault.kind = *kind;
   fault.from_frame = std::stoull(part[2]);
@@ -42,9 +40,8 @@ CanFault parse_can_fault(const std::string& text) {
           fmt::format("'{}': '{}' is not a valid time in seconds", text, part[6].str()));
     }
   }
-  if (fault.kind == CanFaultKind::late && !(fault.delay_s > 0.0 && fault.delay_s <= 60.0))
-    throw std::invalid_argument(
-        fmt::format("'{}': late needs a time of 0 to 60 s, for example late@100:0.004", text));
+  require(fault.kind != CanFaultKind::late || (fault.delay_s > 0.0 && fault.delay_s <= 60.0),
+          "'{}': late needs a time of 0 to 60 s, for example late@100:0.004", text);
   return fault;
 }
 

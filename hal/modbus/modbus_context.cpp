@@ -1,14 +1,13 @@
 #include "hal/modbus/modbus_context.hpp"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <modbus/modbus.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <stdexcept>
-#include <string>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -28,20 +27,17 @@ void ModbusContextFree::operator()(_modbus* context) const noexcept {
 ModbusContext make_modbus_context(const ModbusAddress& address) {
   ModbusContext context;
   if (address.serial()) {
-    if (std::find(kBaudRates.begin(), kBaudRates.end(), address.baud) == kBaudRates.end())
-      throw std::invalid_argument(fmt::format("{}: unsupported baud rate; use one of {}",
-                                              to_string(address), fmt::join(kBaudRates, ", ")));
+    require(std::find(kBaudRates.begin(), kBaudRates.end(), address.baud) != kBaudRates.end(),
+            "{}: unsupported baud rate; use one of {}", to_string(address),
+            fmt::join(kBaudRates, ", "));
     context.reset(modbus_new_rtu(address.device.c_str(), address.baud, address.parity, 8,
                                  address.parity == 'N' ? 2 : 1));
   } else {
     context.reset(modbus_new_tcp(address.host.c_str(), address.port));
   }
-  if (!context)
-    throw std::invalid_argument(
-        fmt::format("{}: refused: {}", to_string(address), modbus_strerror(errno)));
-  if (modbus_set_slave(context.get(), address.unit) != 0)
-    throw std::invalid_argument(
-        fmt::format("{}: unit out of range; give 1 to 247", to_string(address)));
+  require(context != nullptr, "{}: refused: {}", to_string(address), modbus_strerror(errno));
+  require(modbus_set_slave(context.get(), address.unit) == 0,
+          "{}: unit out of range; give 1 to 247", to_string(address));
   modbus_set_error_recovery(context.get(), MODBUS_ERROR_RECOVERY_NONE);
   return context;
 }

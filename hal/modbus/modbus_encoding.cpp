@@ -1,10 +1,9 @@
 #include "hal/modbus/modbus_encoding.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 
@@ -20,9 +19,8 @@ std::int32_t to_counts(double value, double si_per_count) noexcept {
 }
 
 float count_scale(double range) {
-  if (!(range >= 1e-20) || !(range <= 1e20))
-    throw std::invalid_argument(fmt::format(
-        "modbus: the range of a channel must be between 1e-20 and 1e20; got {}", range));
+  require(range >= 1e-20 && range <= 1e20,
+          "modbus: the range of a channel must be between 1e-20 and 1e20; got {}", range);
   return static_cast<float>(std::exp2(std::ceil(std::log2(range / kLargestModbusCount))));
 }
 

@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <stdexcept>
 #include <thread>
 
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -37,13 +37,11 @@ bool is_bad_reply(int error) { return error >= EMBBADCRC && error <= EMBBADSLAVE
 
 ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
     : address_(address), timing_(timing), context_(make_modbus_context(address)) {
-  const bool sound = timing.response_s >= 1e-3 && timing.response_s <= timing.worst_reply_s &&
-                     timing.worst_reply_s <= 3600.0;
-  if (!sound)
-    throw std::invalid_argument(
-        fmt::format("modbus: invalid response_s {} s or worst_reply_s {} s; response_s must be at "
-                    "least 0.001 s, and worst_reply_s at least response_s",
-                    timing.response_s, timing.worst_reply_s));
+  require(timing.response_s >= 1e-3 && timing.response_s <= timing.worst_reply_s &&
+              timing.worst_reply_s <= 3600.0,
+          "modbus: invalid response_s {} s or worst_reply_s {} s; response_s must be at least "
+          "0.001 s, and worst_reply_s at least response_s",
+          timing.response_s, timing.worst_reply_s);
   const Duration response = duration(timing.response_s);
   modbus_set_response_timeout(context_.get(), response.seconds, response.microseconds);
   // The response timeout restarts at every group of bytes. With the byte timeout disabled, it becomes one

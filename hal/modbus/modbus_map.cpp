@@ -4,7 +4,8 @@
 
 #include <array>
 #include <iterator>
-#include <stdexcept>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid::modbus_map {
 namespace {
@@ -88,10 +89,9 @@ std::string markdown_table() {
 }
 
 void require_channels(const StageInfo& info) {
-  if (info.actuators.size() > kMostChannels || info.sensors.size() > kMostChannels)
-    throw std::invalid_argument(fmt::format(
-        "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
-        info.actuators.size(), info.sensors.size(), kMostChannels));
+  require(info.actuators.size() <= kMostChannels && info.sensors.size() <= kMostChannels,
+          "modbus: {} actuators and {} sensors; one transaction carries at most {} of each",
+          info.actuators.size(), info.sensors.size(), kMostChannels);
 }
 
 std::uint32_t channel_hash(const StageInfo& info) {

@@ -1,15 +1,12 @@
 #include "hal/modbus/modbus_node.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <span>
-#include <stdexcept>
 
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 
@@ -27,30 +24,29 @@ bool touches(int first, std::size_t count, int address) {
 void check_sizes(const StageNode& node) {
   map::require_channels(node.info());
   const NodePanel panel = node.panel();
-  if (panel.gravity_compensator_n.size() > map::kMostPanelValues ||
-      panel.temperature_k.size() > map::kMostPanelValues)
-    throw std::invalid_argument(fmt::format(
-        "modbus: {} gravity compensators and {} temperatures; the register map has at most {} of "
-        "each",
-        panel.gravity_compensator_n.size(), panel.temperature_k.size(), map::kMostPanelValues));
+  require(panel.gravity_compensator_n.size() <= map::kMostPanelValues &&
+              panel.temperature_k.size() <= map::kMostPanelValues,
+          "modbus: {} gravity compensators and {} temperatures; the register map has at most {} "
+          "of each",
+          panel.gravity_compensator_n.size(), panel.temperature_k.size(), map::kMostPanelValues);
 }
 
 void check_faults(const ModbusFaultScript* faults, const NodePanel& panel) {
   using Kind = ModbusFault::Kind;
   if (faults == nullptr) return;
-  if (faults->mentions(Kind::temperature) && panel.temperature_k.empty())
-    throw std::invalid_argument("fault 'temperature': the stage file has no temperature");
-  if (faults->mentions(Kind::gravity) && panel.gravity_compensator_n.empty())
-    throw std::invalid_argument("fault 'gravity': the stage file has no gravity compensator");
+  require(!faults->mentions(Kind::temperature) || !panel.temperature_k.empty(),
+          "fault 'temperature': the stage file has no temperature");
+  require(!faults->mentions(Kind::gravity) || !panel.gravity_compensator_n.empty(),
+          "fault 'gravity': the stage file has no gravity compensator");
 }
 
 }  // namespace
 
 std::vector<float> modbus_scales(const Eigen::VectorXd& limits, std::size_t channels,
                                  const char* what) {
-  if (static_cast<std::size_t>(limits.size()) != channels)
-    throw std::invalid_argument(fmt::format(
-        "modbus: every {} needs a limit, because the limit sets its range in the registers", what));
+  require(static_cast<std::size_t>(limits.size()) == channels,
+          "modbus: every {} needs a limit, because the limit sets its range in the registers",
+          what);
   std::vector<float> scales;
   for (const double limit : limits) scales.push_back(count_scale(kHeadroom * limit));
   return scales;

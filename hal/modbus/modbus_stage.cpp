@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
+#include "hal/stage/require.hpp"
 #include "hal/stage/supervisor.hpp"
 
 namespace stageid {
@@ -41,12 +41,11 @@ double checked_rate_hz(const StageInfo& info, const ModbusAddress& address,
   map::require_channels(info);
   const double longest_hz = 1.0 / modbus_exchange_s(address, timing, info);
   const auto [written, read] = exchange_of(info);
-  if (info.sample_rate_hz > longest_hz)
-    throw std::invalid_argument(
-        fmt::format("modbus: {:.6g} Hz is too fast for the link: one transaction takes {}, so the "
-                    "maximum is {:.3g} Hz. Lower sample_rate_hz or use a faster link",
-                    info.sample_rate_hz, describe_transaction(address, timing, written, read),
-                    std::floor(longest_hz)));
+  require(info.sample_rate_hz <= longest_hz,
+          "modbus: {:.6g} Hz is too fast for the link: one transaction takes {}, so the maximum "
+          "is {:.3g} Hz. Lower sample_rate_hz or use a faster link",
+          info.sample_rate_hz, describe_transaction(address, timing, written, read),
+          std::floor(longest_hz));
   return longest_hz;
 }
 
@@ -78,8 +77,8 @@ RegisterBlock<const std::uint16_t> ModbusStage::measured() const noexcept {
 }
 
 void ModbusStage::start(std::uint64_t run_seed, Inputs& first) {
-  if (first.y.size() != info_.sensors.size())
-    throw std::invalid_argument("modbus stage: Inputs::y must have one entry per sensor");
+  require(first.y.size() == info_.sensors.size(),
+          "modbus stage: Inputs::y must have one entry per sensor");
   trouble_ = Trouble::none;
   stopped_by_ = PeerStatus::good;
   if (!link_.connected()) {

@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <stdexcept>
 #include <utility>
 
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/peer_status.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 
@@ -46,13 +45,10 @@ PlantSnapshot parse(Status status) {
 }
 
 void check(const ModbusSupervisorOptions& o) {
-  const bool sound = o.poll_period_s >= 0.001 && o.poll_period_s <= 60.0 &&
-                     o.backoff_first_s > 0.0 && o.backoff_first_s <= o.backoff_longest_s &&
-                     o.backoff_longest_s <= 3600.0;
-  if (!sound)
-    throw std::invalid_argument(
-        fmt::format("supervisor: invalid poll period {} s (0.001 to 60) or back-off {} to {} s",
-                    o.poll_period_s, o.backoff_first_s, o.backoff_longest_s));
+  require(o.poll_period_s >= 0.001 && o.poll_period_s <= 60.0 && o.backoff_first_s > 0.0 &&
+              o.backoff_first_s <= o.backoff_longest_s && o.backoff_longest_s <= 3600.0,
+          "supervisor: invalid poll period {} s (0.001 to 60) or back-off {} to {} s",
+          o.poll_period_s, o.backoff_first_s, o.backoff_longest_s);
 }
 
 }  // namespace

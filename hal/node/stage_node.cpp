@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -18,8 +18,8 @@ constexpr int kBadSample = 2;
 constexpr int kMissesAllowed = 10;
 
 std::int64_t nanoseconds(double seconds, const char* name) {
-  if (!(seconds >= 0.0) || !std::isfinite(seconds))
-    throw std::invalid_argument(fmt::format("node: {} must be 0 or more; got {}", name, seconds));
+  require(seconds >= 0.0 && std::isfinite(seconds), "node: {} must be 0 or more; got {}", name,
+          seconds);
   return std::llround(1e9 * seconds);
 }
 
@@ -61,12 +61,11 @@ StageNode::StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limi
     : stage_(std::move(stage), limits), controller_(controller), panel_(std::move(panel)) {
   stage_.carry(controller);
   const StageInfo& info = stage_.info();
-  if (controller_.sensors() != static_cast<Eigen::Index>(info.sensors.size()) ||
-      controller_.actuators() != static_cast<Eigen::Index>(info.actuators.size()))
-    throw std::invalid_argument(
-        fmt::format("node: the controller has {} sensors and {} actuators, the stage {} and {}",
-                    controller_.sensors(), controller_.actuators(), info.sensors.size(),
-                    info.actuators.size()));
+  require(controller_.sensors() == static_cast<Eigen::Index>(info.sensors.size()) &&
+              controller_.actuators() == static_cast<Eigen::Index>(info.actuators.size()),
+          "node: the controller has {} sensors and {} actuators, the stage {} and {}",
+          controller_.sensors(), controller_.actuators(), info.sensors.size(),
+          info.actuators.size());
   const double watchdog_s =
       options.watchdog_s == 0.0 ? kWatchdogSamples / info.sample_rate_hz : options.watchdog_s;
   watchdog_ns_ = nanoseconds(watchdog_s, "watchdog_s");
@@ -159,11 +158,11 @@ std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, 
   const std::lock_guard lock(mutex_);
   if (holder() != 0 && (session != holder() || running_))
     refuse(PeerStatus::held, "node", "; wait until it has ended");
-  if (machine_.state() != NodeState::operation_enabled)
-    throw StageError(fmt::format("node: cannot measure in state {}; enable it first",
-                                 to_string(machine_.state())));
-  if (first.y.size() != y_.size())
-    throw StageError("node: Inputs::y must have one entry per sensor");
+  require<StageError>(machine_.state() == NodeState::operation_enabled,
+                      "node: cannot measure in state {}; enable it first",
+                      to_string(machine_.state()));
+  require<StageError>(first.y.size() == y_.size(),
+                      "node: Inputs::y must have one entry per sensor");
   stage_.start(run_seed, first);
   if (holder() == 0) session_ = draw_key();
   static_cast<void>(machine_.begin_measuring());

@@ -1,15 +1,13 @@
 #include "hal/simulator/fault_script.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
-namespace stageid {
+#include "hal/stage/require.hpp"
 
+namespace stageid {
 namespace {
 
 using Fault = WaferStageSpec::Fault;
@@ -33,25 +31,19 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info) {
   const std::size_t channels = of_sensor(fault.kind) ? info.sensors.size() : info.actuators.size();
   const bool all = may_be_all(fault.kind) && fault.channel == -1;
   if ((of_sensor(fault.kind) || of_actuator(fault.kind)) && !all) {
-    if (!std::in_range<std::size_t>(fault.channel))
-      throw std::invalid_argument(
-          fmt::format("faults: entry {}: channel {} is negative", number, fault.channel));
-    if (static_cast<std::size_t>(fault.channel) >= channels)
-      throw std::invalid_argument(
-          fmt::format("faults: entry {}: channel {} is out of range; there are {} {}", number,
-                      fault.channel, channels, of_sensor(fault.kind) ? "sensors" : "actuators"));
+    require(fault.channel >= 0, "faults: entry {}: channel {} is negative", number, fault.channel);
+    require(static_cast<std::size_t>(fault.channel) < channels,
+            "faults: entry {}: channel {} is out of range; there are {} {}", number, fault.channel,
+            channels, of_sensor(fault.kind) ? "sensors" : "actuators");
   }
-  if (fault.kind == Kind::missed_cycle && fault.cycles == 0)
-    throw std::invalid_argument(
-        fmt::format("faults: entry {}: missed_cycle needs cycles of at least 1", number));
-  if (!std::isfinite(fault.value))
-    throw std::invalid_argument(fmt::format("faults: entry {}: the value is not finite", number));
-  if (fault.kind == Kind::extra_delay &&
-      !(fault.value >= 1.0 && fault.value <= kLongestExtraDelay &&
-        fault.value == std::floor(fault.value)))
-    throw std::invalid_argument(
-        fmt::format("faults: entry {}: extra_delay is {} samples; allowed: whole numbers 1 to {}",
-                    number, fault.value, kLongestExtraDelay));
+  require(fault.kind != Kind::missed_cycle || fault.cycles > 0,
+          "faults: entry {}: missed_cycle needs cycles of at least 1", number);
+  require(std::isfinite(fault.value), "faults: entry {}: the value is not finite", number);
+  require(
+      fault.kind != Kind::extra_delay || (fault.value >= 1.0 && fault.value <= kLongestExtraDelay &&
+                                          fault.value == std::floor(fault.value)),
+      "faults: entry {}: extra_delay is {} samples; allowed: whole numbers 1 to {}", number,
+      fault.value, kLongestExtraDelay);
 }
 
 }  // namespace

@@ -1,13 +1,10 @@
 #include "hal/simulator/modal_plant.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <stdexcept>
 
 #include "hal/simulator/modal_propagator.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -18,33 +15,27 @@ constexpr double kLongestDelay = 1e5;  // in samples; limits the memory for held
 Eigen::Index padded(Eigen::Index n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
 void check(const std::vector<PlantMode>& modes, double delay_s, double sample_rate_hz) {
-  if (modes.empty()) throw std::invalid_argument("plant: at least one mode is needed");
-  if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz))
-    throw std::invalid_argument(
-        fmt::format("plant: the sample rate must be positive; got {} Hz", sample_rate_hz));
-  if (!(delay_s >= 0.0) || !std::isfinite(delay_s))
-    throw std::invalid_argument(
-        fmt::format("plant: the delay must be 0 or more; got {} s", delay_s));
-  if (delay_s * sample_rate_hz > kLongestDelay)
-    throw std::invalid_argument(
-        fmt::format("plant: a delay of {} s is {:.0f} samples; the maximum is {:.0f}", delay_s,
-                    delay_s * sample_rate_hz, kLongestDelay));
+  require(!modes.empty(), "plant: at least one mode is needed");
+  require(sample_rate_hz > 0.0 && std::isfinite(sample_rate_hz),
+          "plant: the sample rate must be positive; got {} Hz", sample_rate_hz);
+  require(delay_s >= 0.0 && std::isfinite(delay_s), "plant: the delay must be 0 or more; got {} s",
+          delay_s);
+  require(delay_s * sample_rate_hz <= kLongestDelay,
+          "plant: a delay of {} s is {:.0f} samples; the maximum is {:.0f}", delay_s,
+          delay_s * sample_rate_hz, kLongestDelay);
   for (std::size_t i = 0; i < modes.size(); ++i) {
     const PlantMode& mode = modes[i];
-    if (!(mode.natural_frequency_hz >= 0.0) || !std::isfinite(mode.natural_frequency_hz))
-      throw std::invalid_argument(fmt::format("plant: mode {}: invalid natural_frequency_hz {}",
-                                              i + 1, mode.natural_frequency_hz));
-    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0))
-      throw std::invalid_argument(fmt::format(
-          "plant: mode {}: damping_ratio must be in [0, 1); got {}", i + 1, mode.damping_ratio));
-    if (mode.acceleration_shape.size() != modes[0].acceleration_shape.size() ||
-        mode.actuator_shape.size() != modes[0].actuator_shape.size() ||
-        mode.sensor_shape.size() != modes[0].sensor_shape.size())
-      throw std::invalid_argument(fmt::format(
-          "plant: mode {}: the shapes have a different size than those of mode 1", i + 1));
-    if (!mode.actuator_shape.allFinite() || !mode.sensor_shape.allFinite() ||
-        !mode.acceleration_shape.allFinite())
-      throw std::invalid_argument(fmt::format("plant: mode {}: a shape is not finite", i + 1));
+    require(mode.natural_frequency_hz >= 0.0 && std::isfinite(mode.natural_frequency_hz),
+            "plant: mode {}: invalid natural_frequency_hz {}", i + 1, mode.natural_frequency_hz);
+    require(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0,
+            "plant: mode {}: damping_ratio must be in [0, 1); got {}", i + 1, mode.damping_ratio);
+    require(mode.acceleration_shape.size() == modes[0].acceleration_shape.size() &&
+                mode.actuator_shape.size() == modes[0].actuator_shape.size() &&
+                mode.sensor_shape.size() == modes[0].sensor_shape.size(),
+            "plant: mode {}: the shapes have a different size than those of mode 1", i + 1);
+    require(mode.actuator_shape.allFinite() && mode.sensor_shape.allFinite() &&
+                mode.acceleration_shape.allFinite(),
+            "plant: mode {}: a shape is not finite", i + 1);
   }
 }
 
@@ -82,7 +73,7 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
 
 void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,
                         double damping_ratio) noexcept {
-  const double omega = 2.0 * std::numbers::pi * natural_frequency_hz;
+  const double omega = kTwoPi * natural_frequency_hz;
   const auto over = [&](double part) {
     return modal_propagator(omega, damping_ratio, part * period_s_);
   };

@@ -4,15 +4,12 @@
 // One mode, 1 / ((s - p)(s - p*)), is the divided difference over p and p* of 1 / (s - p). Through
 // a hold delayed by (d + e) samples, 0 <= e < 1, and a sampler, 1 / (s - p) becomes
 //   z^-d [ f((1-e) T) + e^(p (1-e) T) f(e T) z^-1 ] / (z - e^(p T)),   f(t) = (e^(p t) - 1) / p.
-#include <fmt/format.h>
-
 #include <cmath>
 #include <complex>
-#include <numbers>
-#include <stdexcept>
 
 #include "hal/simulator/modal_propagator.hpp"
 #include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -87,21 +84,17 @@ ModalResponse sampled_mode(const PlantMode& mode, const Sampling& at) {
 
 Eigen::MatrixXcd sampled_response(const std::vector<PlantMode>& modes, double delay_s,
                                   double sample_rate_hz, double frequency_hz) {
-  if (!(sample_rate_hz > 0.0) || !(delay_s >= 0.0)) {
-    throw std::invalid_argument(
-        fmt::format("plant response: the sample rate must be positive and the delay 0 or more; got "
-                    "{} Hz and {} s",
-                    sample_rate_hz, delay_s));
-  }
+  require(sample_rate_hz > 0.0 && delay_s >= 0.0,
+          "plant response: the sample rate must be positive and the delay 0 or more; got {} Hz and "
+          "{} s",
+          sample_rate_hz, delay_s);
   const Sampling at = sampling(delay_s, sample_rate_hz, frequency_hz);
-  if (modes.empty()) throw std::invalid_argument("plant response: at least one mode is needed");
+  require(!modes.empty(), "plant response: at least one mode is needed");
   Eigen::MatrixXcd sum =
       Eigen::MatrixXcd::Zero(modes[0].sensor_shape.size(), modes[0].actuator_shape.size());
   for (const PlantMode& mode : modes) {
-    if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
-      throw std::invalid_argument(fmt::format(
-          "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio));
-    }
+    require(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0,
+            "plant response: damping_ratio must be in [0, 1); got {}", mode.damping_ratio);
     const ModalResponse of_mode = sampled_mode(mode, at);
     sum += of_mode.position * (mode.sensor_shape * mode.actuator_shape.transpose());
     if (mode.acceleration_shape.size() > 0)

@@ -1,12 +1,10 @@
 #include "hal/simulator/plate_modes.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "excitation/decompositions/decompositions.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -57,19 +55,13 @@ Eigen::VectorXd polynomials(double t, int parity) {
 }
 
 void check(const FreePlate& plate, int count) {
-  if (!(plate.length_x_m > 0.0) || !(plate.length_y_m > 0.0) || !std::isfinite(plate.length_x_m) ||
-      !std::isfinite(plate.length_y_m)) {
-    throw std::invalid_argument(fmt::format("plate: lengths must be positive; got {} x {} m",
-                                            plate.length_x_m, plate.length_y_m));
-  }
-  if (!(plate.poisson_ratio >= 0.0 && plate.poisson_ratio < 0.5)) {
-    throw std::invalid_argument(
-        fmt::format("plate: poisson_ratio must be in [0, 0.5); got {}", plate.poisson_ratio));
-  }
-  if (count < 0 || count > kMaxCount) {
-    throw std::invalid_argument(
-        fmt::format("plate: the number of modes must be 0 to {}; got {}", kMaxCount, count));
-  }
+  require(plate.length_x_m > 0.0 && plate.length_y_m > 0.0 && std::isfinite(plate.length_x_m) &&
+              std::isfinite(plate.length_y_m),
+          "plate: lengths must be positive; got {} x {} m", plate.length_x_m, plate.length_y_m);
+  require(plate.poisson_ratio >= 0.0 && plate.poisson_ratio < 0.5,
+          "plate: poisson_ratio must be in [0, 0.5); got {}", plate.poisson_ratio);
+  require(count >= 0 && count <= kMaxCount, "plate: the number of modes must be 0 to {}; got {}",
+          kMaxCount, count);
 }
 
 }  // namespace

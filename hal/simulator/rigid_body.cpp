@@ -1,14 +1,12 @@
 #include "hal/simulator/rigid_body.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "excitation/decompositions/decompositions.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -23,22 +21,18 @@ void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& invers
   constexpr double kTolerance = 1e-9;
   Eigen::RowVectorXd row = inverse.row(axis) * jacobian;
   row[axis] -= 1.0;
-  if (row.cwiseAbs().maxCoeff() > kTolerance) {
-    throw std::invalid_argument(
-        fmt::format("controller: axis {} is closed, but the {} cannot control it independently of "
-                    "the other axes; add {} or leave the axis open",
-                    kRigidAxisNames[static_cast<std::size_t>(axis)], what, what));
-  }
+  require(!(row.cwiseAbs().maxCoeff() > kTolerance),
+          "controller: axis {} is closed, but the {} cannot control it independently of the other "
+          "axes; add {} or leave the axis open",
+          kRigidAxisNames[static_cast<std::size_t>(axis)], what, what);
 }
 
 // The gain that makes |C(j w_c)| / (inertia w_c^2) = 1.
 double unit_crossover_gain(AxisController axis, double inertia, const char* name) {
-  if (!(inertia > 0.0) || !std::isfinite(inertia)) {
-    throw std::invalid_argument(fmt::format(
-        "controller: axis {} has gain 0 (automatic), which needs a positive inertia; got {}. Write "
-        "'gain', or the inertia in 'plant'",
-        name, inertia));
-  }
+  require(inertia > 0.0 && std::isfinite(inertia),
+          "controller: axis {} has gain 0 (automatic), which needs a positive inertia; got {}. "
+          "Write 'gain', or the inertia in 'plant'",
+          name, inertia);
   axis.gain = 1.0;
   const double omega = 2.0 * pi * axis.crossover_hz;
   return inertia * omega * omega / std::abs(axis_response(axis, axis.crossover_hz));

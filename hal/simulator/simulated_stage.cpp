@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/noise.hpp"
 #include "hal/simulator/wafer_stage_check.hpp"
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -127,8 +127,8 @@ void SimulatedStage::displacement(std::span<double> y_m) const noexcept {
 
 void SimulatedStage::start(std::uint64_t run_seed, Inputs& first) {
   State& s = *state_;
-  if (first.y.size() != s.info.sensors.size())
-    throw std::invalid_argument("simulated stage: Inputs::y must have one entry per sensor");
+  require(first.y.size() == s.info.sensors.size(),
+          "simulated stage: Inputs::y must have one entry per sensor");
   ++s.run;
   s.faults.start_run(s.run);
   s.cycle = 0;

@@ -1,59 +1,49 @@
 #include "hal/simulator/wafer_stage_check.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <stdexcept>
 
 #include "hal/simulator/plate_modes.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
 
-void require(bool holds, const char* field, double value, const char* wanted) {
-  if (holds && std::isfinite(value)) return;
-  throw std::invalid_argument(fmt::format("stage: {} is {}; must be {}", field, value, wanted));
+void check(bool holds, const char* field, double value, const char* wanted) {
+  require(holds && std::isfinite(value), "stage: {} is {}; must be {}", field, value, wanted);
 }
 
-void positive(const char* field, double value) { require(value > 0.0, field, value, "positive"); }
+void positive(const char* field, double value) { check(value > 0.0, field, value, "positive"); }
 
 void not_negative(const char* field, double value) {
-  require(value >= 0.0, field, value, "0 or more");
+  check(value >= 0.0, field, value, "0 or more");
 }
 
 void damping(const char* field, double value) {
-  require(value >= 0.0 && value < 1.0, field, value, "at least 0 and below 1");
+  check(value >= 0.0 && value < 1.0, field, value, "at least 0 and below 1");
 }
 
 void check_channels(const char* kind, const std::vector<Channel>& channels,
                     const WaferStageSpec& spec) {
   // The valid mask of Inputs has 64 bits, one per sensor.
-  if (channels.empty() || channels.size() > 64)
-    throw std::invalid_argument(
-        fmt::format("stage: {} {}; must be 1 to 64", channels.size(), kind));
+  require(!channels.empty() && channels.size() <= 64, "stage: {} {}; must be 1 to 64",
+          channels.size(), kind);
   for (const Channel& channel : channels) {
     const double* p = channel.position_m;
     const double* d = channel.direction;
-    if (std::abs(std::hypot(d[0], d[1], d[2]) - 1.0) > 1e-6)
-      throw std::invalid_argument(
-          fmt::format("stage: {} {}: direction [{}, {}, {}] is not a unit vector", kind,
-                      channel.name, d[0], d[1], d[2]));
-    if (spec.flexible_modes > 0 && is_rotation(channel))
-      throw std::invalid_argument(
-          fmt::format("stage: {} {}: a plate with flexible modes is simulated without rotations; "
-                      "use forces and translations, or 'modes: 0'",
-                      kind, channel.name));
-    if (channel.gain == 0.0 || !std::isfinite(channel.gain))
-      throw std::invalid_argument(fmt::format("stage: {} {}: gain is {}; must not be zero", kind,
-                                              channel.name, channel.gain));
+    require(!(std::abs(std::hypot(d[0], d[1], d[2]) - 1.0) > 1e-6),
+            "stage: {} {}: direction [{}, {}, {}] is not a unit vector", kind, channel.name, d[0],
+            d[1], d[2]);
+    require(spec.flexible_modes == 0 || !is_rotation(channel),
+            "stage: {} {}: a plate with flexible modes is simulated without rotations; use forces "
+            "and translations, or 'modes: 0'",
+            kind, channel.name);
+    require(channel.gain != 0.0 && std::isfinite(channel.gain),
+            "stage: {} {}: gain is {}; must not be zero", kind, channel.name, channel.gain);
     // This form rejects NaN too.
-    const bool on_plate = std::abs(p[0]) <= 0.5 * spec.length_x_m * (1.0 + 1e-9) &&
-                          std::abs(p[1]) <= 0.5 * spec.length_y_m * (1.0 + 1e-9) &&
-                          std::isfinite(p[2]);
-    if (!on_plate)
-      throw std::invalid_argument(
-          fmt::format("stage: {} {}: position_m [{}, {}, {}] is not on the plate of {} x {} m",
-                      kind, channel.name, p[0], p[1], p[2], spec.length_x_m, spec.length_y_m));
+    require(std::abs(p[0]) <= 0.5 * spec.length_x_m * (1.0 + 1e-9) &&
+                std::abs(p[1]) <= 0.5 * spec.length_y_m * (1.0 + 1e-9) && std::isfinite(p[2]),
+            "stage: {} {}: position_m [{}, {}, {}] is not on the plate of {} x {} m", kind,
+            channel.name, p[0], p[1], p[2], spec.length_x_m, spec.length_y_m);
   }
 }
 
@@ -64,23 +54,22 @@ void check_plant(const WaferStageSpec& spec) {
   damping("suspension_damping", spec.suspension_damping);
   positive("plate length_x_m", spec.length_x_m);
   positive("plate length_y_m", spec.length_y_m);
-  require(spec.poisson_ratio >= 0.0 && spec.poisson_ratio < 0.5, "plate poisson_ratio",
-          spec.poisson_ratio, "at least 0 and below 0.5");
-  require(spec.flexible_modes >= 0 && spec.flexible_modes <= PlateModes::max_count(), "plate modes",
-          spec.flexible_modes, "0 to 40");
+  check(spec.poisson_ratio >= 0.0 && spec.poisson_ratio < 0.5, "plate poisson_ratio",
+        spec.poisson_ratio, "at least 0 and below 0.5");
+  check(spec.flexible_modes >= 0 && spec.flexible_modes <= PlateModes::max_count(), "plate modes",
+        spec.flexible_modes, "0 to 40");
   if (spec.flexible_modes > 0) {
     positive("plate first_mode_hz", spec.first_mode_hz);
-    if (spec.flexible_damping.empty())
-      throw std::invalid_argument("stage: plate damping is empty; must have at least one value");
+    require(!spec.flexible_damping.empty(),
+            "stage: plate damping is empty; must have at least one value");
   }
   for (double ratio : spec.flexible_damping) damping("plate damping", ratio);
   for (const PlantMode& mode : spec.in_plane_modes) {
     positive("in_plane_modes natural_frequency_hz", mode.natural_frequency_hz);
     damping("in_plane_modes damping_ratio", mode.damping_ratio);
-    if (mode.actuator_shape.size() != static_cast<Eigen::Index>(spec.info.actuators.size()) ||
-        mode.sensor_shape.size() != static_cast<Eigen::Index>(spec.info.sensors.size()))
-      throw std::invalid_argument(
-          "stage: in_plane_modes: a shape must have one entry per actuator and one per sensor");
+    require(mode.actuator_shape.size() == static_cast<Eigen::Index>(spec.info.actuators.size()) &&
+                mode.sensor_shape.size() == static_cast<Eigen::Index>(spec.info.sensors.size()),
+            "stage: in_plane_modes: a shape must have one entry per actuator and one per sensor");
   }
 }
 

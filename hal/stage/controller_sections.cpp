@@ -1,10 +1,9 @@
 #include "hal/stage/controller_sections.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -37,36 +36,34 @@ double prewarped(double frequency_hz, double sample_rate_hz) {
   return kTwoPi * frequency_hz / std::tan(std::numbers::pi * frequency_hz / sample_rate_hz);
 }
 
-[[noreturn]] void refuse(const char* field, double value, const std::string& wanted) {
-  throw std::invalid_argument(
-      fmt::format("controller: {} is {}; must be {}", field, value, wanted));
+void check(bool holds, const char* field, double value, const char* wanted) {
+  require(holds, "controller: {} is {}; must be {}", field, value, wanted);
 }
 
 void check_frequency(const char* field, double hz, double nyquist_hz, bool zero_allowed) {
-  const bool holds = (zero_allowed ? hz >= 0.0 : hz > 0.0) && hz < nyquist_hz;
-  if (!holds)
-    refuse(field, hz,
-           fmt::format("{} and below the Nyquist frequency, {} Hz",
-                       zero_allowed ? "0 (off) or positive" : "positive", nyquist_hz));
+  require((zero_allowed ? hz >= 0.0 : hz > 0.0) && hz < nyquist_hz,
+          "controller: {} is {}; must be {} and below the Nyquist frequency, {} Hz", field, hz,
+          zero_allowed ? "0 (off) or positive" : "positive", nyquist_hz);
 }
 
 void check(const AxisController& axis, double nyquist_hz) {
-  if (!std::isfinite(axis.gain)) refuse("gain", axis.gain, "finite");
+  check(std::isfinite(axis.gain), "gain", axis.gain, "finite");
   check_frequency("crossover_hz", axis.crossover_hz, nyquist_hz, false);
   check_frequency("integrator_hz", axis.integrator_hz, nyquist_hz, true);
   check_frequency("lead_zero_hz", axis.lead_zero_hz, nyquist_hz, true);
   check_frequency("lead_pole_hz", axis.lead_pole_hz, nyquist_hz, true);
   check_frequency("lowpass_hz", axis.lowpass_hz, nyquist_hz, true);
-  if (axis.lead_zero_hz > 0.0 && axis.lead_pole_hz == 0.0)
-    refuse("lead_pole_hz", 0.0, "positive if lead_zero_hz is set");
-  if (axis.lowpass_hz > 0.0 && !(axis.lowpass_damping > 0.0 && std::isfinite(axis.lowpass_damping)))
-    refuse("lowpass_damping", axis.lowpass_damping, "positive");
+  check(axis.lead_zero_hz == 0.0 || axis.lead_pole_hz > 0.0, "lead_pole_hz", 0.0,
+        "positive if lead_zero_hz is set");
+  check(
+      axis.lowpass_hz == 0.0 || (axis.lowpass_damping > 0.0 && std::isfinite(axis.lowpass_damping)),
+      "lowpass_damping", axis.lowpass_damping, "positive");
   for (const auto& notch : axis.notches) {
     check_frequency("notch frequency_hz", notch.frequency_hz, nyquist_hz, false);
-    if (!(notch.zero_damping >= 0.0 && std::isfinite(notch.zero_damping)))
-      refuse("notch zero_damping", notch.zero_damping, "0 or more");
-    if (!(notch.pole_damping > 0.0 && std::isfinite(notch.pole_damping)))
-      refuse("notch pole_damping", notch.pole_damping, "positive");
+    check(notch.zero_damping >= 0.0 && std::isfinite(notch.zero_damping), "notch zero_damping",
+          notch.zero_damping, "0 or more");
+    check(notch.pole_damping > 0.0 && std::isfinite(notch.pole_damping), "notch pole_damping",
+          notch.pole_damping, "positive");
   }
 }
 

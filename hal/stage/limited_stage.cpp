@@ -4,16 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
 
 std::unique_ptr<CyclicStage> checked(std::unique_ptr<CyclicStage> stage) {
-  if (!stage) throw std::invalid_argument("limits: a stage is required");
-  if (!(stage->info().sample_rate_hz > 0.0))
-    throw std::invalid_argument("limits: the stage has no sample rate; set sample_rate_hz");
+  require(stage != nullptr, "limits: a stage is required");
+  require(stage->info().sample_rate_hz > 0.0,
+          "limits: the stage has no sample rate; set sample_rate_hz");
   return stage;
 }
 
@@ -29,10 +30,9 @@ LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limit
   largest_n_ = positive_or(limits_.actuator_n, unlimited, "actuator_n");
   step_n_ = positive_or(limits_.slew_n_s, unlimited, "slew_n_s") / info.sample_rate_hz;
   mean_square_limit_n2_ = positive_or(limits_.thermal_rms_n, unlimited, "thermal_rms_n").square();
-  if (!(limits_.thermal_time_constant_s > 0.0) || !std::isfinite(limits_.thermal_time_constant_s))
-    throw std::invalid_argument(
-        fmt::format("limits: thermal_time_constant_s must be positive; got {}",
-                    limits_.thermal_time_constant_s));
+  require(limits_.thermal_time_constant_s > 0.0 && std::isfinite(limits_.thermal_time_constant_s),
+          "limits: thermal_time_constant_s must be positive; got {}",
+          limits_.thermal_time_constant_s);
   decay_ = std::exp(-1.0 / (info.sample_rate_hz * limits_.thermal_time_constant_s));
   wanted_.setZero(largest_n_.size());
   applied_.setZero(largest_n_.size());

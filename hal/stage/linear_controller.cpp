@@ -1,14 +1,12 @@
 #include "hal/stage/linear_controller.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <stdexcept>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/controller_sections.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -56,21 +54,18 @@ std::vector<Factor> factors_of(const std::vector<double>& coefficients) {
 std::vector<BiquadSection> transfer_sections(const ControllerTransfer& transfer) {
   for (const auto* list : {&transfer.numerator, &transfer.denominator})
     for (const double value : *list)
-      if (!std::isfinite(value))
-        throw std::invalid_argument(
-            "controller: a coefficient of a transfer function is not "
-            "finite; write finite numbers");
+      require(std::isfinite(value),
+              "controller: a coefficient of a transfer function is not finite; write finite "
+              "numbers");
   const std::vector<double> denominator = without_leading_zeros(transfer.denominator);
   const std::vector<double> numerator = without_leading_zeros(transfer.numerator);
-  if (denominator.empty())
-    throw std::invalid_argument(
-        "controller: the denominator of a transfer function is zero; write at least one nonzero "
-        "coefficient");
-  if (numerator.size() > denominator.size())
-    throw std::invalid_argument(fmt::format(
-        "controller: a transfer function has {} zeros and {} poles; a controller is causal only "
-        "with at least as many poles as zeros",
-        numerator.size() - 1, denominator.size() - 1));
+  require(!denominator.empty(),
+          "controller: the denominator of a transfer function is zero; write at least one nonzero "
+          "coefficient");
+  require(numerator.size() <= denominator.size(),
+          "controller: a transfer function has {} zeros and {} poles; a controller is causal only "
+          "with at least as many poles as zeros",
+          numerator.size() - 1, denominator.size() - 1);
   if (numerator.empty()) return {BiquadSection{.b0 = 0.0}};
 
   const std::vector<Factor> poles = factors_of(denominator);

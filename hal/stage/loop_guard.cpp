@@ -1,11 +1,10 @@
 #include "hal/stage/loop_guard.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -21,9 +20,8 @@ constexpr double kLeastResponse = 0.25;  // a stage with a smaller response cann
 constexpr double kErrorThatTells = 0.1;  // of deviation_m: if less, the response is as expected
 
 void require_size(Eigen::Index size, std::size_t channels, const char* name) {
-  if (size == static_cast<Eigen::Index>(channels)) return;
-  throw std::invalid_argument(
-      fmt::format("limits: {} has {} entries for {} channels", name, size, channels));
+  require(size == static_cast<Eigen::Index>(channels), "limits: {} has {} entries for {} channels",
+          name, size, channels);
 }
 
 }  // namespace
@@ -33,9 +31,7 @@ Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& o
   if (given.size() == 0) return otherwise;
   require_size(given.size(), static_cast<std::size_t>(otherwise.size()), name);
   for (Eigen::Index i = 0; i < given.size(); ++i)
-    if (!(given[i] > 0.0))
-      throw std::invalid_argument(
-          fmt::format("limits: {}, entry {}: {} is not positive", name, i + 1, given[i]));
+    require(given[i] > 0.0, "limits: {}, entry {}: {} is not positive", name, i + 1, given[i]);
   return given.array();
 }
 
@@ -52,16 +48,14 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
       model_known_ ? positive_or(limits.deviation_m, 0.5 * window_m_, "deviation_m") : unlimited;
   speed_limit_m_s_ = positive_or(limits.speed_m_s, unlimited, "speed_m_s");
   for (Eigen::Index i = 0; i < sensors; ++i)
-    if (!(hard_window_m_[i] >= window_m_[i]))
-      throw std::invalid_argument(
-          fmt::format("limits: hard_window_m, entry {}: {} is below window_m, {}", i + 1,
-                      hard_window_m_[i], window_m_[i]));
+    require(hard_window_m_[i] >= window_m_[i],
+            "limits: hard_window_m, entry {}: {} is below window_m, {}", i + 1, hard_window_m_[i],
+            window_m_[i]);
 
   const double repeats = limits.stuck_sensor_s * info.sample_rate_hz;
-  if (!(repeats >= 0.0 && repeats < 1e9) || (repeats > 0.0 && repeats < 2.0))
-    throw std::invalid_argument(
-        fmt::format("limits: stuck_sensor_s is {} s at {} Hz; must be 0 or at least two samples",
-                    limits.stuck_sensor_s, info.sample_rate_hz));
+  require(repeats == 0.0 || (repeats >= 2.0 && repeats < 1e9),
+          "limits: stuck_sensor_s is {} s at {} Hz; must be 0 or at least two samples",
+          limits.stuck_sensor_s, info.sample_rate_hz);
   repeats_allowed_ = static_cast<std::uint32_t>(std::llround(repeats));
 
   stopping_s2_m_.setZero(sensors);
@@ -72,8 +66,8 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
     require_size(motion.acceleration_per_n.cols(), info.actuators.size(), "motion");
     require_size(motion.force_per_acceleration.rows(), info.actuators.size(), "motion");
     require_size(motion.force_per_acceleration.cols(), info.sensors.size(), "motion");
-    if (!(motion.bandwidth_rad_s > 0.0) || !std::isfinite(motion.bandwidth_rad_s))
-      throw std::invalid_argument("limits: the bandwidth of the motion must be positive");
+    require(motion.bandwidth_rad_s > 0.0 && std::isfinite(motion.bandwidth_rad_s),
+            "limits: the bandwidth of the motion must be positive");
     acceleration_per_n_ = motion.acceleration_per_n;
     force_per_acceleration_ = motion.force_per_acceleration;
     contradiction_ = motion.contradiction;

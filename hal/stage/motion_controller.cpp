@@ -1,14 +1,12 @@
 #include "hal/stage/motion_controller.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/controller_sections.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -18,52 +16,45 @@ constexpr Eigen::Index kLanes = 8;  // one AVX-512 register of doubles, two of A
 Eigen::Index padded(Eigen::Index n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
 void check(const MotionControllerSpec& spec) {
-  if (!(spec.sample_rate_hz > 0.0) || !std::isfinite(spec.sample_rate_hz))
-    throw std::invalid_argument(fmt::format(
-        "controller: the sample rate must be positive; got {} Hz", spec.sample_rate_hz));
+  require(spec.sample_rate_hz > 0.0 && std::isfinite(spec.sample_rate_hz),
+          "controller: the sample rate must be positive; got {} Hz", spec.sample_rate_hz);
   const auto axes = static_cast<Eigen::Index>(spec.axes.size());
-  if (spec.sensor_decoupling.rows() != axes || spec.actuator_decoupling.cols() != axes ||
-      spec.sensor_decoupling.cols() == 0 || spec.actuator_decoupling.rows() == 0)
-    throw std::invalid_argument(
-        fmt::format("controller: {} axes need a sensor decoupling with {} rows and an actuator "
-                    "decoupling with {} columns; got {} x {} and {} x {}",
-                    axes, axes, axes, spec.sensor_decoupling.rows(), spec.sensor_decoupling.cols(),
-                    spec.actuator_decoupling.rows(), spec.actuator_decoupling.cols()));
-  if (!spec.sensor_decoupling.allFinite() || !spec.actuator_decoupling.allFinite())
-    throw std::invalid_argument("controller: a decoupling matrix is not finite");
   const Eigen::Index sensors = spec.sensor_decoupling.cols();
   const Eigen::Index actuators = spec.actuator_decoupling.rows();
+  require(spec.sensor_decoupling.rows() == axes && spec.actuator_decoupling.cols() == axes &&
+              sensors != 0 && actuators != 0,
+          "controller: {} axes need a sensor decoupling with {} rows and an actuator decoupling "
+          "with {} columns; got {} x {} and {} x {}",
+          axes, axes, axes, spec.sensor_decoupling.rows(), sensors, actuators,
+          spec.actuator_decoupling.cols());
+  require(spec.sensor_decoupling.allFinite() && spec.actuator_decoupling.allFinite(),
+          "controller: a decoupling matrix is not finite");
   for (const ControllerTransfer& t : spec.transfer)
-    if (t.actuator < 0 || t.actuator >= actuators || t.sensor < 0 || t.sensor >= sensors)
-      throw std::invalid_argument(fmt::format(
-          "controller: a transfer function from sensor {} to actuator {}, but there are {} and {}",
-          t.sensor + 1, t.actuator + 1, sensors, actuators));
-  if (spec.feed_forward_n.size() != 0 && spec.feed_forward_n.size() != actuators)
-    throw std::invalid_argument(
-        fmt::format("controller: the feed-forward has {} values for {} "
-                    "actuators",
-                    spec.feed_forward_n.size(), actuators));
-  if (!spec.feed_forward_n.allFinite() || !(spec.feed_forward_ramp_s >= 0.0) ||
-      !std::isfinite(spec.feed_forward_ramp_s))
-    throw std::invalid_argument(
-        "controller: feed-forward and its ramp must be finite, the ramp not negative");
+    require(
+        t.actuator >= 0 && t.actuator < actuators && t.sensor >= 0 && t.sensor < sensors,
+        "controller: a transfer function from sensor {} to actuator {}, but there are {} and {}",
+        t.sensor + 1, t.actuator + 1, sensors, actuators);
+  require(spec.feed_forward_n.size() == 0 || spec.feed_forward_n.size() == actuators,
+          "controller: the feed-forward has {} values for {} actuators", spec.feed_forward_n.size(),
+          actuators);
+  require(spec.feed_forward_n.allFinite() && spec.feed_forward_ramp_s >= 0.0 &&
+              std::isfinite(spec.feed_forward_ramp_s),
+          "controller: feed-forward and its ramp must be finite, the ramp not negative");
 }
 
 void check(const ControllerStateSpace& s, Eigen::Index actuators, Eigen::Index sensors) {
   const Eigen::Index n = s.a.rows();
-  const auto require = [](const char* name, const Eigen::MatrixXd& m, Eigen::Index rows,
-                          Eigen::Index columns) {
-    if (m.rows() != rows || m.cols() != columns)
-      throw std::invalid_argument(fmt::format("controller: matrix {} is {} x {}; expected {} x {}",
-                                              name, m.rows(), m.cols(), rows, columns));
-    if (!m.allFinite())
-      throw std::invalid_argument(
-          fmt::format("controller: matrix {} has an entry that is not finite", name));
+  const auto check_matrix = [](const char* name, const Eigen::MatrixXd& m, Eigen::Index rows,
+                               Eigen::Index columns) {
+    require(m.rows() == rows && m.cols() == columns,
+            "controller: matrix {} is {} x {}; expected {} x {}", name, m.rows(), m.cols(), rows,
+            columns);
+    require(m.allFinite(), "controller: matrix {} has an entry that is not finite", name);
   };
-  require("A", s.a, n, n);
-  require("B", s.b, n, sensors);
-  require("C", s.c, actuators, n);
-  require("D", s.d, actuators, sensors);
+  check_matrix("A", s.a, n, n);
+  check_matrix("B", s.b, n, sensors);
+  check_matrix("C", s.c, actuators, n);
+  check_matrix("D", s.d, actuators, sensors);
 }
 
 // y = M x, with the columns of M padded to `rows`, a multiple of the lane width.

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <stdexcept>
 
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -17,12 +17,10 @@ using Seconds = std::chrono::duration<double>;
 constexpr double kLooksAWindow = 10.0;  // checks of the snapshot per stale_s
 
 void check(const PlantConditions& c) {
-  const bool sound = c.stale_s > 0.0 && std::isfinite(c.stale_s) && c.enable_s > 0.0 &&
-                     std::isfinite(c.enable_s) && c.gravity_low_n <= c.gravity_high_n &&
-                     c.temperature_low_k <= c.temperature_high_k;
-  if (!sound)
-    throw std::invalid_argument(
-        "supervisor: times must be positive, and ranges [low, high] must have low <= high");
+  require(c.stale_s > 0.0 && std::isfinite(c.stale_s) && c.enable_s > 0.0 &&
+              std::isfinite(c.enable_s) && c.gravity_low_n <= c.gravity_high_n &&
+              c.temperature_low_k <= c.temperature_high_k,
+          "supervisor: times must be positive, and ranges [low, high] must have low <= high");
 }
 
 /// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are in range. NaN is out of range.
@@ -82,8 +80,7 @@ PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions
   std::string trouble = wait_until_good(false);
   if (!trouble.empty()) throw StageError(trouble);
   const SupervisorReply reply = supervisor_.request(SupervisorCommand::enable);
-  if (!reply.accepted)
-    throw StageError(fmt::format("the plant cannot be enabled: {}", reply.message));
+  require<StageError>(reply.accepted, "the plant cannot be enabled: {}", reply.message);
   trouble = wait_until_good(true);
   if (!trouble.empty()) {
     supervisor_.request(SupervisorCommand::disable);

@@ -13,23 +13,21 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
-#include <stdexcept>
 #include <thread>
 
+#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
 namespace {
 
 void check(const RealTimeOptions& options) {
-  if (options.priority < 1 || options.priority > 99)
-    throw std::invalid_argument(
-        fmt::format("realtime: priority {} is out of range; give 1 to 99", options.priority));
+  require(options.priority >= 1 && options.priority <= 99,
+          "realtime: priority {} is out of range; give 1 to 99", options.priority);
   const long processors = ::sysconf(_SC_NPROCESSORS_CONF);
-  if (options.cpu < -1 || options.cpu >= processors)
-    throw std::invalid_argument(
-        fmt::format("realtime: cpu {} is out of range; give 0 to {}, or -1 for any", options.cpu,
-                    processors - 1));
+  require(options.cpu >= -1 && options.cpu < processors,
+          "realtime: cpu {} is out of range; give 0 to {}, or -1 for any", options.cpu,
+          processors - 1);
 }
 
 bool kernel_is_preempt_rt() {

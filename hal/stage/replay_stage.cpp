@@ -1,45 +1,41 @@
 #include "hal/stage/replay_stage.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
+
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 
 ReplayStage::ReplayStage(StageInfo info, std::unique_ptr<ReplaySource> source, double tolerance_n)
     : info_(std::move(info)), source_(std::move(source)), tolerance_n_(tolerance_n) {
-  if (!source_) throw std::invalid_argument("replay: a source is required");
-  if (!(tolerance_n >= 0.0) || !std::isfinite(tolerance_n))
-    throw std::invalid_argument(
-        fmt::format("replay: the tolerance must be 0 or more; got {}", tolerance_n));
-  if (info_.sensors.empty() || info_.sensors.size() > 64)
-    throw std::invalid_argument(
-        fmt::format("replay: {} sensors are unsupported; must be 1 to 64", info_.sensors.size()));
-  if (!(info_.sample_rate_hz > 0.0))
-    throw std::invalid_argument("replay: the sample rate must be positive");
+  require(source_ != nullptr, "replay: a source is required");
+  require(tolerance_n >= 0.0 && std::isfinite(tolerance_n),
+          "replay: the tolerance must be 0 or more; got {}", tolerance_n);
+  require(!info_.sensors.empty() && info_.sensors.size() <= 64,
+          "replay: {} sensors are unsupported; must be 1 to 64", info_.sensors.size());
+  require(info_.sample_rate_hz > 0.0, "replay: the sample rate must be positive");
 }
 
 void ReplayStage::start(std::uint64_t /*run_seed*/, Inputs& first) {
   const int run = run_ + 1;
-  if (run >= source_->runs())
-    throw StageError(fmt::format(
-        "replay: run {} is out of range; the log has {}. Record a longer log or replay fewer runs",
-        run + 1, source_->runs()));
+  require<StageError>(
+      run < source_->runs(),
+      "replay: run {} is out of range; the log has {}. Record a longer log or replay fewer runs",
+      run + 1, source_->runs());
   source_->load(run, u_, y_, marked_);
   const Eigen::Index samples = u_.cols();
-  if (u_.rows() != static_cast<Eigen::Index>(info_.actuators.size()) ||
-      y_.rows() != static_cast<Eigen::Index>(info_.sensors.size()) || y_.cols() != samples ||
-      samples == 0 || (marked_.size() != 0 && marked_.size() != samples))
-    throw StageError(
-        fmt::format("replay: run {} has u {} x {}, y {} x {} and {} marks; expected {} actuators, "
-                    "{} sensors and equal numbers of samples",
-                    run + 1, u_.rows(), u_.cols(), y_.rows(), y_.cols(), marked_.size(),
-                    info_.actuators.size(), info_.sensors.size()));
-  if (first.y.size() != info_.sensors.size())
-    throw std::invalid_argument("replay: Inputs::y must have one entry per sensor");
+  require<StageError>(
+      u_.rows() == static_cast<Eigen::Index>(info_.actuators.size()) &&
+          y_.rows() == static_cast<Eigen::Index>(info_.sensors.size()) && y_.cols() == samples &&
+          samples != 0 && (marked_.size() == 0 || marked_.size() == samples),
+      "replay: run {} has u {} x {}, y {} x {} and {} marks; expected {} actuators, {} sensors and "
+      "equal numbers of samples",
+      run + 1, u_.rows(), samples, y_.rows(), y_.cols(), marked_.size(), info_.actuators.size(),
+      info_.sensors.size());
+  require(first.y.size() == info_.sensors.size(),
+          "replay: Inputs::y must have one entry per sensor");
   run_ = run;
   cycle_ = 0;
   give(first, 0);
