@@ -6,7 +6,6 @@
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/noise.hpp"
-#include "hal/simulator/wafer_stage_check.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/require.hpp"
 
@@ -112,10 +111,8 @@ void SimulatedStage::State::measure() noexcept {
   if (spec.sensor_quantum_m > 0.0) quantize(y, spec.sensor_quantum_m);
 }
 
-SimulatedStage::SimulatedStage(const WaferStageSpec& spec) {
-  require_valid(spec);
-  state_ = std::make_unique<State>(spec);
-}
+SimulatedStage::SimulatedStage(const WaferStageSpec& spec)
+    : state_(std::make_unique<State>(spec)) {}
 
 SimulatedStage::~SimulatedStage() = default;
 

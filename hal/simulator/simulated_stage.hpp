@@ -94,6 +94,7 @@ inline constexpr std::array kWords<WaferStageSpec::Fault::Kind> = {
 
 /// All modes of the stage: rigid-body ones on their suspension first, then flexible out of plane by
 /// frequency, then in plane.
+/// @throws std::invalid_argument naming the field, its value, and the permitted values.
 std::vector<PlantMode> wafer_stage_modes(const WaferStageSpec& spec);
 
 /// The exact frequency response of the plant without controller, sensors x actuators, through zero-order hold, delay
