@@ -70,9 +70,8 @@ Message values(const CanValueFrame& frame, std::size_t number, bool setpoint,
                   frame.payload_bytes(), setpoint);
   message.header(setpoint ? "reserved" : "state", setpoint ? "tag" : "time_us");
   std::size_t at = kCanHeaderBytes;
-  for (const int channel : frame.channels) {
-    const auto index = static_cast<std::size_t>(channel);
-    message.channel(channels[index], at, scales[index]);
+  for (const std::size_t channel : frame.channels) {
+    message.channel(channels[channel], at, scales[channel]);
     at += kCanCountBytes;
   }
   return message;

@@ -63,23 +63,22 @@ void get_fields(const CanFrame& frame, const std::tuple<Fields&...>& fields) noe
 
 }  // namespace
 
-void encode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,
-                       std::span<const double> values, CanHeader header, CanFrame& frame,
-                       CanConversions& conversions) noexcept {
+CanConversions encode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,
+                                 std::span<const double> values, CanHeader header,
+                                 CanFrame& frame) noexcept {
   frame.id = layout.id;
   frame.bus = layout.bus;
   std::size_t at = kAt;
-  bool saturated = false;
-  for (const int channel : layout.channels) {
-    const auto index = static_cast<std::size_t>(channel);
-    const CanConversion result = put_can_value(frame, at, values[index], scale[index]);
-    saturated |= result == CanConversion::saturated;
+  CanConversions conversions;
+  for (const std::size_t channel : layout.channels) {
+    const CanConversion result = put_can_value(frame, at, values[channel], scale[channel]);
     conversions.saturated += result == CanConversion::saturated ? 1U : 0U;
     conversions.no_number += result == CanConversion::no_number ? 1U : 0U;
     at += kCanCountBytes;
   }
-  if (saturated) header.kind |= kCanSaturatedBit;
+  if (conversions.saturated > 0) header.kind |= kCanSaturatedBit;
   seal_can_frame(frame, header, layout.payload_bytes());
+  return conversions;
 }
 
 bool decode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,
@@ -87,9 +86,8 @@ bool decode_can_values(const CanValueFrame& layout, std::span<const CanScale> sc
                        std::span<double> values) noexcept {
   if (!open_can_frame(frame, layout.payload_bytes(), header)) return false;
   std::size_t at = kAt;
-  for (const int channel : layout.channels) {
-    const auto index = static_cast<std::size_t>(channel);
-    values[index] = get_can_value(frame, at, scale[index]);
+  for (const std::size_t channel : layout.channels) {
+    values[channel] = get_can_value(frame, at, scale[channel]);
     at += kCanCountBytes;
   }
   return true;

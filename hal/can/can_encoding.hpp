@@ -30,16 +30,16 @@ constexpr std::uint16_t can_tag(std::uint32_t session) noexcept {
   return static_cast<std::uint16_t>(session >> 8);
 }
 
-/// Conversion counts of encoded values.
+/// Numbers of values that a frame does not carry as they are.
 struct CanConversions {
   std::uint64_t saturated = 0;
   std::uint64_t no_number = 0;
 };
 
 /// Writes the values of the frame's channels (NaN: no value) and the header.
-void encode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,
-                       std::span<const double> values, CanHeader header, CanFrame& frame,
-                       CanConversions& conversions) noexcept;
+CanConversions encode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,
+                                 std::span<const double> values, CanHeader header,
+                                 CanFrame& frame) noexcept;
 /// Decodes the frame's channels into `values`. @returns false without changing them if the frame is damaged
 /// or has another length.
 [[nodiscard]] bool decode_can_values(const CanValueFrame& layout, std::span<const CanScale> scale,

@@ -88,10 +88,8 @@ std::string describe(const std::vector<CanValueFrame>& list, const std::vector<C
   std::string text;
   for (const CanValueFrame& frame : list) {
     text += fmt::format("{:x}:", frame.id);
-    for (const int channel : frame.channels) {
-      const auto index = static_cast<std::size_t>(channel);
-      text += fmt::format("{} {:.17g};", channels[index].name, scale[index].si_per_count);
-    }
+    for (const std::size_t channel : frame.channels)
+      text += fmt::format("{} {:.17g};", channels[channel].name, scale[channel].si_per_count);
   }
   return text;
 }

@@ -54,7 +54,7 @@ inline constexpr std::size_t kCanValuesOfFrame = 18;  ///< (64 - 8) / 3
 struct CanValueFrame {
   std::uint16_t id = 0;
   std::uint8_t bus = 0;
-  std::vector<int> channels;
+  std::vector<std::size_t> channels;
   std::size_t payload_bytes() const noexcept { return kCanCountBytes * channels.size(); }
 };
 

@@ -132,12 +132,9 @@ void CanNode::make_answer(std::uint16_t sequence, std::uint64_t valid) {
     given_[i] = ((valid >> i) & 1U) != 0 ? y_[i] : std::numeric_limits<double>::quiet_NaN();
   const CanHeader header{sequence, static_cast<std::uint8_t>(stage_.state()), can_run(session_),
                          microseconds(transport_.now_ns())};
-  answer_.clear();
-  for (const CanValueFrame& layout : layout_.sensors) {
-    CanFrame frame;
-    encode_can_values(layout, layout_.sensor_scale, given_, header, frame, conversions_);
-    answer_.push_back(frame);
-  }
+  answer_.resize(layout_.sensors.size());
+  for (std::size_t i = 0; i < answer_.size(); ++i)
+    encode_can_values(layout_.sensors[i], layout_.sensor_scale, given_, header, answer_[i]);
 }
 
 void CanNode::put_answer() { outbox_.insert(outbox_.end(), answer_.begin(), answer_.end()); }

@@ -79,7 +79,6 @@ class CanNode {
   std::uint32_t gaps_ = 0;
   std::uint32_t repeated_ = 0;
   std::uint32_t rejected_ = 0;
-  CanConversions conversions_;
   NodeState announced_ = NodeState::not_ready;
   std::int64_t next_heartbeat_ns_ = 0;
   bool state_asked_ = false;

@@ -68,8 +68,7 @@ void configure(int fd, const std::string& interface,
   const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
   if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on)) != 0 ||
       setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) != 0 ||
-      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) != 0 ||
-      setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) != 0)
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) != 0)
     refuse(interface, fmt::format("cannot be configured: {}", std::strerror(errno)));
   stamp_arrivals(fd);
 }
@@ -98,7 +97,6 @@ struct SocketCan::Bus {
   std::size_t send(std::span<const CanFrame> frames) noexcept;
   std::size_t receive(std::span<CanFrame> frames, std::uint8_t number, std::int64_t now) noexcept;
   bool take(const canfd_frame& raw, CanFrame& frame) noexcept;
-  void watch_overflow(msghdr& header) noexcept;
 
   std::string interface;
   int fd;
@@ -180,7 +178,7 @@ std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t num
   canfd_frame raw[kBatch];
   iovec part[kBatch];
   mmsghdr message[kBatch]{};
-  alignas(cmsghdr) char control[kBatch][CMSG_SPACE(sizeof(std::uint32_t)) + kArrivalControlBytes];
+  alignas(cmsghdr) char control[kBatch][kArrivalControlBytes];
   std::size_t count = 0;
   arrivals.begin(now);
   while (count < frames.size()) {
@@ -198,7 +196,6 @@ std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t num
     if (n < 0 && is_down(errno)) health.state = CanBusState::down;
     if (n <= 0) break;
     for (int i = 0; i < n; ++i) {
-      watch_overflow(message[i].msg_hdr);
       frames[count].bus = number;
       frames[count].t_rx_ns = arrivals.arrival_ns(message[i].msg_hdr);
       if (take(raw[i], frames[count])) ++count;
@@ -219,15 +216,6 @@ bool SocketCan::Bus::take(const canfd_frame& raw, CanFrame& frame) noexcept {
   frame.length = std::min<std::uint8_t>(raw.len, sizeof(raw.data));
   std::copy_n(raw.data, frame.length, frame.data.begin());
   return true;
-}
-
-void SocketCan::Bus::watch_overflow(msghdr& header) noexcept {
-  for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
-    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
-    std::uint32_t dropped = 0;
-    std::memcpy(&dropped, CMSG_DATA(c), sizeof(dropped));
-    health.dropped = dropped;
-  }
 }
 
 void SocketCan::wait(std::int64_t until_ns) noexcept {

@@ -9,7 +9,7 @@
 namespace stageid {
 
 /// SocketCAN (Linux): one raw CAN FD socket per bus, sendmmsg and recvmmsg, exact identifier filters,
-/// error frames, overflow counter, time stamps of arrival (can_arrival.hpp).
+/// error frames, time stamps of arrival (can_arrival.hpp).
 class SocketCan final : public CanTransport {
  public:
   /// Receives only frames with `identifiers`.

@@ -109,17 +109,16 @@ void CanStage::begin_cycle(std::uint16_t sequence) noexcept {
 
 bool CanStage::send_setpoints(const Outputs& outputs) noexcept {
   const CanHeader header{expected_, 0, can_run(link_.session()), can_tag(link_.session())};
-  const std::uint64_t refused = conversions_.no_number + conversions_.saturated;
-  for (std::size_t i = 0; i < layout_.setpoints.size(); ++i)
-    encode_can_values(layout_.setpoints[i], layout_.actuator_scale, outputs.u, header, outbox_[i],
-                      conversions_);
-  counts_.saturated = conversions_.saturated;
-  if (conversions_.no_number + conversions_.saturated != refused) {
-    not_carried_ = true;
-    return false;
+  bool carried = true;
+  for (std::size_t i = 0; i < layout_.setpoints.size(); ++i) {
+    const CanConversions lost = encode_can_values(layout_.setpoints[i], layout_.actuator_scale,
+                                                  outputs.u, header, outbox_[i]);
+    counts_.saturated += lost.saturated;
+    carried &= lost.saturated + lost.no_number == 0;
   }
-  static_cast<void>(transport_->send(outbox_));
-  return true;
+  not_carried_ |= !carried;
+  if (carried) static_cast<void>(transport_->send(outbox_));
+  return carried;
 }
 
 Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept {
@@ -232,8 +231,8 @@ void CanStage::take(const CanFrame& frame) noexcept {
   --frames_missing_;
   measured_in_ = static_cast<NodeState>(header.kind & ~kCanSaturatedBit);
   out_of_range_ |= (header.kind & kCanSaturatedBit) != 0;
-  for (const int channel : layout_.sensors[number].channels)
-    fresh_[static_cast<std::size_t>(channel)] = decoded_[static_cast<std::size_t>(channel)];
+  for (const std::size_t channel : layout_.sensors[number].channels)
+    fresh_[channel] = decoded_[channel];
 }
 
 void CanStage::give(Inputs& inputs) const noexcept {

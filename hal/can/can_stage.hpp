@@ -113,7 +113,6 @@ class CanStage final : public CyclicStage {
   enum class NodeTime : std::uint8_t { unknown, none, runs } node_time_ = NodeTime::unknown;
   SampleClock host_of_node_;     // arrival over the node's time
   std::int64_t instant_ns_ = 0;  // of the last sample, if the node sets the pace
-  CanConversions conversions_;
   CanCounts counts_;
   std::string trouble_at_stop_;
   std::vector<CanFrame> outbox_;

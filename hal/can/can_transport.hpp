@@ -21,7 +21,6 @@ struct CanBusHealth {
   CanBusState state = CanBusState::active;
   std::uint64_t error_frames = 0;
   std::uint64_t send_refused = 0;  ///< frames refused by a full queue (the bus is too slow)
-  std::uint64_t dropped = 0;       ///< frames that arrived faster than they were read
 };
 
 /// Largest number of frames per receive().

@@ -133,7 +133,7 @@ TEST(CanLayout, SpreadsOverBusesAndFrames) {
   ASSERT_EQ(layout.setpoints.size(), 2U);
   EXPECT_EQ(layout.setpoints[1].id, 0x101);
   EXPECT_EQ(layout.setpoints[1].bus, 1);
-  EXPECT_EQ(layout.setpoints[1].channels, (std::vector<int>{16, 3}));
+  EXPECT_EQ(layout.setpoints[1].channels, (std::vector<std::size_t>{16, 3}));
   EXPECT_EQ(can_host_identifiers(layout).size(), 5U);
   EXPECT_EQ(can_node_identifiers(layout).size(), 4U);
 }

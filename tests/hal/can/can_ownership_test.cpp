@@ -78,19 +78,18 @@ class Forger {
     command.a = 1;
     rig_.send_to_node(encode_can_command(command));
     // The run number is right, because it can be read on the bus; the rest of the key is wrong.
-    CanConversions conversions;
     CanFrame setpoint;
     const std::vector<double> u(2, 49.0);
     for (const std::uint8_t guess : {run, static_cast<std::uint8_t>(run + 1)}) {
       CanHeader header{next, 0, guess, tag_};
       encode_can_values(rig_.layout().setpoints[0], rig_.layout().actuator_scale, u, header,
-                        setpoint, conversions);
+                        setpoint);
       rig_.send_to_node(setpoint);
     }
     const std::vector<double> y(1, 1e-3);
     CanFrame measurement;
     encode_can_values(rig_.layout().sensors[0], rig_.layout().sensor_scale, y,
-                      {next, 5, static_cast<std::uint8_t>(run + 1), 0}, measurement, conversions);
+                      {next, 5, static_cast<std::uint8_t>(run + 1), 0}, measurement);
     rig_.send_to_host(measurement);
   }
   /// Another tag than that of the run.
