@@ -13,7 +13,7 @@ namespace {
 
 // Only what importers of C types support: macros, and named structures of numbers and arrays. Sizes are checked when the
 // header is compiled. Members are aligned to their sizes: no packing is needed.
-constexpr const char* kStructures = R"(/* A message over ZeroMQ. All numbers are little-endian. */
+constexpr const char* kFrames = R"(/* A message over ZeroMQ. All numbers are little-endian. */
 typedef struct {
   uint16_t id;
   uint16_t length;   /* used bytes of data */
@@ -29,35 +29,9 @@ typedef struct {
   uint16_t crc;
 } stageid_header;
 
-/* Payload of 0x080. */
-typedef struct {
-  uint64_t a;
-  uint64_t b;
-  uint32_t c;
-  uint32_t d;
-  uint32_t host;
-  uint32_t session;
-  uint8_t version;
-  uint8_t reserved[7];
-} stageid_command;
+)";
 
-/* Payload of 0x200. */
-typedef struct {
-  uint8_t version;
-  uint8_t cause;
-  uint8_t answer;
-  uint8_t resident;
-  uint32_t gaps;
-  uint32_t repeated;
-  uint32_t rejected;
-  uint64_t sample;
-  uint32_t fingerprint;
-  uint32_t boot;
-  uint32_t host;
-  uint32_t session;
-} stageid_state;
-
-/* Payload of 0x300 and 0x380. */
+constexpr const char* kTransfers = R"(/* Payload of 0x300 and 0x380. */
 typedef struct {
   uint8_t bytes[56];
 } stageid_chunk;
@@ -81,6 +55,13 @@ extern char stageid_sizes_are_right[sizeof(stageid_message) == 72 && sizeof(stag
 
 #endif
 )";
+
+std::string structure(const char* name, std::span<const CanField> fields, const char* rest) {
+  std::string text = "typedef struct {\n";
+  for (const CanField& field : fields)
+    text += fmt::format("  uint{}_t {};\n", 8 * field.bytes, field.name);
+  return text + rest + fmt::format("}} stageid_{};\n\n", name);
+}
 
 std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{}", value) : "HUGE_VAL";
@@ -125,7 +106,9 @@ std::string can_c_header(const CanLayout& layout, const StageInfo& info,
                       info.actuators.size(), info.sensors.size());
   add_channels(text, "ACTUATOR", info.actuators, layout.actuator_scale, limits.actuator_n);
   add_channels(text, "SENSOR", info.sensors, layout.sensor_scale, limits.position_window_m);
-  return text + "\n" + kStructures;
+  return text + "\n" + kFrames + "/* Payload of 0x080. */\n" +
+         structure("command", kCanCommandFields, "  uint8_t reserved[7];\n") +
+         "/* Payload of 0x200. */\n" + structure("state", kCanStateFields, "") + kTransfers;
 }
 
 }  // namespace stageid

@@ -41,24 +41,22 @@ auto fields_of_state(State& state) noexcept {
                   state.host, state.session);
 }
 
-template <typename... Fields>
-void put_fields(CanFrame& frame, const std::tuple<const Fields&...>& fields) noexcept {
+template <typename Fields, typename Each>
+void for_each_field(const Fields& fields, const Each& each) noexcept {
   std::size_t at = kAt;
-  const auto put = [&](const auto& field) {
-    put_can(frame, at, field);
-    at += sizeof(field);
-  };
-  std::apply([&](const Fields&... field) { (put(field), ...); }, fields);
+  std::apply([&](auto&... field) { ((each(field, at), at += sizeof(field)), ...); }, fields);
 }
 
-template <typename... Fields>
-void get_fields(const CanFrame& frame, const std::tuple<Fields&...>& fields) noexcept {
-  std::size_t at = kAt;
-  const auto get = [&]<typename Field>(Field& field) {
+template <typename Fields>
+void put_fields(CanFrame& frame, const Fields& fields) noexcept {
+  for_each_field(fields, [&](const auto& field, std::size_t at) { put_can(frame, at, field); });
+}
+
+template <typename Fields>
+void get_fields(const CanFrame& frame, const Fields& fields) noexcept {
+  for_each_field(fields, [&]<typename Field>(Field& field, std::size_t at) {
     field = get_can<Field>(frame, at);
-    at += sizeof(field);
-  };
-  std::apply([&](Fields&... field) { (get(field), ...); }, fields);
+  });
 }
 
 }  // namespace

@@ -14,6 +14,12 @@ namespace stageid {
 
 // Payload of each kind of frame, after the header; documented in docs/can-protocol.md.
 
+/// A field of a command or state. The fields follow each other without gaps, little-endian.
+struct CanField {
+  const char* name;
+  std::size_t bytes;
+};
+
 inline constexpr std::uint8_t kCanProtocolVersion = 2;
 inline constexpr double kCanHeartbeatRate_hz = 10.0;
 
@@ -71,6 +77,8 @@ struct CanCommand {
   std::uint8_t version = kCanProtocolVersion;
   friend bool operator==(const CanCommand&, const CanCommand&) = default;
 };
+inline constexpr CanField kCanCommandFields[] = {
+    {"a", 8}, {"b", 8}, {"c", 4}, {"d", 4}, {"host", 4}, {"session", 4}, {"version", 1}};
 inline constexpr std::size_t kCanCommandBytes = 33;
 CanFrame encode_can_command(const CanCommand& command) noexcept;
 /// A command of version 1 was shorter: only its version, code and sequence are decoded.
@@ -99,6 +107,10 @@ struct CanState {
   std::uint32_t session = 0;  ///< the key, in answers to the host that owns the stage; otherwise 0
   friend bool operator==(const CanState&, const CanState&) = default;
 };
+inline constexpr CanField kCanStateFields[] = {{"version", 1},  {"cause", 1},  {"answer", 1},
+                                               {"resident", 1}, {"gaps", 4},   {"repeated", 4},
+                                               {"rejected", 4}, {"sample", 8}, {"fingerprint", 4},
+                                               {"boot", 4},     {"host", 4},   {"session", 4}};
 inline constexpr std::size_t kCanStateBytes = 40;
 CanFrame encode_can_state(const CanState& state) noexcept;
 [[nodiscard]] bool decode_can_state(const CanFrame& frame, CanState& state) noexcept;
