@@ -85,11 +85,11 @@ enum class Access : std::uint8_t { read, write };
 struct Entry {
   int address = 0;
   std::string_view name;
+  std::string_view meaning;
+  Access access = Access::read;  ///< write: by FC 6, 16, 23; all entries are read by FC 3, 4, 23
   Type type = Type::u32;
   int count = 1;
-  std::string_view unit;         ///< "1": dimensionless
-  Access access = Access::read;  ///< write: by FC 6, 16, 23; all entries are read by FC 3, 4, 23
-  std::string_view meaning;
+  std::string_view unit = "1";  ///< "1": dimensionless
 
   constexpr int registers() const noexcept { return count * (type == Type::u64 ? 4 : 2); }
 };
