@@ -1,6 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <string>
+
+// libmodbus' own name for its handle, declared here to keep its header out of other files.
+struct _modbus;  // NOLINT(bugprone-reserved-identifier)
 
 namespace stageid {
 
@@ -18,6 +22,16 @@ struct ModbusAddress {
 
 /// "Modbus TCP 127.0.0.1:502, unit 1".
 std::string to_string(const ModbusAddress& address);
+
+struct ModbusContextFree {
+  void operator()(_modbus* context) const noexcept;
+};
+using ModbusContext = std::unique_ptr<_modbus, ModbusContextFree>;
+
+/// A handle for this address, not connected. libmodbus' own error recovery is disabled, because it blocks
+/// forever when the peer is gone.
+/// @throws std::invalid_argument if libmodbus refuses the address (unit, baud rate, parity).
+ModbusContext make_modbus_context(const ModbusAddress& address);
 
 struct ModbusTiming {
   double response_s = 0.2;     ///< a later reply counts as missing

@@ -1,35 +1,17 @@
 #include "hal/modbus/modbus_fault.hpp"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace stageid {
 namespace {
-
-using Kind = ModbusFault::Kind;
-
-struct KindRule {
-  std::string_view name;
-  bool lasting = false;  // active until the end unless COUNT is given
-  bool needs_value = false;
-};
-
-constexpr std::array<KindRule, 9> kRules = {{{"late_reply", false, true},
-                                             {"half_frame", false, false},
-                                             {"wrong_unit", false, false},
-                                             {"exception", false, true},
-                                             {"dead_server", true, false},
-                                             {"heartbeat", true, false},
-                                             {"interlock", true, false},
-                                             {"temperature", true, true},
-                                             {"gravity", true, true}}};
 
 [[noreturn]] void refuse(std::string_view text, const std::string& what) {
   throw std::invalid_argument(
@@ -54,15 +36,14 @@ Number parse(std::string_view whole, std::string_view text, const char* name) {
   return value;
 }
 
-std::size_t kind_index(std::string_view whole, std::string_view name) {
-  for (std::size_t i = 0; i < kRules.size(); ++i)
-    if (kRules[i].name == name) return i;
-  std::vector<std::string_view> names;
-  for (const KindRule& rule : kRules) names.push_back(rule.name);
-  refuse(whole, fmt::format("unknown kind '{}', allowed are {}", name, fmt::join(names, ", ")));
+bool needs_value(ModbusFault::Kind kind) {
+  using Kind = ModbusFault::Kind;
+  return kind == Kind::late_reply || kind == Kind::exception || kind == Kind::temperature ||
+         kind == Kind::gravity;
 }
 
 void check_value(std::string_view whole, const ModbusFault& fault) {
+  using Kind = ModbusFault::Kind;
   if (!std::isfinite(fault.value)) refuse(whole, "VALUE must be finite");
   if (fault.kind == Kind::late_reply && !(fault.value > 0.0 && fault.value <= 60.0))
     refuse(whole, "VALUE must be above 0 and at most 60 s");
@@ -73,6 +54,7 @@ void check_value(std::string_view whole, const ModbusFault& fault) {
 }  // namespace
 
 ModbusFault parse_modbus_fault(std::string_view text) {
+  using Kind = ModbusFault::Kind;
   std::string_view rest = text;
   const bool has_value = rest.find(':') != std::string_view::npos;
   const std::string_view value = cut(rest, ':');
@@ -80,13 +62,16 @@ ModbusFault parse_modbus_fault(std::string_view text) {
   std::string_view place = cut(rest, '@');
   const std::string_view count = cut(place, 'x');
   ModbusFault fault;
-  const std::size_t kind = kind_index(text, rest);
-  fault.kind = static_cast<Kind>(kind);
-  fault.count = kRules[kind].lasting ? 0 : 1;
+  const std::optional<Kind> kind = from_word<Kind>(rest);
+  if (!kind)
+    refuse(text,
+           fmt::format("unknown kind '{}', allowed are {}", rest, fmt::join(kWords<Kind>, ", ")));
+  fault.kind = *kind;
+  fault.count = *kind >= Kind::dead_server ? 0 : 1;
   if (has_place) fault.from = parse<std::uint64_t>(text, place, "REQUEST");
   if (fault.from == 0) refuse(text, "REQUEST must be 1 or more");
   if (!count.empty()) fault.count = parse<std::uint64_t>(text, count, "COUNT");
-  if (has_value != kRules[kind].needs_value)
+  if (has_value != needs_value(*kind))
     refuse(text, has_value ? "this kind has no VALUE" : "this kind needs a VALUE");
   if (has_value) fault.value = parse<double>(text, value, "VALUE");
   check_value(text, fault);
@@ -96,7 +81,7 @@ ModbusFault parse_modbus_fault(std::string_view text) {
 ModbusFaultScript::ModbusFaultScript(std::vector<ModbusFault> faults)
     : faults_(std::move(faults)) {}
 
-const ModbusFault* ModbusFaultScript::active(Kind kind) const noexcept {
+const ModbusFault* ModbusFaultScript::active(ModbusFault::Kind kind) const noexcept {
   for (const ModbusFault& fault : faults_) {
     const bool begun = fault.kind == kind && request_ >= fault.from;
     if (begun && (fault.count == 0 || request_ - fault.from < fault.count)) return &fault;
@@ -104,7 +89,7 @@ const ModbusFault* ModbusFaultScript::active(Kind kind) const noexcept {
   return nullptr;
 }
 
-bool ModbusFaultScript::mentions(Kind kind) const noexcept {
+bool ModbusFaultScript::mentions(ModbusFault::Kind kind) const noexcept {
   return std::any_of(faults_.begin(), faults_.end(),
                      [kind](const ModbusFault& fault) { return fault.kind == kind; });
 }

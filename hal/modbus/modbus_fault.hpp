@@ -1,14 +1,17 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <string>
 #include <string_view>
 #include <vector>
+
+#include "excitation/words/words.hpp"
 
 namespace stageid {
 
 /// A simulated fault of a Modbus server.
 struct ModbusFault {
+  /// Those from dead_server on last until the end unless a count is given.
   enum class Kind : std::uint8_t {
     late_reply,   ///< the reply is `value` seconds late
     half_frame,   ///< the second half of the reply is missing
@@ -25,6 +28,10 @@ struct ModbusFault {
   std::uint64_t count = 1;  ///< number of affected requests; 0: all that follow
   double value = 0.0;
 };
+template <>
+inline constexpr std::array kWords<ModbusFault::Kind> = {"late_reply", "half_frame",  "wrong_unit",
+                                                         "exception",  "dead_server", "heartbeat",
+                                                         "interlock",  "temperature", "gravity"};
 
 /// Reads `KIND[@REQUEST][xCOUNT][:VALUE]`: "late_reply@200:0.4", "exception@50x3:4", "interlock@100".
 /// The default COUNT is 1 for faults of one reply, otherwise unlimited.

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "hal/modbus/modbus_address.hpp"
-#include "hal/modbus/modbus_context.hpp"
 
 namespace stageid {
 

@@ -18,7 +18,6 @@
 #include <thread>
 #include <utility>
 
-#include "hal/modbus/modbus_context.hpp"
 #include "hal/modbus/modbus_frame.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/stage.hpp"
@@ -56,16 +55,12 @@ struct ModbusServer::Line {
   bool closed = false;
 };
 
-struct ModbusServer::Context {
-  ModbusContext modbus;
-};
-
 ModbusServer::ModbusServer(const ModbusAddress& address, ModbusRegisters& registers,
                            ModbusFaultScript* faults)
     : address_(address),
       registers_(registers),
       faults_(faults),
-      context_(std::make_unique<Context>(Context{make_modbus_context(address)})) {
+      context_(make_modbus_context(address)) {
   open();
 }
 
@@ -80,7 +75,7 @@ void ModbusServer::hang_up(const Line& line) {
 }
 
 void ModbusServer::open() {
-  modbus_t* modbus = context_->modbus.get();
+  modbus_t* modbus = context_.get();
   if (address_.serial()) {
     if (modbus_connect(modbus) != 0)
       throw StageError(

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -49,7 +48,6 @@ class ModbusServer {
 
  private:
   struct Line;
-  struct Context;  // libmodbus context, which opens ports and devices
 
   void open();
   void serve_lines(int wait_ms);
@@ -70,7 +68,7 @@ class ModbusServer {
   ModbusAddress address_;
   ModbusRegisters& registers_;
   ModbusFaultScript* faults_;
-  std::unique_ptr<Context> context_;
+  ModbusContext context_;  // opens ports and devices
   int listener_ = -1;
   std::vector<Line> lines_;
   ModbusConnection last_connection_ = 0;
