@@ -67,27 +67,20 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{}", value) : "HUGE_VAL";
 }
 
-/// `/* s1 [m] */ 1e-3, ...`
-void add_table(std::string& text, const char* name, const std::vector<Channel>& channels,
-               const std::vector<std::string>& values) {
-  std::vector<std::string> entries;
-  for (std::size_t i = 0; i < channels.size(); ++i)
-    entries.push_back(
-        fmt::format("/* {} [{}] */ {}", channels[i].name, channels[i].unit, values[i]));
-  text += fmt::format("#define {} {{ \\\n  {} }}\n", name, fmt::join(entries, ", \\\n  "));
-}
-
-void add_channels(std::string& text, const std::string& kind, const std::vector<Channel>& channels,
+void add_channels(std::string& text, const char* kind, const std::vector<Channel>& channels,
                   const std::vector<CanScale>& scales, const Eigen::VectorXd& limits) {
-  std::vector<std::string> names, counts, largest;
-  for (std::size_t i = 0; i < channels.size(); ++i) {
-    names.push_back(fmt::format("\"{}\"", channels[i].name));
-    counts.push_back(number(scales[i].si_per_count));
-    largest.push_back(number(limits[static_cast<Eigen::Index>(i)]));
-  }
-  add_table(text, fmt::format("STAGEID_{}_NAMES", kind).c_str(), channels, names);
-  add_table(text, fmt::format("STAGEID_{}_LIMITS", kind).c_str(), channels, largest);
-  add_table(text, fmt::format("STAGEID_{}_PER_COUNT", kind).c_str(), channels, counts);
+  /// `/* s1 [m] */ 1e-3, ...`
+  const auto add_table = [&](const char* of, const auto& value) {
+    std::vector<std::string> entries;
+    for (std::size_t i = 0; i < channels.size(); ++i)
+      entries.push_back(
+          fmt::format("/* {} [{}] */ {}", channels[i].name, channels[i].unit, value(i)));
+    text += fmt::format("#define STAGEID_{}_{} {{ \\\n  {} }}\n", kind, of,
+                        fmt::join(entries, ", \\\n  "));
+  };
+  add_table("NAMES", [&](std::size_t i) { return fmt::format("\"{}\"", channels[i].name); });
+  add_table("LIMITS", [&](std::size_t i) { return number(limits[static_cast<Eigen::Index>(i)]); });
+  add_table("PER_COUNT", [&](std::size_t i) { return number(scales[i].si_per_count); });
 }
 
 }  // namespace

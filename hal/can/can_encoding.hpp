@@ -147,6 +147,11 @@ void append_can_word(std::vector<std::uint8_t>& memory, std::uint32_t word);
 void append_can_float(std::vector<std::uint8_t>& memory, double value);
 double can_float_at(std::span<const std::uint8_t> memory, std::size_t at) noexcept;
 
+/// Bytes of a row of a trace: all actuators and sensors, and the outcome.
+inline std::size_t can_trace_row_bytes(const StageInfo& info) noexcept {
+  return kCanFloatBytes * (info.actuators.size() + info.sensors.size() + 1);
+}
+
 enum class CanMemory : std::uint8_t { waveform = 0, trace = 1 };
 
 /// The received chunks of an upload: all before `first`, then those with a set bit.

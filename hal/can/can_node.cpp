@@ -46,7 +46,9 @@ void CanNode::serve(std::int64_t until_ns) {
   // If this node is delayed after this instant, the host may have sent meanwhile: it is not silent.
   const std::int64_t now_ns = transport_.now_ns();
   const std::size_t count = transport_.receive(inbox_);
-  watch_bus();  // first, because a bus that is off takes precedence over received commands
+  // First, because a bus that is off takes precedence over received commands.
+  if (worst_bus(transport_).state >= CanBusState::off && stage_.state() == NodeState::measuring)
+    stage_.fail(FaultCause::bus_off);
   for (std::size_t i = 0; i < count; ++i) handle(inbox_[i]);
   player_.work(now_ns, transport_);
   stage_.tick(now_ns);
@@ -195,7 +197,7 @@ std::string CanNode::execute(const CanCommand& command) {
     case CanCommandCode::upload:
       return player_.prepare(command);
     case CanCommandCode::missing:
-      put_missing();
+      outbox_.push_back(encode_can_missing(player_.missing()));
       return "";
     case CanCommandCode::arm:
       return arm(command);
@@ -278,17 +280,10 @@ void CanNode::put_state(const CanCommand* answered, CanAnswer answer, const std:
   state_asked_ = false;
 }
 
-void CanNode::put_missing() { outbox_.push_back(encode_can_missing(player_.missing())); }
-
 void CanNode::announce() {
   const bool changed = stage_.state() != announced_;
   if (changed || state_asked_ || transport_.now_ns() >= next_heartbeat_ns_)
     put_state(nullptr, CanAnswer::none, changed || state_asked_ ? stage_.trouble() : "");
-}
-
-void CanNode::watch_bus() {
-  if (worst_bus(transport_).state < CanBusState::off) return;
-  if (stage_.state() == NodeState::measuring) stage_.fail(FaultCause::bus_off);
 }
 
 void CanNode::flush() {

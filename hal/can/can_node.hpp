@@ -50,9 +50,7 @@ class CanNode {
   void make_answer(std::uint16_t sequence, std::uint64_t valid);
   void put_answer();
   void put_state(const CanCommand* answered, CanAnswer answer, const std::string& text);
-  void put_missing();
   void announce();
-  void watch_bus();
   void flush();
 
   StageNode& stage_;

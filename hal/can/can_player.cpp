@@ -30,10 +30,6 @@ CanPlayer::CanPlayer(StageNode& stage, double pace)
       u_(stage.info().actuators.size()),
       y_(stage.info().sensors.size()) {}
 
-std::size_t CanPlayer::row_bytes() const noexcept {
-  return kCanFloatBytes * (u_.size() + y_.size() + 1);
-}
-
 std::string CanPlayer::prepare(const CanCommand& command) {
   if (busy()) return "a resident experiment is running; stop it first";
   token_ = static_cast<std::uint8_t>(command.host);
@@ -87,9 +83,10 @@ std::string CanPlayer::arm(const CanCommand& command) {
     return "the waveform is incomplete; upload it first";
   if (can_digest(waveform_) != digest_ || static_cast<std::uint32_t>(digest_) != command.d)
     return "the memory contains a different waveform; upload it again";
-  if (command.b == 0 || command.b > depth_bytes() / row_bytes())
+  const std::size_t row_bytes = can_trace_row_bytes(stage_.info());
+  if (command.b == 0 || command.b > depth_bytes() / row_bytes)
     return fmt::format("{} samples exceed the trace memory of {}", command.b,
-                       depth_bytes() / row_bytes());
+                       depth_bytes() / row_bytes);
   const SupervisorReply reply = stage_.request(SupervisorCommand::enable);
   if (!reply.accepted) return reply.message;
   if (stage_.session() == 0) static_cast<void>(stage_.reserve());
@@ -97,7 +94,7 @@ std::string CanPlayer::arm(const CanCommand& command) {
   samples_ = command.b;
   ramp_samples_ = command.c;
   trace_.clear();
-  trace_.reserve(samples_ * row_bytes());
+  trace_.reserve(samples_ * row_bytes);
   reserved_ = true;
   status_ = CanResident::armed;
   return "";

@@ -45,7 +45,6 @@ class CanPlayer {
   static std::uint64_t depth_bytes() noexcept { return std::uint64_t{256} << 20; }
 
  private:
-  std::size_t row_bytes() const noexcept;
   void play_sample(std::int64_t now_ns);
   void record();
   void finish(CanResident status);

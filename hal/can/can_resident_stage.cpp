@@ -37,12 +37,8 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
   info_.clock = Clock::virtual_time;  // this side does not wait for samples
 }
 
-std::size_t CanResidentStage::row_bytes() const noexcept {
-  return kCanFloatBytes * (info_.actuators.size() + info_.sensors.size() + 1);
-}
-
 std::uint64_t CanResidentStage::depth_samples() const noexcept {
-  return CanPlayer::depth_bytes() / row_bytes();
+  return CanPlayer::depth_bytes() / can_trace_row_bytes(info_);
 }
 
 void CanResidentStage::connect() {
@@ -210,7 +206,8 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
 JobProgress CanResidentStage::download(TraceSink& sink) {
   const CanState node = link_.command({CanCommandCode::hello});
   const std::uint64_t rows = std::min(node.sample, samples_);
-  trace_.resize(rows * row_bytes());
+  const std::size_t row_bytes = can_trace_row_bytes(info_);
+  trace_.resize(rows * row_bytes);
   const bool complete = read(CanMemory::trace, trace_, trace_chunks_);
   require<StageError>(
       complete,
@@ -225,7 +222,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
     values.clear();
     outcomes.clear();
     for (std::uint64_t row = rows_given_; row < end; ++row) {
-      const std::size_t at = row * row_bytes();
+      const std::size_t at = row * row_bytes;
       for (std::size_t i = 0; i < columns; ++i)
         values.push_back(can_float_at(trace_, at + kCanFloatBytes * i));
       outcomes.push_back(outcome_of_code(trace_[at + kCanFloatBytes * columns]));

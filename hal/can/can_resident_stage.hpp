@@ -39,7 +39,6 @@ class CanResidentStage final : public ResidentStage {
   void send_missing(const std::vector<std::uint32_t>& chunks);
   void send_all();
   bool read(CanMemory memory, std::vector<std::uint8_t>& bytes, std::size_t& chunks_done);
-  std::size_t row_bytes() const noexcept;
 
   StageInfo info_;
   CanSpec spec_;

@@ -16,7 +16,6 @@
 #include <ctime>
 
 #include "hal/can/can_arrival.hpp"
-#include "hal/stage/pacer.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -125,8 +124,6 @@ const std::string& SocketCan::name(std::size_t bus) const noexcept {
 const CanBusHealth& SocketCan::health(std::size_t bus) const noexcept {
   return buses_[bus]->health;
 }
-
-std::int64_t SocketCan::now_ns() const noexcept { return monotonic_ns(); }
 
 std::size_t SocketCan::send(std::span<const CanFrame> frames) noexcept {
   std::size_t sent = 0;

@@ -25,7 +25,6 @@ class SocketCan final : public CanTransport {
   std::size_t receive(std::span<CanFrame> frames) noexcept override;
   void wait(std::int64_t until_ns) noexcept override;
   const CanBusHealth& health(std::size_t bus) const noexcept override;
-  std::int64_t now_ns() const noexcept override;
 
  private:
   struct Bus;

@@ -142,7 +142,11 @@ Outcome CanStage::exchange(const Outputs& outputs, Inputs& inputs, Deadline dead
   const Outcome outcome = meaning(status_).outcome;
   samples_bad_ += status_ == PeerStatus::good ? 0U : 1U;
   if (wall_ && frames_seen_ != 0) stamp(inputs);
-  const Pacer::Instant now = info_.sets_pace ? wait_for_instant(ready_ns) : pacer_.wait();
+  // A node that sets the pace has waited; without an answer, the next instant follows a period after the last.
+  if (info_.sets_pace && frames_seen_ == 0) instant_ns_ += period_ns_;
+  const Pacer::Instant now =
+      info_.sets_pace ? Pacer::Instant{instant_ns_, transport_->now_ns(), ready_ns, false}
+                      : pacer_.wait();
   now.put(outputs.cycle + 1, inputs);
   return outcome == Outcome::ok && now.too_late(deadline) ? Outcome::late : outcome;
 }
@@ -164,12 +168,6 @@ void CanStage::stamp(Inputs& inputs) noexcept {
   if (!info_.sets_pace) return;
   static_cast<void>(host_of_node_.take(inputs.stamp_ns, arrival_ns_));
   instant_ns_ = host_of_node_.stamp_ns(inputs.stamp_ns);
-}
-
-/// The node has waited; without an answer, the next instant follows a period after the last.
-Pacer::Instant CanStage::wait_for_instant(std::int64_t ready_ns) noexcept {
-  if (frames_seen_ == 0) instant_ns_ += period_ns_;
-  return {instant_ns_, transport_->now_ns(), ready_ns, false};
 }
 
 std::int64_t CanStage::reply_deadline_ns(Deadline deadline) const noexcept {
@@ -245,12 +243,6 @@ void CanStage::give(Inputs& inputs) const noexcept {
   inputs.node_state = link_.states() != states_before_ ? link_.state().state : measured_in_;
 }
 
-PeerStatus CanStage::bus_status() const noexcept {
-  using enum PeerStatus;
-  constexpr std::array kStatus = {good, good, passive, bus_off, link_down};
-  return kStatus[static_cast<std::size_t>(worst_bus(*transport_).state)];
-}
-
 /// Status from the node's state and measurement frames of this cycle.
 PeerStatus CanStage::node_status() const noexcept {
   if (conflict_) return PeerStatus::conflict;
@@ -268,13 +260,16 @@ PeerStatus CanStage::node_status() const noexcept {
 }
 
 PeerStatus CanStage::judge(const Inputs& inputs) noexcept {
-  PeerStatus worst = std::max(bus_status(), node_status());
+  using enum PeerStatus;
+  constexpr std::array kOfBus = {good, good, passive, bus_off, link_down};
+  PeerStatus worst =
+      std::max(kOfBus[static_cast<std::size_t>(worst_bus(*transport_).state)], node_status());
   // Reported once: the gaps mark this sample only.
   if (link_.state().gaps > samples_bad_) samples_bad_ = link_.state().gaps;
   const std::uint64_t valid = inputs.valid & all_sensors();
   if (valid == all_sensors()) return worst;
-  worst = std::max(worst, valid == 0 ? PeerStatus::nothing_new : PeerStatus::incomplete);
-  return damaged_in_cycle_ ? std::max(worst, PeerStatus::damaged) : worst;
+  worst = std::max(worst, valid == 0 ? nothing_new : incomplete);
+  return damaged_in_cycle_ ? std::max(worst, damaged) : worst;
 }
 
 void CanStage::stop() noexcept {

@@ -74,9 +74,7 @@ class CanStage final : public CyclicStage {
   bool over() const noexcept;
   std::int64_t reply_deadline_ns(Deadline deadline) const noexcept;
   void stamp(Inputs& inputs) noexcept;
-  Pacer::Instant wait_for_instant(std::int64_t ready_ns) noexcept;
   PeerStatus judge(const Inputs& inputs) noexcept;
-  PeerStatus bus_status() const noexcept;
   PeerStatus node_status() const noexcept;
   std::uint64_t all_sensors() const noexcept { return all_bits(fresh_.size()); }
   void give(Inputs& inputs) const noexcept;

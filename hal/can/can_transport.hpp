@@ -8,6 +8,7 @@
 
 #include "excitation/words/words.hpp"
 #include "hal/can/can_frame.hpp"
+#include "hal/stage/pacer.hpp"
 
 namespace stageid {
 
@@ -43,7 +44,7 @@ class CanTransport {
   virtual void wait(std::int64_t until_ns) noexcept = 0;
 
   virtual const CanBusHealth& health(std::size_t bus) const noexcept = 0;
-  virtual std::int64_t now_ns() const noexcept = 0;
+  virtual std::int64_t now_ns() const noexcept { return monotonic_ns(); }
 };
 
 /// A transport through another one. Derived classes change what they want.

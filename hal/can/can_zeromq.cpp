@@ -7,7 +7,6 @@
 #include <array>
 #include <utility>
 
-#include "hal/stage/pacer.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -107,7 +106,5 @@ void ZeroMqCan::wait(std::int64_t until_ns) noexcept {
   zmq_pollitem_t item{socket_->socket, 0, ZMQ_POLLIN, 0};
   zmq_poll(&item, 1, static_cast<long>((left_ns + kMillisecond_ns - 1) / kMillisecond_ns));
 }
-
-std::int64_t ZeroMqCan::now_ns() const noexcept { return monotonic_ns(); }
 
 }  // namespace stageid

@@ -28,7 +28,6 @@ class ZeroMqCan final : public CanTransport {
   void wait(std::int64_t until_ns) noexcept override;
   /// Messages of a wrong size are counted as `error_frames`.
   const CanBusHealth& health(std::size_t /*bus*/) const noexcept override { return health_; }
-  std::int64_t now_ns() const noexcept override;
 
  private:
   struct Socket;

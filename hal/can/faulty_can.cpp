@@ -94,15 +94,11 @@ void FaultyCan::send_spoiled(CanFrame frame, const CanFault& fault) noexcept {
 }
 
 void FaultyCan::release(bool one_has_passed) noexcept {
-  for (std::size_t i = 0; i < held_.size();) {
-    const bool due = held_[i].behind_next ? one_has_passed : held_[i].due_ns <= now_ns();
-    if (!due) {
-      ++i;
-      continue;
-    }
-    static_cast<void>(CanThrough::send({&held_[i].frame, 1}));
-    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  std::erase_if(held_, [&](const Held& held) {
+    const bool due = held.behind_next ? one_has_passed : held.due_ns <= now_ns();
+    if (due) static_cast<void>(CanThrough::send({&held.frame, 1}));
+    return due;
+  });
 }
 
 std::size_t FaultyCan::receive(std::span<CanFrame> frames) noexcept {

@@ -152,21 +152,19 @@ ModbusException ModbusNode::write(int first, std::span<const std::uint16_t> valu
     return ModbusException::illegal_address;
   std::array<std::uint16_t, map::kWritableEnd> before{};
   std::copy_n(registers_.begin(), before.size(), before.begin());
-  const std::uint32_t heartbeat = map_.u32(map::kHeartbeat);
-  const std::uint32_t command = map_.u32(map::kCommandSequence);
-  const std::uint32_t run = map_.u32(map::kRunSequence);
   std::copy(values.begin(), values.end(), registers_.begin() + first);
-  const ModbusException refused = obey(first, values.size(), heartbeat, command, run);
+  const ModbusException refused = obey(first, values.size(), {0, before});
   if (refused != ModbusException::none) std::copy(before.begin(), before.end(), registers_.begin());
   map_.set_u32(map::kRunKey, 0);  // the key must not be readable here
   return refused;
 }
 
 /// Acts on the changes between the previous values and the current registers.
-ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t heartbeat,
-                                 std::uint32_t command, std::uint32_t run) {
-  const bool beats = map_.u32(map::kHeartbeat) != heartbeat;
-  const bool runs = map_.u32(map::kRunSequence) != run;
+ModbusException ModbusNode::obey(int first, std::size_t count,
+                                 RegisterBlock<const std::uint16_t> before) {
+  const auto is_new = [&](int address) { return map_.u32(address) != before.u32(address); };
+  const bool beats = is_new(map::kHeartbeat);
+  const bool runs = is_new(map::kRunSequence);
   const bool moves = touches(first, count, map::kSetpointSequence);
   const bool of_the_run = first + static_cast<int>(count) > map::kRunCommand;
   if (beats && counting_ != 0 && counting_ != asking_) return ModbusException::busy;
@@ -175,7 +173,7 @@ ModbusException ModbusNode::obey(int first, std::size_t count, std::uint32_t hea
     if (const ModbusException refused = take_run_command(); refused != ModbusException::none)
       return refused;
   if (beats) counting_ = asking_;
-  if (map_.u32(map::kCommandSequence) != command) take_supervisor_command();
+  if (is_new(map::kCommandSequence)) take_supervisor_command();
   if (moves) take_setpoint();
   return ModbusException::none;
 }

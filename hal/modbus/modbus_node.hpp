@@ -47,8 +47,7 @@ class ModbusNode final : public ModbusRegisters {
   void disturb_panel();
   void watch_heartbeat(std::int64_t now_ns);
   void take_supervisor_command();
-  ModbusException obey(int first, std::size_t count, std::uint32_t heartbeat, std::uint32_t command,
-                       std::uint32_t run);
+  ModbusException obey(int first, std::size_t count, RegisterBlock<const std::uint16_t> before);
   bool may_control_the_run(bool commands, bool moves) const;
   ModbusException take_run_command();
   ModbusException begin_run();

@@ -167,21 +167,11 @@ bool ModbusStage::restarted() noexcept {
 }
 
 PeerStatus ModbusStage::judge(LinkStatus status) noexcept {
+  using enum PeerStatus;
+  constexpr std::array kStatus = {good, link_down, damaged, fault, link_down, link_down};
   trouble_ = status == LinkStatus::ok ? Trouble::none : Trouble::link;
   link_trouble_ = link_.last();
-  switch (status) {
-    case LinkStatus::ok:
-      return judge_reply();
-    case LinkStatus::timeout:
-    case LinkStatus::disconnected:
-    case LinkStatus::flooded:
-      return PeerStatus::link_down;
-    case LinkStatus::corrupt:
-      return PeerStatus::damaged;
-    case LinkStatus::refused:
-      break;
-  }
-  return PeerStatus::fault;
+  return status == LinkStatus::ok ? judge_reply() : kStatus[static_cast<std::size_t>(status)];
 }
 
 PeerStatus ModbusStage::judge_reply() noexcept {

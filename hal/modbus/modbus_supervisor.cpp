@@ -84,11 +84,6 @@ void ModbusSupervisor::set_trouble(std::string trouble) {
   trouble_ = std::move(trouble);
 }
 
-double ModbusSupervisor::reply_allowance_s() const noexcept {
-  // The current poll, its repetition, and the poll with the command.
-  return 3.0 * (options_.poll_period_s + link_.timing().worst_reply_s);
-}
-
 SupervisorReply ModbusSupervisor::request(SupervisorCommand command) {
   const std::lock_guard one(request_mutex_);
   std::unique_lock lock(mutex_);
@@ -96,8 +91,9 @@ SupervisorReply ModbusSupervisor::request(SupervisorCommand command) {
   sent_ = false;
   reply_.reset();
   changed_.notify_all();
-  const bool answered =
-      changed_.wait_for(lock, Seconds(reply_allowance_s()), [this] { return reply_.has_value(); });
+  // The current poll, its repetition, and the poll with the command.
+  const Seconds allowance(3.0 * (options_.poll_period_s + link_.timing().worst_reply_s));
+  const bool answered = changed_.wait_for(lock, allowance, [this] { return reply_.has_value(); });
   wanted_.reset();
   if (answered) return *std::exchange(reply_, std::nullopt);
   return {false, trouble_.empty() ? "the command was not answered" : trouble_};

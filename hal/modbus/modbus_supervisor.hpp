@@ -48,7 +48,6 @@ class ModbusSupervisor final : public Supervisor {
   LinkStatus transact(std::span<std::uint16_t> status);
   bool take_status(RegisterBlock<const std::uint16_t> status);
   void set_trouble(std::string trouble);
-  double reply_allowance_s() const noexcept;
 
   ModbusLink link_;
   ModbusSupervisorOptions options_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/plant_watch.hpp"
 #include "hal/stage/require.hpp"
 
 namespace stageid {
@@ -30,14 +31,9 @@ struct PanelTrouble {
 
 PanelTrouble trouble_of(const NodePanel& panel) {
   if (!panel.interlock_closed) return {FaultCause::interlock, "the interlock is open; close it"};
-  for (std::size_t i = 0; i < panel.gravity_compensator_n.size(); ++i) {
-    const double force_n = panel.gravity_compensator_n[i];
-    // This form treats NaN as out of range.
-    if (!(force_n >= panel.gravity_low_n && force_n <= panel.gravity_high_n))
-      return {FaultCause::gravity,
-              fmt::format("gravity compensator {}: {:.4g} N is out of range ({:.4g} to {:.4g} N)",
-                          i + 1, force_n, panel.gravity_low_n, panel.gravity_high_n)};
-  }
+  const std::string gravity = range_trouble(panel.gravity_compensator_n, panel.gravity_low_n,
+                                            panel.gravity_high_n, "gravity compensator", "N");
+  if (!gravity.empty()) return {FaultCause::gravity, gravity};
   for (std::size_t i = 0; i < panel.temperature_k.size(); ++i)
     if (!(panel.temperature_k[i] <= panel.temperature_high_k))
       return {FaultCause::temperature,

@@ -75,14 +75,6 @@ bool FaultScript::any(Fault::Kind kind, std::uint64_t cycle) const noexcept {
   });
 }
 
-bool FaultScript::missed(std::uint64_t cycle) const noexcept {
-  return any(Fault::Kind::missed_cycle, cycle);
-}
-
-bool FaultScript::interlock(std::uint64_t cycle) const noexcept {
-  return any(Fault::Kind::interlock, cycle);
-}
-
 void FaultScript::drive(std::uint64_t cycle, std::span<const double> applied,
                         std::span<double> u) noexcept {
   if (!history_.empty()) delay(cycle, u);

@@ -31,8 +31,8 @@ class FaultScript {
   FaultScript(std::vector<WaferStageSpec::Fault> faults, const StageInfo& info);
 
   void start_run(int run) noexcept;
-  bool missed(std::uint64_t cycle) const noexcept;
-  bool interlock(std::uint64_t cycle) const noexcept;
+  /// Whether a fault of this kind acts.
+  bool any(WaferStageSpec::Fault::Kind kind, std::uint64_t cycle) const noexcept;
   /// Replaces the forces of faulty actuators. `applied`: forces of the last cycle.
   void drive(std::uint64_t cycle, std::span<const double> applied, std::span<double> u) noexcept;
   /// Corrupts a fresh measurement; `last` is the previous one.
@@ -44,11 +44,9 @@ class FaultScript {
  private:
   using Fault = WaferStageSpec::Fault;
   bool active(const Fault& fault, std::uint64_t cycle) const noexcept;
-  bool any(Fault::Kind kind, std::uint64_t cycle) const noexcept;
-
-  std::vector<Fault> faults_;
   void delay(std::uint64_t cycle, std::span<double> u) noexcept;
 
+  std::vector<Fault> faults_;
   double period_s_ = 0.0;
   std::size_t history_cycles_ = 0;
   std::vector<double> history_;  // ring of past forces; empty if no fault adds a delay

@@ -153,8 +153,8 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
     return Outcome::fault;
   }
   const bool faulty = !s.faults.empty();
-  const bool missed = faulty && s.faults.missed(s.cycle);
-  const bool off = faulty && s.faults.interlock(s.cycle);
+  const bool missed = faulty && s.faults.any(WaferStageSpec::Fault::Kind::missed_cycle, s.cycle);
+  const bool off = faulty && s.faults.any(WaferStageSpec::Fault::Kind::interlock, s.cycle);
   const bool accepted = s.take_command(outputs.u, missed, off);
   s.drive();
   s.measure();

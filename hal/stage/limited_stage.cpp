@@ -103,16 +103,12 @@ void LimitedStage::apply(std::uint64_t cycle) noexcept {
                         (decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
     outside |= static_cast<int>(!inside);
   }
-  if (outside != 0) limit_command(cycle);
+  for (Eigen::Index i = 0; outside != 0 && i < wanted_.size(); ++i)
+    wanted_[i] = limit_channel(i, wanted_[i], cycle);
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     applied_[i] = wanted_[i];
     mean_square_[i] = decay_ * mean_square_[i] + fresh * applied_[i] * applied_[i];
   }
-}
-
-void LimitedStage::limit_command(std::uint64_t cycle) noexcept {
-  for (Eigen::Index i = 0; i < wanted_.size(); ++i)
-    wanted_[i] = limit_channel(i, wanted_[i], cycle);
 }
 
 double LimitedStage::limit_channel(Eigen::Index channel, double wanted,

@@ -59,7 +59,6 @@ class LimitedStage final : public CyclicStage {
   enum class Loop : std::uint8_t { closed, braking, open };
 
   void apply(std::uint64_t cycle) noexcept;
-  void limit_command(std::uint64_t cycle) noexcept;
   double limit_channel(Eigen::Index channel, double wanted, std::uint64_t cycle) noexcept;
   void inspect(Inputs& inputs) noexcept;
   void take_emergency(const LimitViolation& cause) noexcept;

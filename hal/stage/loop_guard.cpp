@@ -138,12 +138,8 @@ void LoopGuard::start(const Inputs& first) noexcept {
   }
   measured_ = p_.matrix();
   if (contradiction_.size() > 0) contradicting_at_start_.noalias() = contradiction_ * measured_;
-  v_.setZero();
-  d_.setZero();
-  force_p_.setZero();
-  force_v_.setZero();
-  force_d_.setZero();
-  last_error_m_.setZero();
+  for (Eigen::ArrayXd* state : {&v_, &d_, &force_p_, &force_v_, &force_d_, &last_error_m_})
+    state->setZero();
   last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // compares unequal to any value
   accelerations_.setZero();
   repeats_.setZero();

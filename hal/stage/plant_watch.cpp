@@ -23,16 +23,6 @@ void check(const PlantConditions& c) {
           "supervisor: times must be positive, and ranges [low, high] must have low <= high");
 }
 
-/// "gravity compensator 2: 12 N is not within 40 ... 60 N"; empty if all are in range. NaN is out of range.
-std::string range_trouble(const std::vector<double>& values, double low, double high,
-                          const char* what, const char* unit) {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!(values[i] >= low && values[i] <= high))
-      return fmt::format("{} {}: {:.4g} {} is out of range ({:.4g} to {:.4g} {})", what, i + 1,
-                         values[i], unit, low, high, unit);
-  return "";
-}
-
 /// Trouble of the current snapshot; `enabled`: the plant must also be enabled.
 std::string trouble_of(const Supervisor& supervisor, const PlantConditions& conditions,
                        bool enabled) {
@@ -51,6 +41,15 @@ std::string trouble_of(const Supervisor& supervisor, const PlantConditions& cond
 }
 
 }  // namespace
+
+std::string range_trouble(const std::vector<double>& values, double low, double high,
+                          const char* what, const char* unit) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!(values[i] >= low && values[i] <= high))
+      return fmt::format("{} {}: {:.4g} {} is out of range ({:.4g} to {:.4g} {})", what, i + 1,
+                         values[i], unit, low, high, unit);
+  return "";
+}
 
 std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& conditions,
                           std::int64_t now_ns) {
@@ -76,7 +75,11 @@ std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& 
 PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault)
     : supervisor_(supervisor), conditions_(conditions) {
   check(conditions);
-  if (reset_fault) clear_fault();
+  if (reset_fault) {
+    static_cast<void>(wait_until_good(false));
+    if (supervisor_.snapshot().state == NodeState::fault)
+      static_cast<void>(supervisor_.request(SupervisorCommand::reset_fault));
+  }
   std::string trouble = wait_until_good(false);
   if (!trouble.empty()) throw StageError(trouble);
   const SupervisorReply reply = supervisor_.request(SupervisorCommand::enable);
@@ -97,13 +100,6 @@ PlantWatch::~PlantWatch() {
   changed_.notify_all();
   thread_.join();
   supervisor_.request(SupervisorCommand::disable);
-}
-
-/// Waits for the plant and resets its fault, if there is one and the plant permits it.
-void PlantWatch::clear_fault() {
-  static_cast<void>(wait_until_good(false));
-  if (supervisor_.snapshot().state == NodeState::fault)
-    static_cast<void>(supervisor_.request(SupervisorCommand::reset_fault));
 }
 
 /// Waits up to enable_s. @returns the remaining trouble; empty if there is none.

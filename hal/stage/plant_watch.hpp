@@ -21,6 +21,10 @@ struct PlantConditions {
   double enable_s = 5.0;  ///< longest time for enabling
 };
 
+/// "gravity compensator 2: 12 N is out of range (40 to 60 N)"; empty if all are in range. NaN is out of range.
+std::string range_trouble(const std::vector<double>& values, double low, double high,
+                          const char* what, const char* unit);
+
 /// One line: the most serious violated condition; empty if all hold. It does not check whether the stage is
 /// enabled.
 std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& conditions,
@@ -47,7 +51,6 @@ class PlantWatch {
   std::string reason() const;
 
  private:
-  void clear_fault();
   std::string wait_until_good(bool enabled);
   void watch();
 

@@ -21,24 +21,19 @@ std::int64_t SampleClock::stamp_ns(std::int64_t expected_ns) const noexcept {
 }
 
 std::int64_t SampleClock::take(std::int64_t expected_ns, std::int64_t stamp_ns) noexcept {
-  if (count_ == 0) {
+  const bool first = count_ == 0;
+  const std::int64_t deviation = first ? 0 : stamp_ns - this->stamp_ns(expected_ns);
+  const bool irregular = std::abs(deviation) > limit_ns_;
+  if (irregular && ++irregular_ < kJump) return deviation;
+  irregular_ = 0;
+  if (first) drift_ = 0.0;
+  if (first || irregular) {
     count_ = 1;
-    expected_ns_ = expected_ns;
-    stamp_ns_ = stamp_ns;
-    fraction_ns_ = drift_ = 0.0;
-    return 0;
-  }
-  const std::int64_t deviation = stamp_ns - this->stamp_ns(expected_ns);
-  if (std::abs(deviation) > limit_ns_) {
-    if (++irregular_ < kJump) return deviation;
     expected_ns_ = expected_ns;
     stamp_ns_ = stamp_ns;
     fraction_ns_ = 0.0;
-    count_ = 1;
-    irregular_ = 0;
     return deviation;
   }
-  irregular_ = 0;
   ++count_;
   const auto pull = static_cast<double>(std::clamp(deviation, -trust_ns_, trust_ns_));
   const double share = std::max(kSmallestShare, 1.0 / count_);

@@ -12,7 +12,6 @@
 
 #include "hal/can/can_layout.hpp"
 #include "hal/can/can_transport.hpp"
-#include "hal/stage/pacer.hpp"
 
 namespace stageid::test {
 
@@ -74,7 +73,6 @@ class RouterCan final : public CanTransport {
              static_cast<long>(std::max<std::int64_t>(0, until_ns - now_ns()) / 1'000'000));
   }
   const CanBusHealth& health(std::size_t /*bus*/) const noexcept override { return health_; }
-  std::int64_t now_ns() const noexcept override { return monotonic_ns(); }
 
  private:
   static constexpr std::size_t kHead = 8;
