@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hal/stage/peer_status.hpp"
+#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {
@@ -109,29 +110,28 @@ bool CanLink::exchange(CanCommand command, const Other& other) {
 }
 
 CanState CanLink::command(const CanCommand& command, const Other& other) {
-  const std::string& bus = transport_.name(0);
+  const std::string place = fmt::format("can: {}", transport_.name(0));
   const bool greeting = boot_ == 0;
   const bool answered = exchange(command, other);
-  if (other_node_ && !greeting)
-    refuse(PeerStatus::other_node, fmt::format("can: {}", bus), "; start the run again");
+  if (other_node_ && !greeting) refuse(PeerStatus::other_node, place, "; start the run again");
   if (!answered) {
-    if (interrupted()) throw StageError(fmt::format("can: {}: interrupted", bus));
+    require<StageError>(!interrupted(), "{}: interrupted", place);
     const WorstBus worst = worst_bus(transport_);
-    if (worst.state >= CanBusState::passive)
-      throw StageError(fmt::format("can: {}: {}; check the cable and 'ip -details link show {}'",
-                                   transport_.name(worst.bus), to_string(worst.state),
-                                   transport_.name(worst.bus)));
-    throw StageError(
-        fmt::format("can: {}: no node answered within {} ms; start 'stageid node', and check the "
-                    "cable, interface and bit rates",
-                    bus, kAttempts * kAnswer_ns / 1'000'000));
+    require<StageError>(worst.state < CanBusState::passive,
+                        "can: {}: {}; check the cable and 'ip -details link show {}'",
+                        transport_.name(worst.bus), to_string(worst.state),
+                        transport_.name(worst.bus));
   }
+  require<StageError>(answered,
+                      "{}: no node answered within {} ms; start 'stageid node', and check the "
+                      "cable, interface and bit rates",
+                      place, kAttempts * kAnswer_ns / 1'000'000);
   if (answer_.version != kCanProtocolVersion)
-    refuse(PeerStatus::other_version, fmt::format("can: {}", bus),
+    refuse(PeerStatus::other_version, place,
            fmt::format(" ({}; expected {}); update the older program", answer_.version,
                        kCanProtocolVersion));
-  if (answer_.answer != CanAnswer::accepted)
-    throw StageError(fmt::format("can: {}: the node refused the command: {}", bus, text()));
+  require<StageError>(answer_.answer == CanAnswer::accepted, "{}: the node refused the command: {}",
+                      place, text());
   return answer_;
 }
 

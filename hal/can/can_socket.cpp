@@ -1,6 +1,5 @@
 #include "hal/can/can_socket.hpp"
 
-#include <fmt/format.h>
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
@@ -16,6 +15,7 @@
 #include <ctime>
 
 #include "hal/can/can_arrival.hpp"
+#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -26,35 +26,32 @@ constexpr std::size_t kLargestBusCount = 16;
 
 bool is_down(int error) { return error == ENETDOWN || error == ENXIO || error == ENODEV; }
 
-[[noreturn]] void refuse(const std::string& interface, const std::string& why) {
-  throw StageError(fmt::format("can: {}: {}", interface, why));
-}
-
 int open_socket(const std::string& interface) {
   const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-  if (fd < 0)
-    refuse(interface,
-           fmt::format("cannot open a CAN socket ({}); load the kernel modules can and can_raw",
-                       std::strerror(errno)));
+  require<StageError>(
+      fd >= 0, "can: {}: cannot open a CAN socket ({}); load the kernel modules can and can_raw",
+      interface, std::strerror(errno));
   return fd;
 }
 
 void bind_to(int fd, const std::string& interface) {
   ifreq request{};
   std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
-  if (ioctl(fd, SIOCGIFINDEX, &request) != 0)
-    refuse(interface, "unknown interface; 'ip link' lists all interfaces");
+  require<StageError>(ioctl(fd, SIOCGIFINDEX, &request) == 0,
+                      "can: {}: unknown interface; 'ip link' lists all interfaces", interface);
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = request.ifr_ifindex;
-  if (ioctl(fd, SIOCGIFMTU, &request) == 0 && request.ifr_mtu < static_cast<int>(CANFD_MTU))
-    refuse(interface, fmt::format("the interface does not support CAN FD (mtu {}); run 'ip link "
-                                  "set {} mtu 72', or set 'fd on'",
-                                  request.ifr_mtu, interface));
-  if (ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) == 0)
-    refuse(interface, fmt::format("the interface is down; run 'ip link set {} up'", interface));
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-    refuse(interface, fmt::format("cannot be bound: {}", std::strerror(errno)));
+  const bool knows_mtu = ioctl(fd, SIOCGIFMTU, &request) == 0;
+  require<StageError>(!knows_mtu || request.ifr_mtu >= static_cast<int>(CANFD_MTU),
+                      "can: {}: the interface does not support CAN FD (mtu {}); run 'ip link set "
+                      "{} mtu 72', or set 'fd on'",
+                      interface, request.ifr_mtu, interface);
+  require<StageError>(ioctl(fd, SIOCGIFFLAGS, &request) != 0 || (request.ifr_flags & IFF_UP) != 0,
+                      "can: {}: the interface is down; run 'ip link set {} up'", interface,
+                      interface);
+  const int bound = bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+  require<StageError>(bound == 0, "can: {}: cannot be bound: {}", interface, std::strerror(errno));
 }
 
 void configure(int fd, const std::string& interface,
@@ -65,10 +62,12 @@ void configure(int fd, const std::string& interface,
   for (const std::uint16_t id : identifiers)
     filters.push_back({id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
   const auto bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
-  if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on)) != 0 ||
-      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) != 0 ||
-      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) != 0)
-    refuse(interface, fmt::format("cannot be configured: {}", std::strerror(errno)));
+  const bool configured =
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on)) == 0 &&
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) == 0 &&
+      setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) == 0;
+  require<StageError>(configured, "can: {}: cannot be configured: {}", interface,
+                      std::strerror(errno));
   stamp_arrivals(fd);
 }
 
@@ -89,13 +88,74 @@ struct SocketCan::Bus {
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
 
-  void failed(int error, std::size_t frames) noexcept {
-    if (is_down(error)) health.state = CanBusState::down;
-    health.send_refused += frames;
+  // @returns false for an error frame: it updates the bus state and has no data.
+  bool take(const canfd_frame& raw, CanFrame& frame) noexcept {
+    if ((raw.can_id & CAN_ERR_FLAG) != 0) {
+      ++health.error_frames;
+      health.state = can_state_after_error(health.state, raw.can_id & CAN_ERR_MASK, raw.data[1]);
+      return false;
+    }
+    frame.id = static_cast<std::uint16_t>(raw.can_id & CAN_SFF_MASK);
+    frame.length = std::min<std::uint8_t>(raw.len, sizeof(raw.data));
+    std::copy_n(raw.data, frame.length, frame.data.begin());
+    return true;
   }
-  std::size_t send(std::span<const CanFrame> frames) noexcept;
-  std::size_t receive(std::span<CanFrame> frames, std::uint8_t number, std::int64_t now) noexcept;
-  bool take(const canfd_frame& raw, CanFrame& frame) noexcept;
+
+  std::size_t send(std::span<const CanFrame> frames) noexcept {
+    canfd_frame raw[kBatch];
+    iovec part[kBatch];
+    mmsghdr message[kBatch]{};
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      raw[i] = to_kernel(frames[i]);
+      part[i] = {&raw[i], sizeof(raw[i])};
+      message[i].msg_hdr.msg_iov = &part[i];
+      message[i].msg_hdr.msg_iovlen = 1;
+    }
+    std::size_t sent = 0;
+    while (sent < frames.size()) {
+      const int n = sendmmsg(fd, message + sent, static_cast<unsigned>(frames.size() - sent), 0);
+      if (n <= 0) {
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0 && is_down(errno)) health.state = CanBusState::down;
+        health.send_refused += frames.size() - sent;
+        break;
+      }
+      sent += static_cast<std::size_t>(n);
+      if (health.state == CanBusState::down) health.state = CanBusState::active;
+    }
+    return sent;
+  }
+
+  std::size_t receive(std::span<CanFrame> frames, std::uint8_t number, std::int64_t now) noexcept {
+    canfd_frame raw[kBatch];
+    iovec part[kBatch];
+    mmsghdr message[kBatch]{};
+    alignas(cmsghdr) char control[kBatch][kArrivalControlBytes];
+    std::size_t count = 0;
+    arrivals.begin(now);
+    while (count < frames.size()) {
+      const std::size_t asked = std::min(kBatch, frames.size() - count);
+      for (std::size_t i = 0; i < asked; ++i) {
+        part[i] = {&raw[i], sizeof(raw[i])};
+        message[i].msg_hdr = {};
+        message[i].msg_hdr.msg_iov = &part[i];
+        message[i].msg_hdr.msg_iovlen = 1;
+        message[i].msg_hdr.msg_control = control[i];
+        message[i].msg_hdr.msg_controllen = sizeof(control[i]);
+      }
+      const int n = recvmmsg(fd, message, static_cast<unsigned>(asked), MSG_DONTWAIT, nullptr);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0 && is_down(errno)) health.state = CanBusState::down;
+      if (n <= 0) break;
+      for (int i = 0; i < n; ++i) {
+        frames[count].bus = number;
+        frames[count].t_rx_ns = arrivals.arrival_ns(message[i].msg_hdr);
+        if (take(raw[i], frames[count])) ++count;
+      }
+      if (static_cast<std::size_t>(n) < asked) break;
+    }
+    return count;
+  }
 
   std::string interface;
   int fd;
@@ -105,9 +165,9 @@ struct SocketCan::Bus {
 
 SocketCan::SocketCan(const std::vector<std::string>& interfaces,
                      const std::vector<std::uint16_t>& identifiers) {
-  if (interfaces.empty() || interfaces.size() > kLargestBusCount)
-    throw StageError(fmt::format("can: {} interfaces are unsupported; give 1 to {}",
-                                 interfaces.size(), kLargestBusCount));
+  require<StageError>(!interfaces.empty() && interfaces.size() <= kLargestBusCount,
+                      "can: {} interfaces are unsupported; give 1 to {}", interfaces.size(),
+                      kLargestBusCount);
   for (const std::string& interface : interfaces) {
     buses_.push_back(std::make_unique<Bus>(interface));
     configure(buses_.back()->fd, interface, identifiers);
@@ -138,81 +198,12 @@ std::size_t SocketCan::send(std::span<const CanFrame> frames) noexcept {
   return sent;
 }
 
-std::size_t SocketCan::Bus::send(std::span<const CanFrame> frames) noexcept {
-  canfd_frame raw[kBatch];
-  iovec part[kBatch];
-  mmsghdr message[kBatch]{};
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    raw[i] = to_kernel(frames[i]);
-    part[i] = {&raw[i], sizeof(raw[i])};
-    message[i].msg_hdr.msg_iov = &part[i];
-    message[i].msg_hdr.msg_iovlen = 1;
-  }
-  std::size_t sent = 0;
-  while (sent < frames.size()) {
-    const int n = sendmmsg(fd, message + sent, static_cast<unsigned>(frames.size() - sent), 0);
-    if (n <= 0) {
-      if (n < 0 && errno == EINTR) continue;
-      failed(n < 0 ? errno : 0, frames.size() - sent);
-      break;
-    }
-    sent += static_cast<std::size_t>(n);
-    if (health.state == CanBusState::down) health.state = CanBusState::active;
-  }
-  return sent;
-}
-
 std::size_t SocketCan::receive(std::span<CanFrame> frames) noexcept {
   std::size_t count = 0;
   const std::int64_t now = now_ns();
   for (std::size_t bus = 0; bus < buses_.size(); ++bus)
     count += buses_[bus]->receive(frames.subspan(count), static_cast<std::uint8_t>(bus), now);
   return count;
-}
-
-std::size_t SocketCan::Bus::receive(std::span<CanFrame> frames, std::uint8_t number,
-                                    std::int64_t now) noexcept {
-  canfd_frame raw[kBatch];
-  iovec part[kBatch];
-  mmsghdr message[kBatch]{};
-  alignas(cmsghdr) char control[kBatch][kArrivalControlBytes];
-  std::size_t count = 0;
-  arrivals.begin(now);
-  while (count < frames.size()) {
-    const std::size_t asked = std::min(kBatch, frames.size() - count);
-    for (std::size_t i = 0; i < asked; ++i) {
-      part[i] = {&raw[i], sizeof(raw[i])};
-      message[i].msg_hdr = {};
-      message[i].msg_hdr.msg_iov = &part[i];
-      message[i].msg_hdr.msg_iovlen = 1;
-      message[i].msg_hdr.msg_control = control[i];
-      message[i].msg_hdr.msg_controllen = sizeof(control[i]);
-    }
-    const int n = recvmmsg(fd, message, static_cast<unsigned>(asked), MSG_DONTWAIT, nullptr);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0 && is_down(errno)) health.state = CanBusState::down;
-    if (n <= 0) break;
-    for (int i = 0; i < n; ++i) {
-      frames[count].bus = number;
-      frames[count].t_rx_ns = arrivals.arrival_ns(message[i].msg_hdr);
-      if (take(raw[i], frames[count])) ++count;
-    }
-    if (static_cast<std::size_t>(n) < asked) break;
-  }
-  return count;
-}
-
-// @returns false for an error frame: it updates the bus state and has no data.
-bool SocketCan::Bus::take(const canfd_frame& raw, CanFrame& frame) noexcept {
-  if ((raw.can_id & CAN_ERR_FLAG) != 0) {
-    ++health.error_frames;
-    health.state = can_state_after_error(health.state, raw.can_id & CAN_ERR_MASK, raw.data[1]);
-    return false;
-  }
-  frame.id = static_cast<std::uint16_t>(raw.can_id & CAN_SFF_MASK);
-  frame.length = std::min<std::uint8_t>(raw.len, sizeof(raw.data));
-  std::copy_n(raw.data, frame.length, frame.data.begin());
-  return true;
 }
 
 void SocketCan::wait(std::int64_t until_ns) noexcept {

@@ -2,7 +2,6 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -20,6 +19,7 @@
 
 #include "hal/modbus/modbus_frame.hpp"
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -77,16 +77,15 @@ void ModbusServer::hang_up(const Line& line) {
 void ModbusServer::open() {
   modbus_t* modbus = context_.get();
   if (address_.serial()) {
-    if (modbus_connect(modbus) != 0)
-      throw StageError(
-          fmt::format("{}: cannot be opened: {}", to_string(address_), modbus_strerror(errno)));
+    const bool opened = modbus_connect(modbus) == 0;
+    require<StageError>(opened, "{}: cannot be opened: {}", to_string(address_),
+                        modbus_strerror(errno));
     lines_.push_back({modbus_get_socket(modbus), ++last_connection_, {}, {}, monotonic_ns()});
     return;
   }
   listener_ = modbus_tcp_listen(modbus, kBacklog);
-  if (listener_ < 0)
-    throw StageError(fmt::format("{}: cannot listen: {}; use another port", to_string(address_),
-                                 std::strerror(errno)));
+  require<StageError>(listener_ >= 0, "{}: cannot listen: {}; use another port",
+                      to_string(address_), std::strerror(errno));
   fcntl(listener_, F_SETFL, fcntl(listener_, F_GETFL) | O_NONBLOCK);
   // The connections inherit this: clients that do not read are detected early and use little memory.
   setsockopt(listener_, SOL_SOCKET, SO_SNDBUF, &kSocketBuffer, sizeof kSocketBuffer);

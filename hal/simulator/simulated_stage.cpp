@@ -71,45 +71,40 @@ struct SimulatedStage::State {
   int run = -1;
   bool running = false;
 
-  bool take_command(std::span<const double> command, bool missed, bool off) noexcept;
-  void drive() noexcept;
-  void measure() noexcept;
-};
-
-// Computes the amplifiers' output. @returns false if the command is not finite and was refused.
-bool SimulatedStage::State::take_command(std::span<const double> command, bool missed,
-                                         bool off) noexcept {
-  const bool good = missed || all_finite(command);
-  if (!missed && good) std::copy(command.begin(), command.end(), commanded.begin());
-  u = commanded;
-  if (off) u.setZero();
-  if (spec.actuator_quantum_n > 0.0) quantize(u, spec.actuator_quantum_n);
-  if (spec.actuator_saturation_n > 0.0)
-    u = u.min(spec.actuator_saturation_n).max(-spec.actuator_saturation_n);
-  if (!faults.empty() && !off)
-    faults.drive(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
-  applied = u;
-  return good;
-}
-
-void SimulatedStage::State::drive() noexcept {
-  noise.next();
-  u += Eigen::Map<const Eigen::ArrayXd>(noise.force_n(), u.size());
-  if (spec.cubic_stiffness_n_m3 > 0.0) {
-    // The nonlinear force is sampled and held over the interval, so the discretization remains exact.
-    const double shape = 1.0 / std::sqrt(spec.mass_kg);
-    const double z_m = shape * plant.coordinate(kHeaveMode);
-    plant.add_modal_force(kHeaveMode, -shape * spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);
+  // Computes the amplifiers' output. @returns false if the command is not finite and was refused.
+  bool take_command(std::span<const double> command, bool missed, bool off) noexcept {
+    const bool good = missed || all_finite(command);
+    if (!missed && good) std::copy(command.begin(), command.end(), commanded.begin());
+    u = commanded;
+    if (off) u.setZero();
+    if (spec.actuator_quantum_n > 0.0) quantize(u, spec.actuator_quantum_n);
+    if (spec.actuator_saturation_n > 0.0)
+      u = u.min(spec.actuator_saturation_n).max(-spec.actuator_saturation_n);
+    if (!faults.empty() && !off)
+      faults.drive(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
+    applied = u;
+    return good;
   }
-  plant.step(u.data());
-}
 
-void SimulatedStage::State::measure() noexcept {
-  last_y = y;
-  plant.output(y.data());
-  y += Eigen::Map<const Eigen::ArrayXd>(noise.sensor_m(), y.size());
-  if (spec.sensor_quantum_m > 0.0) quantize(y, spec.sensor_quantum_m);
-}
+  void drive() noexcept {
+    noise.next();
+    u += Eigen::Map<const Eigen::ArrayXd>(noise.force_n(), u.size());
+    if (spec.cubic_stiffness_n_m3 > 0.0) {
+      // The nonlinear force is sampled and held over the interval, so the discretization remains exact.
+      const double shape = 1.0 / std::sqrt(spec.mass_kg);
+      const double z_m = shape * plant.coordinate(kHeaveMode);
+      plant.add_modal_force(kHeaveMode, -shape * spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);
+    }
+    plant.step(u.data());
+  }
+
+  void measure() noexcept {
+    last_y = y;
+    plant.output(y.data());
+    y += Eigen::Map<const Eigen::ArrayXd>(noise.sensor_m(), y.size());
+    if (spec.sensor_quantum_m > 0.0) quantize(y, spec.sensor_quantum_m);
+  }
+};
 
 SimulatedStage::SimulatedStage(const WaferStageSpec& spec)
     : state_(std::make_unique<State>(spec)) {}

@@ -7,7 +7,8 @@
 
 namespace stageid {
 
-/// @throws Error with the formatted text unless `holds`.
+/// @throws Error with the formatted text unless `holds`. The order in which the arguments are computed is not defined: a
+/// call that sets errno comes before.
 template <typename Error = std::invalid_argument, typename... Args>
 void require(bool holds, fmt::format_string<Args...> text, Args&&... args) {
   if (!holds) throw Error(fmt::format(text, std::forward<Args>(args)...));
