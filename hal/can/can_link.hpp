@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "hal/can/can_encoding.hpp"
-#include "hal/can/can_layout.hpp"
 #include "hal/can/can_transport.hpp"
 
 namespace stageid {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <span>
 
-#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/require.hpp"
 

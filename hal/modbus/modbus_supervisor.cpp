@@ -7,7 +7,6 @@
 #include <chrono>
 #include <utility>
 
-#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/stage/pacer.hpp"

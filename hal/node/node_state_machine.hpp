@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "hal/stage/stage.hpp"
 #include "hal/stage/supervisor.hpp"
 

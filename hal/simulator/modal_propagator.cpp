@@ -1,7 +1,5 @@
 #include "hal/simulator/modal_propagator.hpp"
 
-#include <cmath>
-
 namespace stageid {
 
 // In the time unit of one halved step h the state is x = [q; h q'], x' = A x + [0; h^2 f]. With

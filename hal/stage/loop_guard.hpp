@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
-#include <span>
 
 #include "hal/stage/limits.hpp"
 #include "hal/stage/stage.hpp"

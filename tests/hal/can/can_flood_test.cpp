@@ -4,9 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"

@@ -5,14 +5,12 @@
 
 #include <cstring>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "hal/can/can_resident_stage.hpp"
-#include "hal/stage/peer_status.hpp"
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/resident_bytes.hpp"

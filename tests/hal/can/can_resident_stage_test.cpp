@@ -5,9 +5,6 @@
 
 #include <cmath>
 #include <functional>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "hal/stage/motion_controller.hpp"
 #include "tests/hal/can/can_rig.hpp"

@@ -3,10 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
-#include <string>
-#include <vector>
 
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/hal/can/can_host.hpp"

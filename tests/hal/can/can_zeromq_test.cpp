@@ -4,8 +4,6 @@
 #include <zmq.h>
 
 #include <array>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "hal/can/can_encoding.hpp"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <string_view>
-#include <vector>
 
 namespace stageid {
 namespace test_modbus_frame {

@@ -4,14 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
-#include "hal/modbus/modbus_session.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"

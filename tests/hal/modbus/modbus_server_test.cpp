@@ -2,7 +2,6 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/resource.h>
@@ -10,9 +9,7 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <random>
-#include <vector>
 
 #include "hal/modbus/modbus_frame.hpp"
 #include "hal/modbus/modbus_link.hpp"

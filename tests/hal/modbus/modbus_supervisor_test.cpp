@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
-#include <thread>
 
-#include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"

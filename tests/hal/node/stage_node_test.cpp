@@ -5,8 +5,6 @@
 
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <vector>
 
 #include "tests/hal/node/small_node.hpp"
 #include "tests/hal/stage/fake_stage.hpp"

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <tuple>
-#include <vector>
 
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/simulator/simulated_stage.hpp"

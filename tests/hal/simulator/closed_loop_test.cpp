@@ -7,9 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"

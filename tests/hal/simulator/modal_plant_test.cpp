@@ -11,7 +11,6 @@
 #include <stdexcept>
 #include <string>
 #include <unsupported/Eigen/MatrixFunctions>
-#include <vector>
 
 #include "hal/simulator/modal_propagator.hpp"
 #include "tests/support/stages/wafer_stage.hpp"

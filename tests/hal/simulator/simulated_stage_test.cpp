@@ -6,11 +6,8 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
-#include <memory>
 #include <numbers>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "hal/simulator/modal_plant.hpp"
 #include "tests/hal/simulator/closed_loop.hpp"

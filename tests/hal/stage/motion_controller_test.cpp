@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
-#include <vector>
 
 #include "hal/simulator/rigid_body.hpp"
 #include "tests/support/stages/wafer_stage.hpp"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <ctime>
-
 namespace stageid {
 namespace test_pacer {
 

@@ -5,9 +5,6 @@
 
 #include <cctype>
 #include <functional>
-#include <optional>
-#include <set>
-#include <string>
 #include <vector>
 
 #include "hal/modbus/modbus_encoding.hpp"

@@ -5,9 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <string>
 #include <utility>
-#include <vector>
 
 namespace stageid {
 namespace test_stage {
