@@ -10,9 +10,10 @@
 
 namespace stageid::test {
 
-/// Of a call: it throws a StageError with this text.
-inline auto refuses(const std::string& text) {
-  return testing::ThrowsMessage<StageError>(testing::HasSubstr(text));
+/// Of a call: it throws this error with this text.
+template <typename Error = StageError>
+auto refuses(const std::string& text) {
+  return testing::ThrowsMessage<Error>(testing::HasSubstr(text));
 }
 
 /// Exchanges with a stage in open loop; commands and measurements are accessible.

@@ -2,35 +2,26 @@
 
 #include "hal/plugin/plugin_stage.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_plugin_stage {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+auto loading(const char* library) {
+  return [library] { const PluginStage stage({}, {library, {}}, 0.0); };
+}
 
 TEST(PluginStage, NamesALibraryThatIsNotThere) {
-  EXPECT_THAT(
-      [] {
-        PluginStage({}, {"/nowhere/stage.so", {}}, 0.0);
-      },
-      ThrowsMessage<StageError>(HasSubstr("/nowhere/stage.so: cannot be loaded")));
+  EXPECT_THAT(loading("/nowhere/stage.so"), test::refuses("/nowhere/stage.so: cannot be loaded"));
 }
 
 TEST(PluginStage, RefusesALibraryWithoutTheInterface) {
-  EXPECT_THAT(
-      [] {
-        PluginStage({}, {"libm.so.6", {}}, 0.0);
-      },
-      ThrowsMessage<StageError>(HasSubstr("cannot be loaded")))
+  EXPECT_THAT(loading("libm.so.6"), test::refuses("cannot be loaded"))
       << "not looked for in the system's folders";
-  EXPECT_THAT(
-      [] {
-        PluginStage({}, {"/lib/x86_64-linux-gnu/libm.so.6", {}}, 0.0);
-      },
-      ThrowsMessage<StageError>(HasSubstr("has no function stageid_get_backend()")));
+  EXPECT_THAT(loading("/lib/x86_64-linux-gnu/libm.so.6"),
+              test::refuses("has no function stageid_get_backend()"));
 }
 
 }  // namespace test_plugin_stage

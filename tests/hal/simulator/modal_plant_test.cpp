@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <complex>
 #include <fstream>
 #include <limits>
 #include <numbers>
@@ -13,6 +12,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "hal/simulator/modal_propagator.hpp"
+#include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
@@ -137,18 +137,9 @@ TEST(ModalPlant, ReachesTheClosedFormFrequencyResponse) {
   constexpr int kPeriods = 3;  // slowest decay 0.3 * 2 pi 100 Hz: exp(-38) after two periods
   ModalPlant plant(modes, spec.delay_s, rate_hz);
   for (const int line : {1, 7, 20, 83, 199, 320, 499}) {
-    const double angle = kTwoPi * line / kPeriod;
-    plant.reset();
-    Eigen::VectorXcd y = Eigen::VectorXcd::Zero(plant.sensors());
-    VectorXd u = VectorXd::Zero(plant.actuators());
-    VectorXd sample(plant.sensors());
     const Eigen::Index input = line % 17;
-    for (int n = 0; n < kPeriods * kPeriod; ++n) {
-      plant.output(sample.data());
-      if (n >= (kPeriods - 1) * kPeriod) y += sample * std::polar(2.0 / kPeriod, -angle * n);
-      u[input] = std::cos(angle * n);
-      plant.step(u.data());
-    }
+    const Eigen::VectorXcd y = test::measured_response(
+        plant, VectorXd::Unit(plant.actuators(), input), {line, kPeriod, kPeriods});
     const Eigen::VectorXcd exact =
         sampled_response(modes, spec.delay_s, rate_hz, line * rate_hz / kPeriod).col(input);
     EXPECT_LT((y - exact).norm(), 1e-9 * exact.norm()) << "line " << line;

@@ -8,6 +8,7 @@
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/simulator/simulated_stage.hpp"
+#include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
@@ -171,19 +172,9 @@ Eigen::MatrixXcd run_response(const std::vector<PlantMode>& modes, double delay_
                               int line, int period) {
   ModalPlant plant(modes, delay_s, rate_hz);
   Eigen::MatrixXcd response(plant.sensors(), plant.actuators());
-  Eigen::VectorXd y(plant.sensors());
-  for (Eigen::Index j = 0; j < plant.actuators(); ++j) {
-    plant.reset();
-    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(plant.sensors());
-    for (int n = 0; n < 40 * period; ++n) {
-      const double angle = 2.0 * std::numbers::pi * line * n / period;
-      plant.output(y.data());
-      if (n >= 39 * period) sum += y * std::polar(2.0 / period, -angle);
-      const Eigen::VectorXd u = Eigen::VectorXd::Unit(plant.actuators(), j) * std::cos(angle);
-      plant.step(u.data());
-    }
-    response.col(j) = sum;
-  }
+  for (Eigen::Index j = 0; j < plant.actuators(); ++j)
+    response.col(j) = test::measured_response(plant, Eigen::VectorXd::Unit(plant.actuators(), j),
+                                              {line, period, 40});
   return response;
 }
 

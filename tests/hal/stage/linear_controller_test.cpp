@@ -1,6 +1,5 @@
 #include "hal/stage/linear_controller.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,13 +10,12 @@
 #include "hal/simulator/loop_stability.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/controller_sections.hpp"
+#include "tests/hal/measured_response.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_linear_controller {
-
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 constexpr double kRateHz = 1000.0;
 
@@ -44,21 +42,6 @@ MotionControllerSpec with_transfer(const std::vector<double>& numerator,
   MotionControllerSpec spec = open_spec(1, 1);
   spec.transfer = {{0, 0, numerator, denominator}};
   return spec;
-}
-
-/// The response measured sample by sample, in the last of some periods.
-Eigen::VectorXcd measured(MotionController& controller, const Eigen::VectorXd& direction, int line,
-                          int period) {
-  controller.reset();
-  Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(controller.actuators());
-  Eigen::VectorXd u(controller.actuators());
-  for (int n = 0; n < 20 * period; ++n) {
-    const double angle = 2.0 * std::numbers::pi * line * n / period;
-    const Eigen::VectorXd y = direction * std::cos(angle);
-    controller.update(y.data(), u.data());
-    if (n >= 19 * period) sum += u * std::polar(2.0 / period, -angle);
-  }
-  return sum;
 }
 
 // Pure delays, odd and even orders, complex and repeated roots, fewer zeros than poles.
@@ -90,26 +73,23 @@ TEST(TransferSections, RunAsTheirQuotient) {
   MotionController controller(with_transfer(numerator, denominator));
   const std::complex<double> z = on_circle(5.0 * kRateHz / 100.0);
   const std::complex<double> exact = -polynomial(numerator, z) / polynomial(denominator, z);
-  EXPECT_LT(std::abs(measured(controller, Eigen::VectorXd::Ones(1), 5, 100)[0] - exact),
-            1e-9 * std::abs(exact));
+  const Eigen::VectorXcd measured =
+      test::measured_response(controller, Eigen::VectorXd::Ones(1), {5, 100, 20});
+  EXPECT_LT(std::abs(measured[0] - exact), 1e-9 * std::abs(exact));
 }
 
 TEST(TransferSections, RefuseWhatCannotBeComputed) {
-  EXPECT_THAT(
-      [] {
-        transfer_sections({0, 0, {1.0, 0.0, 0.0}, {1.0, -0.5}});
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("2 zeros and 1 poles")));
-  EXPECT_THAT(
-      [] {
-        transfer_sections({0, 0, {1.0}, {0.0, 0.0}});
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("denominator")));
-  EXPECT_THAT(
-      [] {
-        transfer_sections({0, 0, {std::nan("")}, {1.0}});
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("not finite")));
+  const auto refused = [](const std::vector<double>& numerator,
+                          const std::vector<double>& denominator, const char* text) {
+    EXPECT_THAT(
+        [&] {
+          transfer_sections({0, 0, numerator, denominator});
+        },
+        test::refuses<std::invalid_argument>(text));
+  };
+  refused({1.0, 0.0, 0.0}, {1.0, -0.5}, "2 zeros and 1 poles");
+  refused({1.0}, {0.0, 0.0}, "denominator");
+  refused({std::nan("")}, {1.0}, "not finite");
 }
 
 ControllerStateSpace random_system(Eigen::Index n, Eigen::Index actuators, Eigen::Index sensors) {
@@ -133,7 +113,8 @@ TEST(StateSpaceController, RunsAsItsMatricesSay) {
     const std::complex<double> z = on_circle(line * kRateHz / 100.0);
     const Eigen::MatrixXcd resolvent = inverse(z * Eigen::MatrixXcd::Identity(11, 11) - s.a);
     const Eigen::VectorXcd exact = -(s.c * resolvent * s.b + s.d) * direction;
-    EXPECT_LT((measured(controller, direction, line, 100) - exact).norm(), 1e-9 * exact.norm());
+    EXPECT_LT((test::measured_response(controller, direction, {line, 100, 20}) - exact).norm(),
+              1e-9 * exact.norm());
     EXPECT_LT((controller.response(line * kRateHz / 100.0) * direction - exact).norm(),
               1e-9 * exact.norm());
   }
@@ -144,7 +125,7 @@ TEST(StateSpaceController, RefusesMatricesThatDoNotFit) {
   spec.state_space = random_system(4, 3, 2);
   spec.state_space.b.conservativeResize(4, 3);
   EXPECT_THAT([&] { MotionController{spec}; },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("matrix B is 4 x 3; expected 4 x 2")));
+              test::refuses<std::invalid_argument>("matrix B is 4 x 3; expected 4 x 2"));
 }
 
 TEST(StateSpaceController, OnlyAFeedthroughIsAController) {

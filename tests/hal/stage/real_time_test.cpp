@@ -1,6 +1,5 @@
 #include "hal/stage/real_time.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/resource.h>
@@ -13,13 +12,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "hal/stage/stage.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_real_time {
-
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 bool this_kernel_is_rt() {
   utsname name{};
@@ -111,16 +107,11 @@ TEST(RealTime, ThePriorityOfTheAskingThreadStaysWhatItWas) {
 }
 
 TEST(RealTime, RefusesWhatCannotBe) {
-  EXPECT_THAT(
-      [] {
-        RealTime({RealTimePolicy::attempt, 100, -1, false});
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("1 to 99")));
-  EXPECT_THAT(
-      [] {
-        RealTime({RealTimePolicy::attempt, 80, 100'000, false});
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("100000")));
+  const auto asking = [](int priority, int cpu) {
+    return [=] { const RealTime real_time({RealTimePolicy::attempt, priority, cpu, false}); };
+  };
+  EXPECT_THAT(asking(100, -1), test::refuses<std::invalid_argument>("1 to 99"));
+  EXPECT_THAT(asking(80, 100'000), test::refuses<std::invalid_argument>("100000"));
 }
 
 }  // namespace test_real_time
