@@ -10,6 +10,7 @@
 #include "hal/can/can_stage.hpp"
 #include "hal/can/faulty_can.hpp"
 #include "hal/node/stage_node.hpp"
+#include "tests/hal/node/small_node.hpp"
 #include "tests/support/stages/can_pair.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -58,13 +59,8 @@ class CanRig {
     WaferStageSpec spec = small_stage_spec();
     spec.limits.actuator_n = Eigen::VectorXd::Constant(2, 50.0);
     spec.limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-3);
-    AxisController axis;
-    axis.crossover_hz = 10.0;
-    axis.gain = 100.0;
-    spec.controller.sample_rate_hz = spec.info.sample_rate_hz;
-    spec.controller.sensor_decoupling = Eigen::MatrixXd::Ones(1, 1);
-    spec.controller.actuator_decoupling = Eigen::MatrixXd::Ones(2, 1);
-    spec.controller.axes = {axis};
+    spec.controller = one_axis_controller(spec.info.sample_rate_hz, 10.0, 100.0);
+    spec.controller.actuator_decoupling.setOnes();
     return spec;
   }
 

@@ -71,20 +71,14 @@ class ModbusBench {
   explicit ModbusBench(const std::vector<std::string>& faults = {}, bool serial = false,
                        double heartbeat_s = 1.0, NodePanel panel = good_panel())
       : script_(modbus_faults(faults)),
-        node_(make_stage(&fake), limits(), one_axis_controller(50.0, 1.0, 1.0), std::move(panel),
-              {10.0, 0.01}),
-        registers_(node_, limits(), kBootId, &script_, heartbeat_s),
+        node_(make_stage(&fake), small_limits(), one_axis_controller(50.0, 1.0, 1.0),
+              std::move(panel), {10.0, 0.01}),
+        registers_(node_, small_limits(), kBootId, &script_, heartbeat_s),
         server_(std::make_unique<ServerThread>(registers_, &script_, serial)) {}
 
   static constexpr std::uint32_t kBootId = 4711;
 
   static StageInfo info() { return FakeStage(2, 1, 50.0).info(); }
-  static StageLimits limits() {
-    StageLimits limits;
-    limits.actuator_n = Eigen::Vector2d(10.0, 10.0);
-    limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-2);
-    return limits;
-  }
 
   ModbusAddress address() const { return server_->address(); }
   StageNode& node() { return node_; }

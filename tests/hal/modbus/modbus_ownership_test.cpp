@@ -130,7 +130,7 @@ TEST_F(Registers, TheHeartbeatIsCountedByOneConnection) {
 
 TEST_F(Registers, TheRunOfAnotherDoorIsLeftAlone) {
   begin();
-  ModbusNode other_door(bench_->node(), ModbusBench::limits(), 5, nullptr);
+  ModbusNode other_door(bench_->node(), test::small_limits(), 5, nullptr);
   const auto give = [&](int first, const std::vector<std::uint16_t>& words) {
     other_door.begin_request(kOwner);
     return other_door.write(first, words);
@@ -201,7 +201,7 @@ TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
   before.stop();
   ModbusBench after;
   after.stop();
-  ModbusNode restarted(after.node(), ModbusBench::limits(), ModbusBench::kBootId + 1, nullptr);
+  ModbusNode restarted(after.node(), test::small_limits(), ModbusBench::kBootId + 1, nullptr);
   test::RegistersThrough line(before.registers());  // several nodes in turn on one line
   const test::ServerThread server(line, nullptr, true);
   test::ModbusHost host(server.address());

@@ -16,6 +16,14 @@ inline NodePanel good_panel() {
   return panel;
 }
 
+/// Of two actuators and one sensor.
+inline StageLimits small_limits() {
+  StageLimits limits;
+  limits.actuator_n = Eigen::Vector2d(10.0, 10.0);
+  limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-2);
+  return limits;
+}
+
 /// The only sensor is at the first of two actuators.
 inline MotionControllerSpec one_axis_controller(double sample_rate_hz, double crossover_hz,
                                                 double gain_n_per_m) {

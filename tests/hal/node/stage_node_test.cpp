@@ -28,14 +28,8 @@ class StageNodeTest : public testing::Test {
   StageNodeTest() {
     auto fake = std::make_unique<test::FakeStage>(2, 1, kRate_hz);
     fake_ = fake.get();
-    StageLimits limits;
-    limits.actuator_n = Eigen::Vector2d(10.0, 10.0);
-    limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-2);
-    NodeOptions options;
-    options.watchdog_s = 0.02;
-    options.hold_s = 0.1;
-    node_ = std::make_unique<StageNode>(std::move(fake), limits, controller(), test::good_panel(),
-                                        options);
+    node_ = std::make_unique<StageNode>(std::move(fake), test::small_limits(), controller(),
+                                        test::good_panel(), NodeOptions{0.02, 0.1});
     inputs_.y = y_;
   }
   void measure() {

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 
 #include "hal/stage/motion_controller.hpp"
-#include "hal/stage/stage.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid::test {
 
@@ -12,37 +11,29 @@ namespace stageid::test {
 class ClosedLoop {
  public:
   ClosedLoop(CyclicStage& stage, const MotionControllerSpec& controller)
-      : stage_(stage),
-        controller_(controller),
-        y_(Eigen::VectorXd::Zero(controller_.sensors())),
-        u_(Eigen::VectorXd::Zero(controller_.actuators())) {}
+      : driver_(stage), controller_(controller) {}
 
   void start(std::uint64_t run_seed) {
-    inputs_.y = {y_.data(), static_cast<std::size_t>(y_.size())};
     controller_.reset();
-    stage_.start(run_seed, inputs_);
+    driver_.start(run_seed);
   }
 
   /// Computes u[n], then exchanges the sample with the stage.
   Outcome step(const Eigen::VectorXd& excitation) {
-    controller_.update(y_.data(), u_.data());
-    u_ += excitation;
-    Outputs outputs;
-    outputs.cycle = inputs_.cycle;
-    outputs.u = {u_.data(), static_cast<std::size_t>(u_.size())};
-    return stage_.exchange(outputs, inputs_, {});
+    controller_.update(driver_.y.data(), driver_.u.data());
+    for (Eigen::Index i = 0; i < excitation.size(); ++i)
+      driver_.u[static_cast<std::size_t>(i)] += excitation[i];
+    return driver_.step();
   }
 
-  const Eigen::VectorXd& y() const { return y_; }  ///< after step(): y[n+1]
-  const Eigen::VectorXd& u() const { return u_; }
-  const Inputs& inputs() const { return inputs_; }
+  auto y() const {
+    return Eigen::VectorXd::Map(driver_.y.data(), controller_.sensors());
+  }  ///< after step(): y[n+1]
+  auto u() const { return Eigen::VectorXd::Map(driver_.u.data(), controller_.actuators()); }
 
  private:
-  CyclicStage& stage_;
+  Driver driver_;
   MotionController controller_;
-  Eigen::VectorXd y_;
-  Eigen::VectorXd u_;
-  Inputs inputs_;
 };
 
 }  // namespace stageid::test

@@ -37,12 +37,10 @@ class LimitedStageTest : public testing::Test {
   void start() { stage_->start(42, inputs_); }
   Outcome give(double u0, double u1 = 0.0) {
     const std::vector<double> u{u0, u1};
-    Outputs outputs;
-    outputs.cycle = inputs_.cycle;
-    outputs.u = u;
-    return stage_->exchange(outputs, inputs_, {});
+    return stage_->exchange({inputs_.cycle, u}, inputs_, {});
   }
   const std::vector<double>& reached() const { return fake_->commands.back(); }
+  std::string said() const { return describe(stage_->violation(), stage_->info()); }
 
   test::FakeStage* fake_ = nullptr;
   std::unique_ptr<LimitedStage> stage_;
@@ -85,8 +83,7 @@ TEST_F(LimitedStageTest, ClampsAndSaysWhichActuatorWhereAndWhen) {
   EXPECT_EQ(violation.limit, 20.0);
   EXPECT_EQ(violation.cycle, 1U);
   EXPECT_FALSE(violation.of_sensor);
-  EXPECT_EQ(describe(violation, stage_->info()),
-            "actuator b: |u| would be 25 N, limit 20 N (cycle 1)");
+  EXPECT_EQ(said(), "actuator b: |u| would be 25 N, limit 20 N (cycle 1)");
 }
 
 TEST_F(LimitedStageTest, KeepsSayingSoUntilStopAndForgetsAtStart) {
@@ -110,8 +107,7 @@ TEST_F(LimitedStageTest, LimitsTheSlewFromSampleToSample) {
   EXPECT_EQ(stage_->violation().kind, LimitKind::slew);
   EXPECT_DOUBLE_EQ(stage_->violation().value, -9e3);
   EXPECT_DOUBLE_EQ(stage_->violation().limit, 8e3);
-  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "actuator a: slew would be 9000 N/s, limit 8000 N/s (cycle 0)");
+  EXPECT_EQ(said(), "actuator a: slew would be 9000 N/s, limit 8000 N/s (cycle 0)");
   // The next step counts from the applied command, not from the requested one.
   give(1.0);
   EXPECT_DOUBLE_EQ(reached()[0], 0.0);
@@ -143,8 +139,7 @@ TEST_F(LimitedStageTest, ReplacesWhatIsNoNumberByTheLastGoodCommand) {
   EXPECT_EQ(give(kNan, 5.0), Outcome::limit);
   EXPECT_THAT(reached(), testing::ElementsAre(3.0, 5.0));
   EXPECT_EQ(stage_->violation().kind, LimitKind::not_finite);
-  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "actuator a: the command is not finite (cycle 1)");
+  EXPECT_EQ(said(), "actuator a: the command is not finite (cycle 1)");
   give(4.0, kInfinity);
   EXPECT_THAT(reached(), testing::ElementsAre(4.0, 5.0));
 }
@@ -158,8 +153,7 @@ TEST_F(LimitedStageTest, ReportsAPositionPastItsWindow) {
   EXPECT_EQ(stage_->violation().channel, 1);
   EXPECT_EQ(stage_->violation().cycle, 1U);
   EXPECT_TRUE(stage_->violation().of_sensor);
-  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "sensor t: |y| is 0.0015 m, limit 0.001 m (cycle 1)");
+  EXPECT_EQ(said(), "sensor t: |y| is 0.0015 m, limit 0.001 m (cycle 1)");
 }
 
 TEST_F(LimitedStageTest, HoldsTheLastMeasurementInPlaceOfNan) {
@@ -171,8 +165,7 @@ TEST_F(LimitedStageTest, HoldsTheLastMeasurementInPlaceOfNan) {
   EXPECT_THAT(y_, testing::ElementsAre(5e-4, 6e-4, 3e-4));
   EXPECT_EQ(inputs_.valid, 0b011U);
   EXPECT_EQ(stage_->violation().kind, LimitKind::not_finite);
-  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "sensor u: the measurement is not finite (cycle 2)");
+  EXPECT_EQ(said(), "sensor u: the measurement is not finite (cycle 2)");
   EXPECT_EQ(give(7.0), Outcome::opened);
   EXPECT_THAT(reached(), testing::ElementsAre(0.0, 0.0)) << "no control on a sensor that failed";
   EXPECT_THAT(inputs_.applied, testing::ElementsAre(0.0, 0.0));
@@ -230,8 +223,7 @@ TEST_F(StuckSensorTest, IsReportedAfterItsTime) {
   for (int n = 1; n <= 3; ++n) EXPECT_EQ(show(1e-5 * n, 2e-5, 1e-5 * n), Outcome::ok) << n;
   EXPECT_EQ(show(4e-5, 2e-5, 4e-5), Outcome::ok);  // four equal values: repeated three times
   EXPECT_EQ(show(5e-5, 2e-5, 5e-5), Outcome::opened);
-  EXPECT_EQ(describe(stage_->violation(), stage_->info()),
-            "sensor t: has repeated the value 2e-05 m for 0.004 s (cycle 5)");
+  EXPECT_EQ(said(), "sensor t: has repeated the value 2e-05 m for 0.004 s (cycle 5)");
 }
 
 TEST_F(StuckSensorTest, AChangeBeginsAnew) {

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/hal/stage_bench.hpp"
+
 namespace stageid {
 namespace test_replay_stage {
 
@@ -54,81 +56,78 @@ ReplayStage stage(std::vector<Recorded> runs, double tolerance_n = 1e-9) {
   return {info(), std::make_unique<MemorySource>(std::move(runs)), tolerance_n};
 }
 
-class ReplayTest : public testing::Test {
- protected:
-  ReplayTest() { inputs_.y = y_; }
-  Outcome give(ReplayStage& stage, double u0, double u1) {
-    const std::vector<double> u{u0, u1};
-    Outputs outputs;
-    outputs.u = u;
-    return stage.exchange(outputs, inputs_, {});
+/// Replays, starting with the first run.
+struct Host : test::Driver {
+  explicit Host(ReplayStage& stage) : Driver(stage) { start(); }
+  Outcome give(double u0, double u1) {
+    u = {u0, u1};
+    return step();
   }
-  std::vector<double> y_ = std::vector<double>(1);
-  Inputs inputs_;
 };
 
-TEST_F(ReplayTest, GivesTheRecordSampleBySample) {
+TEST(ReplayTest, GivesTheRecordSampleBySample) {
   ReplayStage replay = stage({recorded(0.0), recorded(100.0)});
+  Host host(replay);
   for (const double offset : {0.0, 100.0}) {
-    replay.start(0, inputs_);
-    EXPECT_EQ(inputs_.cycle, 0U);
+    if (offset > 0.0) host.start();
+    EXPECT_EQ(host.inputs.cycle, 0U);
     for (int n = 0; n < 4; ++n) {
-      EXPECT_EQ(y_[0], 10.0 * (n + 1) + offset);
-      EXPECT_EQ(inputs_.valid, 1U);
-      EXPECT_EQ(give(replay, n + 1.0 + offset, n + 5.0 + offset), Outcome::ok);
-      EXPECT_EQ(inputs_.cycle, static_cast<std::uint64_t>(n + 1));
-      EXPECT_EQ(inputs_.t_sample_ns, 1'000'000 * (n + 1));
+      EXPECT_EQ(host.y[0], 10.0 * (n + 1) + offset);
+      EXPECT_EQ(host.inputs.valid, 1U);
+      EXPECT_EQ(host.give(n + 1.0 + offset, n + 5.0 + offset), Outcome::ok);
+      EXPECT_EQ(host.inputs.cycle, static_cast<std::uint64_t>(n + 1));
+      EXPECT_EQ(host.inputs.t_sample_ns, 1'000'000 * (n + 1));
     }
-    EXPECT_EQ(y_[0], 40.0 + offset) << "held after the last sample";
-    EXPECT_EQ(give(replay, 0.0, 0.0), Outcome::link_down);
-    EXPECT_EQ(inputs_.valid, 0U);
+    EXPECT_EQ(host.y[0], 40.0 + offset) << "held after the last sample";
+    EXPECT_EQ(host.give(0.0, 0.0), Outcome::link_down);
+    EXPECT_EQ(host.inputs.valid, 0U);
     replay.stop();
   }
   EXPECT_EQ(replay.mismatches(), 0U);
   EXPECT_EQ(replay.largest_mismatch_n(), 0.0);
 }
 
-TEST_F(ReplayTest, CountsCommandsThatDiffer) {
+TEST(ReplayTest, CountsCommandsThatDiffer) {
   ReplayStage replay = stage({recorded(0.0)}, 0.01);
-  replay.start(0, inputs_);
-  EXPECT_EQ(give(replay, 1.0, 5.005), Outcome::ok);
+  Host host(replay);
+  EXPECT_EQ(host.give(1.0, 5.005), Outcome::ok);
   EXPECT_EQ(replay.mismatches(), 0U);
-  EXPECT_EQ(give(replay, 2.5, 6.0), Outcome::ok);
+  EXPECT_EQ(host.give(2.5, 6.0), Outcome::ok);
   EXPECT_EQ(replay.mismatches(), 1U);
   EXPECT_DOUBLE_EQ(replay.largest_mismatch_n(), 0.5);
-  EXPECT_EQ(give(replay, std::numeric_limits<double>::quiet_NaN(), 0.0), Outcome::ok);
+  EXPECT_EQ(host.give(std::numeric_limits<double>::quiet_NaN(), 0.0), Outcome::ok);
   EXPECT_EQ(replay.mismatches(), 3U);
   EXPECT_DOUBLE_EQ(replay.largest_mismatch_n(), 7.0);
 }
 
-TEST_F(ReplayTest, PassesTheMarksOn) {
+TEST(ReplayTest, PassesTheMarksOn) {
   Recorded run = recorded(0.0);
   run.marked << 1, 0, 2, 0;
   ReplayStage replay = stage({run});
-  replay.start(0, inputs_);
-  EXPECT_EQ(inputs_.valid, 0U);
-  EXPECT_EQ(give(replay, 1, 5), Outcome::ok);
-  EXPECT_EQ(give(replay, 2, 6), Outcome::late);
-  EXPECT_EQ(give(replay, 3, 7), Outcome::ok);
+  Host host(replay);
+  EXPECT_EQ(host.inputs.valid, 0U);
+  EXPECT_EQ(host.give(1, 5), Outcome::ok);
+  EXPECT_EQ(host.give(2, 6), Outcome::late);
+  EXPECT_EQ(host.give(3, 7), Outcome::ok);
 }
 
-TEST_F(ReplayTest, StopsForGood) {
+TEST(ReplayTest, StopsForGood) {
   ReplayStage replay = stage({recorded(0.0)});
-  replay.start(0, inputs_);
+  Host host(replay);
   replay.stop();
   replay.stop();
-  EXPECT_EQ(give(replay, 1, 5), Outcome::link_down);
+  EXPECT_EQ(host.give(1, 5), Outcome::link_down);
 }
 
-TEST_F(ReplayTest, RefusesARunThatIsNotThereOrDoesNotFit) {
+TEST(ReplayTest, RefusesARunThatIsNotThereOrDoesNotFit) {
   ReplayStage one = stage({recorded(0.0)});
-  one.start(0, inputs_);
-  EXPECT_THROW(one.start(0, inputs_), StageError);
+  Host host(one);
+  EXPECT_THROW(host.start(), StageError);
   const auto refuse = [&](auto change) {
     Recorded run = recorded(0.0);
     change(run);
     ReplayStage replay = stage({run});
-    EXPECT_THROW(replay.start(0, inputs_), StageError);
+    EXPECT_THROW(Host{replay}, StageError);
   };
   refuse([](Recorded& r) { r.u.conservativeResize(1, 4); });
   refuse([](Recorded& r) { r.y.conservativeResize(2, 4); });
@@ -141,7 +140,7 @@ TEST_F(ReplayTest, RefusesARunThatIsNotThereOrDoesNotFit) {
   });
 }
 
-TEST_F(ReplayTest, RefusesBadArguments) {
+TEST(ReplayTest, RefusesBadArguments) {
   EXPECT_THROW(ReplayStage(info(), nullptr, 0.0), std::invalid_argument);
   EXPECT_THROW(stage({}, -1.0), std::invalid_argument);
   EXPECT_THROW(stage({}, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
@@ -155,8 +154,9 @@ TEST_F(ReplayTest, RefusesBadArguments) {
                std::invalid_argument);
   ReplayStage replay = stage({recorded(0.0)});
   std::vector<double> wrong(2);
-  inputs_.y = wrong;
-  EXPECT_THROW(replay.start(0, inputs_), std::invalid_argument);
+  Inputs inputs;
+  inputs.y = wrong;
+  EXPECT_THROW(replay.start(0, inputs), std::invalid_argument);
 }
 
 }  // namespace test_replay_stage
