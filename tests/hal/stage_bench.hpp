@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cctype>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,6 +15,13 @@ namespace stageid::test {
 template <typename Error = StageError>
 auto refuses(const std::string& text) {
   return testing::ThrowsMessage<Error>(testing::HasSubstr(text));
+}
+
+/// A text as the name of a test.
+inline std::string test_name(std::string text) {
+  for (char& c : text)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  return text;
 }
 
 /// Exchanges with a stage in open loop; commands and measurements are accessible.

@@ -44,7 +44,7 @@ class TickingNode {
     spec.node_clock = node_clock;
     // The transport of the pair lives longer than the host.
     return std::make_unique<CanStage>(rig_.stage_spec().info, spec,
-                                      std::make_unique<FaultyCan>(pair_.host(), faults_),
+                                      std::make_unique<CanThrough>(pair_.host()),
                                       CanHostOptions{.pace = 1.0});
   }
   int skip_at = -1;  ///< tick that does nothing
@@ -68,7 +68,6 @@ class TickingNode {
   DriftingEnd end_;
   StageNode node_;
   CanNode front_;
-  std::vector<CanFault> faults_;
   std::int64_t tick_ns_;
   std::int64_t next_ns_ = 0;
   int ticks_ = 0;
@@ -137,8 +136,7 @@ TEST(CanClock, ASimulatedNodeCanWaitForItsTicks) {
   CanRig rig;
   CanNode front(rig.node(), rig.layout(), rig.pair().node(), 0.0, true);
   rig.pair().when_host_waits([&] { front.serve(0); });
-  test::CanHost host(rig);
-  host.start();
+  test::RunningCanHost host(rig);
   const std::int64_t began_ns = monotonic_ns();
   EXPECT_EQ(host.exchange(10), test::all_ok(10));
   // The first tick may be near; a busy machine may be slower, never faster.

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cctype>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -8,6 +7,7 @@
 #include "hal/can/can_stage.hpp"
 #include "hal/can/faulty_can.hpp"
 #include "tests/hal/can/can_host.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_can_fault {
@@ -15,6 +15,7 @@ namespace test_can_fault {
 using test::all_ok;
 using test::CanRig;
 using Host = test::CanHost;
+using Running = test::RunningCanHost;
 using Wire = test::CanRigOptions;
 
 /// One row of the fault table: the faults of the wire, the host's result, the counts of both sides.
@@ -36,8 +37,7 @@ class WallClockFaults : public testing::TestWithParam<Row> {};
 TEST_P(WallClockFaults, CostTheirSampleOnly) {
   const Row& row = GetParam();
   CanRig rig(Wire{row.host_faults, row.node_faults});
-  Host host(rig, {1e3, false});
-  host.start();
+  Running host(rig, {1e3, false});
   std::vector<Outcome> expected = all_ok(10);
   expected[2] = row.third;
   std::vector<Outcome> outcomes;
@@ -78,31 +78,18 @@ INSTANTIATE_TEST_SUITE_P(
         Row{"setpoint damaged", {}, {"corrupt@2"}, Outcome::stale, {}, 1, 0, 1, 9},
         Row{"setpoint short", {}, {"shortened@2"}, Outcome::stale, {}, 1, 0, 1, 9},
         Row{"setpoint under another name", {}, {"foreign@2"}, Outcome::stale, {}, 1, 0, 1, 9}),
-    [](const auto& row) {
-      std::string name = row.param.name;
-      for (char& c : name)
-        if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-      return name;
-    });
+    [](const auto& row) { return test::test_name(row.param.name); });
 
 // In virtual time nothing moves while the host asks again, so the run equals that without the fault.
 TEST(CanStage, InVirtualTimeSingleFaultsHeal) {
-  CanRig clean;
-  Host reference(clean);
-  reference.start();
-  std::vector<double> y;
-  for (int n = 0; n < 20; ++n) {
-    reference.exchange();
-    y.push_back(reference.y()[0]);
-  }
+  const std::vector<double> y = test::undisturbed_can_run(20);
   for (const char* fault : {"lost@3", "corrupt@3", "shortened@3", "foreign@3", "swapped@3",
                             "late@3:0.007", "repeated@3", "lost@3x3"}) {
     for (const bool of_host : {false, true}) {
       test::CanRigOptions options;
       (of_host ? options.host_faults : options.node_faults) = {fault};
       CanRig rig(options);
-      Host host(rig);
-      host.start();
+      Running host(rig);
       for (std::size_t n = 0; n < 20; ++n) {
         ASSERT_EQ(host.exchange(), Outcome::ok) << fault << " " << of_host << " " << n;
         ASSERT_EQ(host.y()[0], y[n]) << fault << " " << of_host << " " << n;

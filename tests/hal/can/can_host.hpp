@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -43,6 +45,25 @@ class CanHost {
   Inputs inputs_;
   std::uint64_t cycle_ = 0;
 };
+
+/// The same after its start.
+struct RunningCanHost : CanHost {
+  explicit RunningCanHost(CanRig& rig, CanHostOptions options = {}) : CanHost(rig, options) {
+    start();
+  }
+};
+
+/// What the sensor measures in an undisturbed run.
+inline std::vector<double> undisturbed_can_run(int samples) {
+  CanRig rig;
+  RunningCanHost host(rig);
+  std::vector<double> y;
+  for (int n = 0; n < samples; ++n) {
+    EXPECT_EQ(host.exchange(), Outcome::ok);
+    y.push_back(host.y()[0]);
+  }
+  return y;
+}
 
 inline std::vector<Outcome> all_ok(int count) {
   return std::vector<Outcome>(static_cast<std::size_t>(count), Outcome::ok);

@@ -5,7 +5,6 @@
 
 #include <cstring>
 #include <deque>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -20,24 +19,12 @@ namespace test_can_ownership {
 
 using test::CanRig;
 using Host = test::CanHost;
+using Running = test::RunningCanHost;
 using test::refuses;
 using testing::HasSubstr;
 
-/// Result of an undisturbed run.
-std::vector<double> undisturbed(int samples) {
-  CanRig rig;
-  Host host(rig);
-  host.start();
-  std::vector<double> y;
-  for (int n = 0; n < samples; ++n) {
-    EXPECT_EQ(host.exchange(), Outcome::ok);
-    y.push_back(host.y()[0]);
-  }
-  return y;
-}
-
 TEST(CanOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
-  const std::vector<double> y = undisturbed(200);
+  const std::vector<double> y = test::undisturbed_can_run(200);
   CanRig rig;
   Host first(rig);
   Host second(rig);
@@ -101,10 +88,9 @@ class Forger {
 
 TEST(CanOwnership, TenThousandForgedFramesChangeNoSample) {
   constexpr int kSamples = 2500;  // four frames each
-  const std::vector<double> y = undisturbed(kSamples);
+  const std::vector<double> y = test::undisturbed_can_run(kSamples);
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   const std::uint32_t session = rig.node().session();
   Forger forger(rig);
   forger.avoid(can_tag(session));
@@ -122,10 +108,9 @@ TEST(CanOwnership, TenThousandForgedFramesChangeNoSample) {
 
 TEST(CanOwnership, AHundredThousandRandomFramesChangeNoSample) {
   constexpr int kSamples = 1000;
-  const std::vector<double> y = undisturbed(kSamples);
+  const std::vector<double> y = test::undisturbed_can_run(kSamples);
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   std::mt19937_64 engine(3);
   const std::size_t before = test::resident_bytes();
   for (std::size_t n = 0; n < y.size(); ++n) {
@@ -148,8 +133,7 @@ TEST(CanOwnership, AHundredThousandRandomFramesChangeNoSample) {
 
 TEST(CanOwnership, AnybodyMayAskForAQuickStop) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   rig.send_to_node(encode_can_command({.code = CanCommandCode::quick_stop, .host = 1}));
   rig.serve_ms(1);
   EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
@@ -246,8 +230,7 @@ TEST(CanOwnership, ANodeThatJoinsARunEndsIt) {
     a.front.serve(0);
     if (both) b.front.serve(0);
   });
-  Host host(rig);
-  host.start();
+  Running host(rig);
   EXPECT_THAT(host.exchange(20), testing::ElementsAreArray(test::all_ok(20)));
   hub.ends.push_back(&b.end);
   both = true;
@@ -266,11 +249,6 @@ Waveforms waveforms(int periods) {
   return w;
 }
 
-std::unique_ptr<CanResidentStage> resident(CanRig& rig) {
-  return std::make_unique<CanResidentStage>(rig.stage_spec().info, rig.spec(), rig.host_bus(),
-                                            CanHostOptions{});
-}
-
 class NoRows final : public TraceSink {
  public:
   void rows(std::uint64_t, std::span<const double>, std::span<const Outcome>) override {}
@@ -278,8 +256,8 @@ class NoRows final : public TraceSink {
 
 TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
   CanRig rig;
-  const auto first = resident(rig);
-  const auto second = resident(rig);
+  const auto first = rig.resident();
+  const auto second = rig.resident();
   first->upload(waveforms(20000));
   first->arm({});
   ASSERT_EQ(rig.node().state(), NodeState::measuring);
@@ -301,8 +279,8 @@ TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
 // Otherwise another host's arm would overwrite a trace that its owner has not downloaded yet.
 TEST(CanOwnership, AStageStaysReservedBetweenTheRunsOfAResidentExperiment) {
   CanRig rig;
-  const auto first = resident(rig);
-  const auto second = resident(rig);
+  const auto first = rig.resident();
+  const auto second = rig.resident();
   first->upload(waveforms(1));
   first->arm({});
   rig.serve_ms(100);
@@ -330,8 +308,8 @@ TEST(CanOwnership, AStageStaysReservedBetweenTheRunsOfAResidentExperiment) {
 
 TEST(CanOwnership, OthersDoNotKeepASilentHostsRunAlive) {
   CanRig rig;
-  const auto first = resident(rig);
-  const auto second = resident(rig);
+  const auto first = rig.resident();
+  const auto second = rig.resident();
   first->upload(waveforms(20000));
   first->arm({});
   for (int i = 0; i < 11; ++i) {
@@ -344,7 +322,7 @@ TEST(CanOwnership, OthersDoNotKeepASilentHostsRunAlive) {
 
 TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   CanRig rig;
-  const auto first = resident(rig);
+  const auto first = rig.resident();
   first->upload(waveforms(1));
   CanCommand arm{CanCommandCode::arm};  // the trigger never comes
   arm.host = 5;

@@ -78,11 +78,6 @@ WaferStageSpec noisy_stage() {
   return spec;
 }
 
-std::unique_ptr<CanResidentStage> resident(CanRig& rig, CanHostOptions options = {}) {
-  return std::make_unique<CanResidentStage>(rig.stage_spec().info, rig.spec(), rig.host_bus(),
-                                            options);
-}
-
 JobProgress play(CanRig& rig, CanResidentStage& stage, std::uint64_t seed) {
   Trigger trigger;
   trigger.run_seed = seed;
@@ -120,7 +115,7 @@ void expect_rows(const std::vector<double>& rows, const std::vector<double>& exp
 
 TEST(CanResidentStage, RecordsWhatTheLoopHereWouldHaveMeasured) {
   CanRig rig({}, noisy_stage());
-  const auto stage = resident(rig);
+  const auto stage = rig.resident();
   EXPECT_EQ(stage->upload(waveforms()).status, JobStatus::done);
   for (const std::uint64_t seed : {3U, 4U}) {
     if (seed == 4U) stage->upload(waveforms());
@@ -169,7 +164,7 @@ TEST(CanResidentStage, ALimitEndsTheRunAndTheRowsUpToItAreThere) {
   WaferStageSpec spec = CanRig::quiet_stage();
   spec.limits.actuator_n[1] = 0.4;
   CanRig rig({}, spec);
-  const auto stage = resident(rig);
+  const auto stage = rig.resident();
   stage->upload(waveforms());
   const JobProgress progress = play(rig, *stage, 3);
   EXPECT_EQ(progress.status, JobStatus::failed);
@@ -186,7 +181,7 @@ TEST(CanResidentStage, ALimitEndsTheRunAndTheRowsUpToItAreThere) {
 TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
   CanRig rig;
   rig.boot();
-  const auto stage = resident(rig);
+  const auto stage = rig.resident();
   Waveforms endless = waveforms();
   endless.periods = 5000;
   stage->upload(endless);
@@ -201,7 +196,7 @@ TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
 
 TEST(CanResidentStage, StopBringsAPlayingNodeToRestUnderControl) {
   CanRig rig;
-  const auto stage = resident(rig);
+  const auto stage = rig.resident();
   Waveforms endless = waveforms();
   endless.periods = 5000;
   stage->upload(endless);
@@ -214,7 +209,7 @@ TEST(CanResidentStage, StopBringsAPlayingNodeToRestUnderControl) {
 
 TEST(CanResidentStage, RefusesWhatDoesNotFit) {
   CanRig rig;
-  const auto stage = resident(rig);
+  const auto stage = rig.resident();
   const auto refused = [&](auto change) {
     Waveforms w = waveforms();
     change(w);

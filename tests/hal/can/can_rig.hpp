@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/can/can_node.hpp"
+#include "hal/can/can_resident_stage.hpp"
 #include "hal/can/can_stage.hpp"
 #include "hal/can/faulty_can.hpp"
 #include "hal/node/stage_node.hpp"
@@ -95,6 +96,11 @@ class CanRig {
   }
   std::unique_ptr<CanStage> host(CanHostOptions options = {}) {
     return std::make_unique<CanStage>(stage_spec_.info, spec_, host_bus(), options);
+  }
+
+  std::unique_ptr<CanResidentStage> resident() {
+    return std::make_unique<CanResidentStage>(stage_spec_.info, spec_, host_bus(),
+                                              CanHostOptions{});
   }
 
   void send_to_node(const CanFrame& frame) { static_cast<void>(pair_.host().send({&frame, 1})); }

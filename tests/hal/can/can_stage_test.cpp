@@ -15,6 +15,7 @@ namespace test_can_stage {
 using test::all_ok;
 using test::CanRig;
 using Host = test::CanHost;
+using Running = test::RunningCanHost;
 using Wire = test::CanRigOptions;
 
 TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
@@ -43,16 +44,14 @@ TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
 
 TEST(CanStage, SequenceNumbersGoRound) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   for (int n = 0; n < 70000; ++n) ASSERT_EQ(host.exchange(), Outcome::ok) << n;
   EXPECT_EQ(rig.node().sample(), 70000U);
 }
 
 TEST(CanStage, FourLostAnswersInARowAreStale) {
   CanRig rig(Wire{{}, {"lost@3x4"}});
-  Host host(rig);
-  host.start();
+  Running host(rig);
   EXPECT_THAT(host.exchange(4),
               testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::stale, Outcome::ok));
   EXPECT_EQ(host.stage().counts().repeats, 3U);
@@ -62,8 +61,7 @@ TEST(CanStage, AChannelWithoutAValueIsIncompleteOrStale) {
   WaferStageSpec spec = CanRig::quiet_stage();
   spec.faults = {{WaferStageSpec::Fault::Kind::missed_cycle, 0, 2, 1, -1}};
   CanRig rig({}, spec);
-  Host host(rig);
-  host.start();
+  Running host(rig);
   EXPECT_THAT(host.exchange(4),
               testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::stale, Outcome::ok));
 }
@@ -71,8 +69,7 @@ TEST(CanStage, AChannelWithoutAValueIsIncompleteOrStale) {
 TEST(CanStage, ASetpointThatIsMissingOnOneBusMovesNothing) {
   // Frames are counted in turn: u[2] on the second bus is frame 5.
   CanRig rig(Wire{{"lost@5"}, {}, 2});
-  Host host(rig, {1e3, false});
-  host.start();
+  Running host(rig, {1e3, false});
   std::vector<Outcome> expected = all_ok(6);
   expected[2] = Outcome::stale;
   EXPECT_EQ(host.exchange(6), expected);
@@ -85,8 +82,7 @@ TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
   WaferStageSpec spec = CanRig::quiet_stage();
   spec.limits.actuator_n[0] = 0.4;  // reached in cycle 2: 0.745 N sin 0.6
   CanRig rig({}, spec);
-  Host host(rig);
-  host.start();
+  Running host(rig);
   EXPECT_THAT(host.exchange(4),
               testing::ElementsAre(Outcome::ok, Outcome::ok, Outcome::limit, Outcome::limit));
   EXPECT_THAT(
@@ -109,8 +105,7 @@ TEST(CanStage, FaultsOfTheStageEndTheRun) {
     WaferStageSpec spec = CanRig::quiet_stage();
     spec.faults = {{row.kind, 0, 2, 1, -1}};
     CanRig rig({}, spec);
-    Host host(rig);
-    host.start();
+    Running host(rig);
     EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, row.outcome));
     if (row.outcome == Outcome::limit) {
       EXPECT_EQ(host.inputs().valid, 0U);
@@ -121,8 +116,7 @@ TEST(CanStage, FaultsOfTheStageEndTheRun) {
 
 TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   host.exchange(5);
   rig.serve_ms(20);
   EXPECT_EQ(rig.node().state(), NodeState::measuring);
@@ -155,8 +149,7 @@ TEST(CanStage, ADelayOfTheNodeIsNotTheSilenceOfItsHost) {
 
 TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   rig.serve_ms(200);
   ASSERT_EQ(rig.node().state(), NodeState::fault);
   EXPECT_THAT([&] { Host(rig).start(); },
@@ -170,8 +163,7 @@ TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
 
 TEST(CanStage, ANodeThatFreezesIsStaleAndOneThatRestartsAFault) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   host.exchange(5);
   rig.freeze();
   const std::int64_t before_ns = rig.pair().now_ns();
@@ -187,8 +179,7 @@ TEST(CanStage, ANodeThatFreezesIsStaleAndOneThatRestartsAFault) {
 TEST(CanStage, TheStateOfTheBusIsAnOutcome) {
   const auto with = [](CanBusState state, const char* text) {
     CanRig rig(Wire{{}, {}, 2});
-    Host host(rig);
-    host.start();
+    Running host(rig);
     host.exchange(3);
     rig.pair().set_state(1, state);
     const Outcome outcome = host.exchange();
@@ -207,8 +198,7 @@ TEST(CanStage, TheStateOfTheBusIsAnOutcome) {
 
 TEST(CanStage, ANodeWhoseBusIsOffStopsByItself) {
   CanRig rig;
-  Host host(rig);
-  host.start();
+  Running host(rig);
   host.exchange(3);
   rig.pair().set_state(0, CanBusState::off);
   rig.serve_ms(1);
@@ -240,8 +230,7 @@ TEST(CanStage, StartRefusesInWords) {
 
 TEST(CanStage, ARunStartsThoughItsFirstFramesAreLost) {
   CanRig rig(Wire{{}, {"lost@0x2"}});
-  Host host(rig);
-  host.start();
+  Running host(rig);
   EXPECT_THAT(host.exchange(3), testing::ElementsAreArray(all_ok(3)));
   CanRig deaf(Wire{{}, {"lost@0x3"}});
   Host unlucky(deaf);

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cctype>
 #include <functional>
 #include <vector>
 
@@ -54,32 +53,25 @@ struct Row {
 
 template <typename Node>
 std::string name_of(const testing::TestParamInfo<Row<Node>>& row) {
-  std::string name = meaning(row.param.status).words;
-  for (char& c : name)
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-  return name + std::to_string(row.index);
+  return test::test_name(meaning(row.param.status).words) + std::to_string(row.index);
 }
 
 /// A frame of the node, and its bus.
 struct CanSaid {
-  CanRig* rig;
   CanFrame* frame;
   std::vector<CanFrame>* more;
+  const CanState* last;
 
   bool measurement() const { return frame->id == kCanSensorId; }
   void state(const std::function<void(CanState&)>& change) const {
-    CanState state = rig_state();
-    change(state);
-    more->push_back(encode_can_state(state));
-  }
-  CanState rig_state() const {
     CanState state = *last;
     state.answer = CanAnswer::none;
     state.session = 0;
-    return state;
+    change(state);
+    more->push_back(encode_can_state(state));
   }
-  const CanState* last;
 };
+using CanRow = Row<CanSaid>;
 
 /// A byte of the measurement.
 std::function<void(CanSaid&)> byte(std::size_t at, std::uint8_t value) {
@@ -108,10 +100,10 @@ void every_state(CanSaid& said, const std::function<void(CanState&)>& change) {
   *said.frame = encode_can_state(state);
 }
 
-class CanPeer : public testing::TestWithParam<Row<CanSaid>> {};
+class CanPeer : public testing::TestWithParam<CanRow> {};
 
 TEST_P(CanPeer, HasTheReactionOfTheTable) {
-  const Row<CanSaid>& row = GetParam();
+  const CanRow& row = GetParam();
   const PeerMeaning& wanted = meaning(row.status);
   CanRig rig;
   bool say = row.before_the_run;
@@ -121,7 +113,7 @@ TEST_P(CanPeer, HasTheReactionOfTheTable) {
     for (std::size_t i = 0; i < count; ++i) {
       CanState state;
       if (frames[i].id == kCanStateId && decode_can_state(frames[i], state)) last = state;
-      CanSaid said{&rig, &frames[i], &more, &last};
+      CanSaid said{&frames[i], &more, &last};
       if (say) row.say(said);
     }
     for (const CanFrame& frame : more) frames[count++] = frame;
@@ -161,59 +153,56 @@ TEST_P(CanPeer, HasTheReactionOfTheTable) {
 INSTANTIATE_TEST_SUITE_P(
     Rows, CanPeer,
     testing::Values(
-        Row<CanSaid>{PeerStatus::setpoints_missed, with_state([](CanState& s) { s.gaps = 5; })},
-        Row<CanSaid>{PeerStatus::nothing_new, no_value},
-        Row<CanSaid>{PeerStatus::damaged, [](CanSaid& s) { s.frame->data[9] ^= 1U; }},
-        Row<CanSaid>{PeerStatus::out_of_range,
-                     byte(2, kCanSaturatedBit | static_cast<std::uint8_t>(NodeState::measuring))},
-        Row<CanSaid>{PeerStatus::limit, with_state([](CanState& s) {
-                       s.state = NodeState::fault_reaction;
-                       s.cause = FaultCause::limit;
-                     })},
-        Row<CanSaid>{PeerStatus::not_measuring,
-                     byte(2, static_cast<std::uint8_t>(NodeState::operation_enabled))},
-        Row<CanSaid>{PeerStatus::not_measuring,
-                     with_state([](CanState& s) { s.state = NodeState::quick_stop; })},
-        Row<CanSaid>{PeerStatus::not_measuring,
-                     with_state([](CanState& s) { s.run = static_cast<std::uint8_t>(s.run + 1); })},
-        Row<CanSaid>{PeerStatus::fault, with_state([](CanState& s) {
-                       s.state = NodeState::fault;
-                       s.cause = FaultCause::temperature;
-                     })},
-        Row<CanSaid>{PeerStatus::fault,
-                     with_state([](CanState& s) { s.cause = static_cast<FaultCause>(77); })},
-        Row<CanSaid>{PeerStatus::unknown_code, byte(2, 9)},
-        Row<CanSaid>{PeerStatus::unknown_code,
-                     with_state([](CanState& s) { s.state = static_cast<NodeState>(42); })},
-        Row<CanSaid>{PeerStatus::conflict,
-                     [](CanSaid& s) {
-                       if (!s.measurement()) return;
-                       CanFrame other = *s.frame;
-                       std::swap(other, *s.frame);
-                       s.frame->data[8] ^= 0x10U;
-                       reseal(*s.frame);
-                       s.more->push_back(other);
-                     }},
-        Row<CanSaid>{PeerStatus::other_node, with_state([](CanState& s) { s.boot ^= 8U; })},
-        Row<CanSaid>{PeerStatus::first_sample_missing, no_value, true},
-        Row<CanSaid>{PeerStatus::in_fault,
-                     [](CanSaid& s) {
-                       every_state(s, [](CanState& told) { told.state = NodeState::fault; });
-                     },
-                     true},
-        Row<CanSaid>{PeerStatus::two_nodes,
-                     [](CanSaid& s) {
-                       if (s.frame->id == kCanStateId)
-                         s.state([](CanState& told) { told.boot ^= 8U; });
-                     },
-                     true},
-        Row<CanSaid>{PeerStatus::other_version,
-                     [](CanSaid& s) { every_state(s, [](CanState& told) { told.version = 1; }); },
-                     true},
-        Row<CanSaid>{
-            PeerStatus::other_stage,
-            [](CanSaid& s) { every_state(s, [](CanState& told) { told.fingerprint ^= 1U; }); },
-            true}),
+        CanRow{PeerStatus::setpoints_missed, with_state([](CanState& s) { s.gaps = 5; })},
+        CanRow{PeerStatus::nothing_new, no_value},
+        CanRow{PeerStatus::damaged, [](CanSaid& s) { s.frame->data[9] ^= 1U; }},
+        CanRow{PeerStatus::out_of_range,
+               byte(2, kCanSaturatedBit | static_cast<std::uint8_t>(NodeState::measuring))},
+        CanRow{PeerStatus::limit, with_state([](CanState& s) {
+                 s.state = NodeState::fault_reaction;
+                 s.cause = FaultCause::limit;
+               })},
+        CanRow{PeerStatus::not_measuring,
+               byte(2, static_cast<std::uint8_t>(NodeState::operation_enabled))},
+        CanRow{PeerStatus::not_measuring,
+               with_state([](CanState& s) { s.state = NodeState::quick_stop; })},
+        CanRow{PeerStatus::not_measuring,
+               with_state([](CanState& s) { s.run = static_cast<std::uint8_t>(s.run + 1); })},
+        CanRow{PeerStatus::fault, with_state([](CanState& s) {
+                 s.state = NodeState::fault;
+                 s.cause = FaultCause::temperature;
+               })},
+        CanRow{PeerStatus::fault,
+               with_state([](CanState& s) { s.cause = static_cast<FaultCause>(77); })},
+        CanRow{PeerStatus::unknown_code, byte(2, 9)},
+        CanRow{PeerStatus::unknown_code,
+               with_state([](CanState& s) { s.state = static_cast<NodeState>(42); })},
+        CanRow{PeerStatus::conflict,
+               [](CanSaid& s) {
+                 if (!s.measurement()) return;
+                 CanFrame other = *s.frame;
+                 std::swap(other, *s.frame);
+                 s.frame->data[8] ^= 0x10U;
+                 reseal(*s.frame);
+                 s.more->push_back(other);
+               }},
+        CanRow{PeerStatus::other_node, with_state([](CanState& s) { s.boot ^= 8U; })},
+        CanRow{PeerStatus::first_sample_missing, no_value, true},
+        CanRow{PeerStatus::in_fault,
+               [](CanSaid& s) {
+                 every_state(s, [](CanState& told) { told.state = NodeState::fault; });
+               },
+               true},
+        CanRow{PeerStatus::two_nodes,
+               [](CanSaid& s) {
+                 if (s.frame->id == kCanStateId) s.state([](CanState& told) { told.boot ^= 8U; });
+               },
+               true},
+        CanRow{PeerStatus::other_version,
+               [](CanSaid& s) { every_state(s, [](CanState& told) { told.version = 1; }); }, true},
+        CanRow{PeerStatus::other_stage,
+               [](CanSaid& s) { every_state(s, [](CanState& told) { told.fingerprint ^= 1U; }); },
+               true}),
     name_of<CanSaid>);
 
 /// The registers of a node, changed before they are sent.
@@ -247,10 +236,12 @@ std::function<void(LyingRegisters&)> status(unsigned outcome, unsigned state = 5
   };
 }
 
-class ModbusPeer : public testing::TestWithParam<Row<LyingRegisters>> {};
+using ModbusRow = Row<LyingRegisters>;
+
+class ModbusPeer : public testing::TestWithParam<ModbusRow> {};
 
 TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
-  const Row<LyingRegisters>& row = GetParam();
+  const ModbusRow& row = GetParam();
   const PeerMeaning& wanted = meaning(row.status);
   test::ModbusBench bench;
   LyingRegisters lying(bench.registers());
@@ -280,36 +271,29 @@ TEST_P(ModbusPeer, HasTheReactionOfTheTable) {
 INSTANTIATE_TEST_SUITE_P(
     Rows, ModbusPeer,
     testing::Values(
-        Row<LyingRegisters>{PeerStatus::setpoints_missed, status(0, 5, 0, 1)},
-        Row<LyingRegisters>{PeerStatus::late, status(1)},
-        Row<LyingRegisters>{PeerStatus::passive, status(5)},
-        Row<LyingRegisters>{PeerStatus::incomplete, status(2)},
-        Row<LyingRegisters>{PeerStatus::nothing_new, status(3)},
-        Row<LyingRegisters>{PeerStatus::nothing_new,
-                            [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }},
-        Row<LyingRegisters>{PeerStatus::damaged, status(4)},
-        Row<LyingRegisters>{PeerStatus::out_of_range,
-                            [](LyingRegisters& r) { r.set(map::kMeasurement, 0x7FFFFFFFU); }},
-        Row<LyingRegisters>{PeerStatus::limit, status(9)},
-        Row<LyingRegisters>{PeerStatus::limit, status(0, 7, 2)},
-        Row<LyingRegisters>{PeerStatus::not_measuring, status(0, 4)},
-        Row<LyingRegisters>{PeerStatus::fault, status(8)},
-        Row<LyingRegisters>{PeerStatus::fault, status(0, 8, 7)},
-        Row<LyingRegisters>{PeerStatus::fault, status(0, 5, 4)},
-        Row<LyingRegisters>{PeerStatus::unknown_code, status(10)},
-        Row<LyingRegisters>{PeerStatus::unknown_code, status(0, 9)},
-        Row<LyingRegisters>{PeerStatus::bus_off, status(6)},
-        Row<LyingRegisters>{PeerStatus::link_down, status(7)},
-        Row<LyingRegisters>{PeerStatus::other_node,
-                            [](LyingRegisters& r) { r.set(map::kMeasurementBootId, 9); }},
-        Row<LyingRegisters>{PeerStatus::first_sample_missing,
-                            [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }, true},
-        Row<LyingRegisters>{PeerStatus::in_fault, [](LyingRegisters& r) { r.set(map::kState, 8); },
-                            true},
-        Row<LyingRegisters>{PeerStatus::other_version,
-                            [](LyingRegisters& r) { r.set(map::kVersion, 1); }, true},
-        Row<LyingRegisters>{PeerStatus::other_stage,
-                            [](LyingRegisters& r) { r.set(map::kChannelHash, 1); }, true}),
+        ModbusRow{PeerStatus::setpoints_missed, status(0, 5, 0, 1)},
+        ModbusRow{PeerStatus::late, status(1)}, ModbusRow{PeerStatus::passive, status(5)},
+        ModbusRow{PeerStatus::incomplete, status(2)}, ModbusRow{PeerStatus::nothing_new, status(3)},
+        ModbusRow{PeerStatus::nothing_new, [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }},
+        ModbusRow{PeerStatus::damaged, status(4)},
+        ModbusRow{PeerStatus::out_of_range,
+                  [](LyingRegisters& r) { r.set(map::kMeasurement, 0x7FFFFFFFU); }},
+        ModbusRow{PeerStatus::limit, status(9)}, ModbusRow{PeerStatus::limit, status(0, 7, 2)},
+        ModbusRow{PeerStatus::not_measuring, status(0, 4)}, ModbusRow{PeerStatus::fault, status(8)},
+        ModbusRow{PeerStatus::fault, status(0, 8, 7)},
+        ModbusRow{PeerStatus::fault, status(0, 5, 4)},
+        ModbusRow{PeerStatus::unknown_code, status(10)},
+        ModbusRow{PeerStatus::unknown_code, status(0, 9)},
+        ModbusRow{PeerStatus::bus_off, status(6)}, ModbusRow{PeerStatus::link_down, status(7)},
+        ModbusRow{PeerStatus::other_node,
+                  [](LyingRegisters& r) { r.set(map::kMeasurementBootId, 9); }},
+        ModbusRow{PeerStatus::first_sample_missing,
+                  [](LyingRegisters& r) { r.set(map::kValid + 2, 0); }, true},
+        ModbusRow{PeerStatus::in_fault, [](LyingRegisters& r) { r.set(map::kState, 8); }, true},
+        ModbusRow{PeerStatus::other_version, [](LyingRegisters& r) { r.set(map::kVersion, 1); },
+                  true},
+        ModbusRow{PeerStatus::other_stage, [](LyingRegisters& r) { r.set(map::kChannelHash, 1); },
+                  true}),
     name_of<LyingRegisters>);
 
 // can_ownership_test.cpp and modbus_ownership_test.cpp test the rows that need more than one peer. can_stage_test.cpp
