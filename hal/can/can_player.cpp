@@ -170,7 +170,11 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
   Inputs inputs;
   inputs.y = y_;
   const Outcome next = stage_.advance_excited(now_ns, r_, u_, inputs);
-  if (played_ < samples_) record();
+  if (played_ < samples_) {
+    for (const std::vector<double>* values : {&u_, &measured_})
+      for (const double value : *values) append_can_float(trace_, value);
+    append_can_word(trace_, static_cast<std::uint32_t>(outcome_));
+  }
   outcome_ = next;
   ++played_;
   if (!gives_measurement(next)) {
@@ -179,12 +183,6 @@ void CanPlayer::play_sample(std::int64_t now_ns) {
     stage_.end_run(true);
     finish(CanResident::done);
   }
-}
-
-void CanPlayer::record() {
-  for (const std::vector<double>* values : {&u_, &measured_})
-    for (const double value : *values) append_can_float(trace_, value);
-  append_can_word(trace_, static_cast<std::uint32_t>(outcome_));
 }
 
 void CanPlayer::finish(CanResident status) {

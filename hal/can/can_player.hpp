@@ -46,7 +46,6 @@ class CanPlayer {
 
  private:
   void play_sample(std::int64_t now_ns);
-  void record();
   void finish(CanResident status);
   void send_chunks(CanTransport& transport);
 

@@ -19,16 +19,6 @@ namespace {
 
 constexpr std::size_t kMostLateReplies = 16;
 
-struct Duration {
-  std::uint32_t seconds = 0;
-  std::uint32_t microseconds = 0;
-};
-
-Duration duration(double seconds) {
-  const auto whole = static_cast<std::uint32_t>(seconds);
-  return {whole, static_cast<std::uint32_t>(1e6 * (seconds - whole))};
-}
-
 bool is_exception(int error) { return error >= EMBXILFUN && error <= EMBXGTAR; }
 
 bool is_bad_reply(int error) { return error >= EMBBADCRC && error <= EMBBADSLAVE; }
@@ -42,8 +32,9 @@ ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
           "modbus: invalid response_s {} s or worst_reply_s {} s; response_s must be at least "
           "0.001 s, and worst_reply_s at least response_s",
           timing.response_s, timing.worst_reply_s);
-  const Duration response = duration(timing.response_s);
-  modbus_set_response_timeout(context_.get(), response.seconds, response.microseconds);
+  const auto seconds = static_cast<std::uint32_t>(timing.response_s);
+  modbus_set_response_timeout(context_.get(), seconds,
+                              static_cast<std::uint32_t>(1e6 * (timing.response_s - seconds)));
   // The response timeout restarts at every group of bytes. With the byte timeout disabled, it becomes one
   // deadline for the whole reply.
   modbus_set_byte_timeout(context_.get(), 0, 0);
@@ -70,12 +61,16 @@ void ModbusLink::close() noexcept {
   connected_ = false;
 }
 
-void ModbusLink::begin() noexcept {
+/// Makes a request that returns the number of registers read, or -1.
+template <typename Request>
+LinkStatus ModbusLink::transact(std::size_t wanted, Request request) noexcept {
+  if (!connected_) {
+    if (last_.status != LinkStatus::flooded) last_ = {LinkStatus::disconnected, ENOTCONN};
+    return last_.status;
+  }
   request_ns_ = monotonic_ns();
   errno = 0;
-}
-
-LinkStatus ModbusLink::judge(int done, std::size_t wanted) noexcept {
+  const int done = request();
   const int error = done < 0 ? errno : 0;
   last_ = {LinkStatus::disconnected, error};
   if (done == static_cast<int>(wanted)) {
@@ -92,27 +87,20 @@ LinkStatus ModbusLink::judge(int done, std::size_t wanted) noexcept {
   return last_.status;
 }
 
-LinkStatus ModbusLink::not_connected() noexcept {
-  if (last_.status != LinkStatus::flooded) last_ = {LinkStatus::disconnected, ENOTCONN};
-  return last_.status;
-}
-
 LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> written,
                                 int read_first, std::span<std::uint16_t> read) noexcept {
-  if (!connected_) return not_connected();
-  begin();
-  return judge(modbus_write_and_read_registers(
-                   context_.get(), write_first, static_cast<int>(written.size()), written.data(),
-                   read_first, static_cast<int>(read.size()), read.data()),
-               read.size());
+  return transact(read.size(), [&] {
+    return modbus_write_and_read_registers(context_.get(), write_first,
+                                           static_cast<int>(written.size()), written.data(),
+                                           read_first, static_cast<int>(read.size()), read.data());
+  });
 }
 
 LinkStatus ModbusLink::read(int first, std::span<std::uint16_t> registers) noexcept {
-  if (!connected_) return not_connected();
-  begin();
-  return judge(modbus_read_registers(context_.get(), first, static_cast<int>(registers.size()),
-                                     registers.data()),
-               registers.size());
+  return transact(registers.size(), [&] {
+    return modbus_read_registers(context_.get(), first, static_cast<int>(registers.size()),
+                                 registers.data());
+  });
 }
 
 void ModbusLink::drain() noexcept {

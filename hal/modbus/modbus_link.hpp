@@ -64,10 +64,9 @@ class ModbusLink {
   std::string describe(const Trouble& trouble) const;
 
  private:
-  void begin() noexcept;
   void discard() noexcept;
-  LinkStatus not_connected() noexcept;
-  LinkStatus judge(int done, std::size_t wanted) noexcept;
+  template <typename Request>
+  LinkStatus transact(std::size_t wanted, Request request) noexcept;
 
   ModbusAddress address_;
   ModbusTiming timing_;

@@ -101,10 +101,6 @@ void ModbusNode::begin_request(ModbusConnection from) {
 void ModbusNode::tick() {
   const std::int64_t now_ns = monotonic_ns();
   node_.tick(now_ns);
-  watch_heartbeat(now_ns);
-}
-
-void ModbusNode::watch_heartbeat(std::int64_t now_ns) {
   const std::uint32_t heartbeat = map_.u32(map::kHeartbeat);
   const NodeState state = node_.state();
   const bool powered = state == NodeState::operation_enabled || state == NodeState::measuring;

@@ -45,7 +45,6 @@ class ModbusNode final : public ModbusRegisters {
  private:
   void describe_stage(const StageLimits& limits);
   void disturb_panel();
-  void watch_heartbeat(std::int64_t now_ns);
   void take_supervisor_command();
   ModbusException obey(int first, std::size_t count, RegisterBlock<const std::uint16_t> before);
   bool may_control_the_run(bool commands, bool moves) const;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "hal/stage/peer_status.hpp"
 #include "hal/stage/plant_watch.hpp"
@@ -72,35 +71,10 @@ StageNode::StageNode(std::unique_ptr<CyclicStage> stage, const StageLimits& limi
   machine_.self_test_passed();  // the constructor has checked stage, limits and controller
 }
 
-NodeState StageNode::state() const {
-  const std::lock_guard lock(mutex_);
-  return machine_.state();
-}
-
-FaultCause StageNode::cause() const {
-  const std::lock_guard lock(mutex_);
-  return machine_.cause();
-}
-
 std::string StageNode::trouble() const {
   const std::lock_guard lock(mutex_);
   if (machine_.cause() == FaultCause::none) return "";
   return reason_.empty() ? to_string(machine_.cause()) : reason_;
-}
-
-std::uint64_t StageNode::sample() const {
-  const std::lock_guard lock(mutex_);
-  return sample_;
-}
-
-NodePanel StageNode::panel() const {
-  const std::lock_guard lock(mutex_);
-  return panel_;
-}
-
-void StageNode::set_panel(NodePanel panel) {
-  const std::lock_guard lock(mutex_);
-  panel_ = std::move(panel);
 }
 
 SupervisorReply StageNode::request(SupervisorCommand command) {
@@ -131,22 +105,12 @@ std::uint32_t StageNode::draw_key() {
   return key;
 }
 
-std::uint32_t StageNode::session() const {
-  const std::lock_guard lock(mutex_);
-  return holder();
-}
-
 std::uint32_t StageNode::reserve() {
   const std::lock_guard lock(mutex_);
   if (holder() != 0) refuse(PeerStatus::held, "node", "; wait until it has ended");
   session_ = draw_key();
   reserved_ = true;
   return session_;
-}
-
-void StageNode::release() {
-  const std::lock_guard lock(mutex_);
-  reserved_ = false;
 }
 
 std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
@@ -175,11 +139,6 @@ std::uint32_t StageNode::begin_run(std::uint64_t run_seed, std::int64_t now_ns, 
   controller_.update(y_.data(), control_.data());
   first.node_state = machine_.state();
   return session_;
-}
-
-Outcome StageNode::advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs) {
-  const std::lock_guard lock(mutex_);
-  return exchange(now_ns, u, inputs);
 }
 
 Outcome StageNode::advance_excited(std::int64_t now_ns, std::span<const double> r,
@@ -242,11 +201,6 @@ void StageNode::end_run(bool keep_reserved) {
   come_to_rest();
   machine_.end_measuring();
   reserved_ = keep_reserved;
-}
-
-void StageNode::fail(FaultCause cause) {
-  const std::lock_guard lock(mutex_);
-  machine_.fail(cause);
 }
 
 void StageNode::tick(std::int64_t now_ns) {

@@ -7,6 +7,8 @@
 #include <random>
 #include <span>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "hal/node/node_state_machine.hpp"
@@ -61,25 +63,40 @@ class StageNode {
             const MotionControllerSpec& controller, NodePanel panel, const NodeOptions& options);
 
   const StageInfo& info() const noexcept { return stage_.info(); }
-  NodeState state() const;
-  FaultCause cause() const;
+  NodeState state() const {
+    return locked([&] { return machine_.state(); });
+  }
+  FaultCause cause() const {
+    return locked([&] { return machine_.cause(); });
+  }
   /// Reason of the fault in one line; empty if there is none.
   std::string trouble() const;
-  std::uint64_t sample() const;  ///< of the current run, without those of a safe stop
-  NodePanel panel() const;
+  /// Of the current run, without those of a safe stop.
+  std::uint64_t sample() const {
+    return locked([&] { return sample_; });
+  }
+  NodePanel panel() const {
+    return locked([&] { return panel_; });
+  }
   /// Takes effect with the next tick().
-  void set_panel(NodePanel panel);
+  void set_panel(NodePanel panel) {
+    locked([&] { panel_ = std::move(panel); });
+  }
 
   /// enable and reset_fault are refused while the panel is out of range; the reply contains the reason.
   SupervisorReply request(SupervisorCommand command);
 
   /// Key of the host that owns the stage by a run or reservation; 0: none.
-  std::uint32_t session() const;
+  std::uint32_t session() const {
+    return locked([&] { return holder(); });
+  }
   /// Reserves the stage for one host until its run ends, it is released, or it is no longer enabled.
   /// @return a new key. @throws StageError if another host owns the stage.
   std::uint32_t reserve();
   /// Ends a reservation.
-  void release();
+  void release() {
+    locked([&] { reserved_ = false; });
+  }
 
   /// operation_enabled -> measuring; y[0] into `first.y` (size sensors). `session`: key of a reservation,
   /// or 0. @return the key of the run.
@@ -87,7 +104,9 @@ class StageNode {
   std::uint32_t begin_run(std::uint64_t run_seed, std::int64_t now_ns, Inputs& first,
                           std::uint32_t session = 0);
   /// u[n] -> y[n+1]. Outcome::fault unless measuring.
-  [[nodiscard]] Outcome advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
+  [[nodiscard]] Outcome advance(std::int64_t now_ns, std::span<const double> u, Inputs& inputs) {
+    return locked([&] { return exchange(now_ns, u, inputs); });
+  }
   /// The same with u[n] = C(y[n]) + r[n] of the node's own controller; writes u[n] to `u`.
   [[nodiscard]] Outcome advance_excited(std::int64_t now_ns, std::span<const double> r,
                                         std::span<double> u, Inputs& inputs);
@@ -96,13 +115,20 @@ class StageNode {
   void end_run(bool keep_reserved = false);
 
   /// Reports a failure outside of the stage (bus, heartbeat): safe stop, then fault.
-  void fail(FaultCause cause);
+  void fail(FaultCause cause) {
+    locked([&] { machine_.fail(cause); });
+  }
 
   /// Watchdog, panel and safe stop; to be called at least every millisecond. `now_ns`:
   /// CLOCK_MONOTONIC, the same clock as in the calls above.
   void tick(std::int64_t now_ns);
 
  private:
+  template <typename Call>
+  std::invoke_result_t<Call> locked(Call call) const {
+    const std::lock_guard lock(mutex_);
+    return call();
+  }
   Outcome exchange(std::int64_t now_ns, std::span<const double> u, Inputs& inputs);
   void give_nothing(Inputs& inputs) const;
   std::uint32_t holder() const;

@@ -11,9 +11,8 @@
 
 #include <cerrno>
 #include <cstring>
-#include <exception>
 #include <fstream>
-#include <thread>
+#include <future>
 
 #include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
@@ -109,17 +108,7 @@ RealTime::~RealTime() {
 }
 
 std::vector<std::string> missing_for_real_time(const RealTimeOptions& options) {
-  std::vector<std::string> missing;
-  std::exception_ptr failure;
-  std::thread([&] {
-    try {
-      missing = RealTime(options).missing();
-    } catch (...) {
-      failure = std::current_exception();
-    }
-  }).join();
-  if (failure) std::rethrow_exception(failure);
-  return missing;
+  return std::async(std::launch::async, [&] { return RealTime(options).missing(); }).get();
 }
 
 }  // namespace stageid
