@@ -16,34 +16,25 @@ namespace test_can_zeromq {
 /// The node's socket.
 class Router {
  public:
-  explicit Router(const std::string& endpoint)
-      : context_(zmq_ctx_new()), socket_(zmq_socket(context_, ZMQ_ROUTER)) {
-    const int none = 0;
-    zmq_setsockopt(socket_, ZMQ_LINGER, &none, sizeof(none));
-    EXPECT_EQ(zmq_bind(socket_, endpoint.c_str()), 0);
+  explicit Router(const std::string& endpoint) {
+    EXPECT_EQ(zmq_bind(socket_.get(), endpoint.c_str()), 0);
   }
-  ~Router() {
-    zmq_close(socket_);
-    zmq_ctx_term(context_);
-  }
-  Router(const Router&) = delete;
-  Router& operator=(const Router&) = delete;
 
   std::vector<std::uint8_t> receive() {
     host_.resize(64);
-    host_.resize(static_cast<std::size_t>(zmq_recv(socket_, host_.data(), host_.size(), 0)));
+    host_.resize(static_cast<std::size_t>(zmq_recv(socket_.get(), host_.data(), host_.size(), 0)));
     std::vector<std::uint8_t> message(1000);
-    message.resize(static_cast<std::size_t>(zmq_recv(socket_, message.data(), message.size(), 0)));
+    message.resize(
+        static_cast<std::size_t>(zmq_recv(socket_.get(), message.data(), message.size(), 0)));
     return message;
   }
   void answer(const std::vector<std::uint8_t>& message) {
-    zmq_send(socket_, host_.data(), host_.size(), ZMQ_SNDMORE);
-    zmq_send(socket_, message.data(), message.size(), 0);
+    zmq_send(socket_.get(), host_.data(), host_.size(), ZMQ_SNDMORE);
+    zmq_send(socket_.get(), message.data(), message.size(), 0);
   }
 
  private:
-  void* context_;
-  void* socket_;
+  ZeroMqSocket socket_{ZMQ_ROUTER};
   std::vector<std::uint8_t> host_;
 };
 
