@@ -64,6 +64,32 @@ void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count
                            : link.describe(link.last()));
 }
 
+std::string describe(const ModbusState& state) {
+  return fmt::format("state {}, cause: {}{}; remove the cause{}", to_string(state.state),
+                     to_string(state.cause),
+                     state.interlock_closed ? "" : ", the interlock is open",
+                     state.state == NodeState::fault ? " and add --reset-fault" : "");
+}
+
+/// Sends a run command. `session`: the expected key in the answer, 0: any but 0.
+/// @return the key in the answer.
+std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
+                               std::uint32_t session, std::vector<std::uint16_t>& reply) {
+  std::random_device random;
+  std::array<std::uint16_t, map::kRunRegisters> request{};
+  const RegisterBlock out(map::kRunCommand, request);
+  out.set_u32(map::kRunCommand, command);
+  out.set_u32(map::kRunSequence, random() | 1U);
+  out.set_u64(map::kRunSeed, run_seed);
+  out.set_u32(map::kRunKey, session);
+  const auto shown = [&] {
+    return RegisterBlock(map::kMeasurementBootId, reply).u32(map::kSession);
+  };
+  transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
+           [&] { return shown() != 0 && (session == 0 || shown() == session); });
+  return shown();
+}
+
 }  // namespace
 
 std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count) {
@@ -127,36 +153,6 @@ ModbusState read_state(ModbusLink& link) {
           (block[map::kFlags] & map::kFlagInterlockClosed) != 0,
           (block[map::kFlags] & map::kFlagEnabled) != 0};
 }
-
-namespace {
-
-std::string describe(const ModbusState& state) {
-  return fmt::format("state {}, cause: {}{}; remove the cause{}", to_string(state.state),
-                     to_string(state.cause),
-                     state.interlock_closed ? "" : ", the interlock is open",
-                     state.state == NodeState::fault ? " and add --reset-fault" : "");
-}
-
-/// Sends a run command. `session`: the expected key in the answer, 0: any but 0.
-/// @return the key in the answer.
-std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
-                               std::uint32_t session, std::vector<std::uint16_t>& reply) {
-  std::random_device random;
-  std::array<std::uint16_t, map::kRunRegisters> request{};
-  const RegisterBlock out(map::kRunCommand, request);
-  out.set_u32(map::kRunCommand, command);
-  out.set_u32(map::kRunSequence, random() | 1U);
-  out.set_u64(map::kRunSeed, run_seed);
-  out.set_u32(map::kRunKey, session);
-  const auto shown = [&] {
-    return RegisterBlock(map::kMeasurementBootId, reply).u32(map::kSession);
-  };
-  transact(link, map::kRunCommand, request, map::kMeasurementBootId, reply,
-           [&] { return shown() != 0 && (session == 0 || shown() == session); });
-  return shown();
-}
-
-}  // namespace
 
 void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
   const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;

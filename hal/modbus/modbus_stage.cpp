@@ -26,12 +26,8 @@ FaultCause cause_of(std::uint32_t status) {
   return static_cast<FaultCause>((status >> 16) & 0xFFU);
 }
 
-struct Exchange {
-  int written = 0;  // registers
-  int read = 0;
-};
-
-Exchange exchange_of(const StageInfo& info) {
+/// Numbers of registers that are written and read.
+std::pair<int, int> exchange_of(const StageInfo& info) {
   return {static_cast<int>(kSetpointHead + 2 * info.actuators.size()),
           static_cast<int>(kMeasurementHead + 2 * info.sensors.size())};
 }

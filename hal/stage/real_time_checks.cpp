@@ -79,8 +79,7 @@ std::string idle_states_of(const fs::path& processor) {
   if (longest_us <= kLongestWake_us) return "";
   return fmt::format(
       "{} needs up to {} us to leave its deepest idle state; run 'cpupower idle-set -D {}', or "
-      "boot "
-      "with processor.max_cstate=1",
+      "boot with processor.max_cstate=1",
       processor.filename().string(), longest_us, kLongestWake_us);
 }
 

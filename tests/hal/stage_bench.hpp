@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 
 #include <cctype>
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "hal/simulator/simulated_stage.hpp"
@@ -15,6 +18,15 @@ namespace stageid::test {
 template <typename Error = StageError>
 auto refuses(const std::string& text) {
   return testing::ThrowsMessage<Error>(testing::HasSubstr(text));
+}
+
+/// Waits for an event; ten seconds allow for a busy machine.
+inline bool comes(const std::function<bool()>& condition) {
+  for (int i = 0; i < 2000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
 }
 
 /// A text as the name of a test.

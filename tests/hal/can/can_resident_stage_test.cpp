@@ -61,12 +61,12 @@ class Rows final : public TraceSink {
   std::function<void()> after_block;
 };
 
-Waveforms waveforms() {
+Waveforms waveforms(int periods = 2) {
   Waveforms w;
   w.samples.setZero(kPeriod, 2);
   for (int n = 0; n < kPeriod; ++n)
     w.samples(n, 1) = 0.5 * std::sin(2.0 * M_PI * 7.0 * n / kPeriod);
-  w.periods = 2;
+  w.periods = periods;
   w.transient_periods = 1;
   return w;
 }
@@ -182,9 +182,7 @@ TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
   CanRig rig;
   rig.boot();
   const auto stage = rig.resident();
-  Waveforms endless = waveforms();
-  endless.periods = 5000;
-  stage->upload(endless);
+  stage->upload(waveforms(5000));
   stage->arm({});
   rig.serve_ms(1000);
   EXPECT_EQ(rig.node().state(), NodeState::measuring);
@@ -197,9 +195,7 @@ TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
 TEST(CanResidentStage, StopBringsAPlayingNodeToRestUnderControl) {
   CanRig rig;
   const auto stage = rig.resident();
-  Waveforms endless = waveforms();
-  endless.periods = 5000;
-  stage->upload(endless);
+  stage->upload(waveforms(5000));
   stage->arm({});
   stage->stop();
   EXPECT_EQ(rig.node().state(), NodeState::quick_stop);

@@ -51,10 +51,13 @@ class Registers : public testing::Test {
   }
   void begin() {
     ASSERT_TRUE(bench_->node().request(SupervisorCommand::enable).accepted);
-    ASSERT_EQ(write(kOwner, map::kRunCommand, {map::kRunBegin, 11, 0, 7, 0}),
-              ModbusException::none);
+    ASSERT_EQ(command(kOwner, map::kRunBegin, 11), ModbusException::none);
     session_ = read(kOwner, map::kSession);
     ASSERT_NE(session_, 0U);
+  }
+  ModbusException command(ModbusConnection from, std::uint32_t command, std::uint32_t sequence,
+                          std::uint32_t key = 0) {
+    return write(from, map::kRunCommand, {command, sequence, 0, sequence, key});  // the seed: any
   }
   ModbusException move(ModbusConnection from, std::uint32_t key, std::uint32_t sequence) {
     return write(from, map::kRunKey, {key, sequence, 1000, 0});
@@ -72,13 +75,10 @@ TEST_F(Registers, OnlyTheOwnersConnectionAndKeyMoveTheStage) {
   EXPECT_EQ(move(kOther, session_, 2), ModbusException::busy) << "the key, another connection";
   EXPECT_EQ(move(kOwner, session_ + 1, 2), ModbusException::busy) << "another key";
   EXPECT_EQ(write(kOther, map::kSetpoint, {5}), ModbusException::busy);
-  EXPECT_EQ(write(kOther, map::kRunCommand, {map::kRunEnd, 12, 0, 0, session_}),
-            ModbusException::busy);
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunEnd, 12, 0, 0, session_ + 1}),
-            ModbusException::busy);
-  EXPECT_EQ(write(kOther, map::kRunCommand, {map::kRunBegin, 13, 0, 0, 0}), ModbusException::busy);
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunBegin, 13, 0, 0, session_}),
-            ModbusException::busy);
+  EXPECT_EQ(command(kOther, map::kRunEnd, 12, session_), ModbusException::busy);
+  EXPECT_EQ(command(kOwner, map::kRunEnd, 12, session_ + 1), ModbusException::busy);
+  EXPECT_EQ(command(kOther, map::kRunBegin, 13), ModbusException::busy);
+  EXPECT_EQ(command(kOwner, map::kRunBegin, 13, session_), ModbusException::busy);
   EXPECT_EQ(image(), before) << "a refused request has changed something";
   EXPECT_EQ(moved(), 1U);
   EXPECT_EQ(move(kOwner, session_, 2), ModbusException::none);
@@ -95,12 +95,11 @@ TEST_F(Registers, TheKeyIsShownToItsOwnerOnly) {
 
 TEST_F(Registers, TheSameBeginAgainIsAnsweredAndEveryRunHasItsKey) {
   begin();
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunBegin, 11, 0, 7, 0}), ModbusException::none);
+  EXPECT_EQ(command(kOwner, map::kRunBegin, 11), ModbusException::none);
   EXPECT_EQ(read(kOwner, map::kSession), session_);
   EXPECT_EQ(move(kOwner, session_, 1), ModbusException::none);
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunEnd, 12, 0, 0, session_}),
-            ModbusException::none);
-  EXPECT_EQ(write(kOther, map::kRunCommand, {map::kRunBegin, 13, 0, 0, 0}), ModbusException::none);
+  EXPECT_EQ(command(kOwner, map::kRunEnd, 12, session_), ModbusException::none);
+  EXPECT_EQ(command(kOther, map::kRunBegin, 13), ModbusException::none);
   const std::uint32_t next = read(kOther, map::kSession);
   EXPECT_NE(next, session_);
   EXPECT_EQ(move(kOwner, session_, 1), ModbusException::busy) << "its run is over";
@@ -109,10 +108,8 @@ TEST_F(Registers, TheSameBeginAgainIsAnsweredAndEveryRunHasItsKey) {
 
 TEST_F(Registers, ARunThatDoesNotBeginChangesNothing) {
   const std::vector<std::uint16_t> before = image();
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunBegin, 11, 0, 7, 0}),
-            ModbusException::device_failure)
-      << "not enabled";
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunEnd, 11, 0, 7, 0}), ModbusException::busy);
+  EXPECT_EQ(command(kOwner, map::kRunBegin, 11), ModbusException::device_failure) << "not enabled";
+  EXPECT_EQ(command(kOwner, map::kRunEnd, 11), ModbusException::busy);
   EXPECT_EQ(move(kOwner, 0, 1), ModbusException::busy);
   EXPECT_EQ(image(), before);
 }
@@ -191,8 +188,7 @@ TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
     ASSERT_EQ(moved(), sequence);
     ASSERT_EQ(bench_->fake->commands.back()[0], 1000 * 0x1p-26);
   }
-  EXPECT_EQ(write(kOwner, map::kRunCommand, {map::kRunEnd, 77, 0, 0, session_}),
-            ModbusException::none);
+  EXPECT_EQ(command(kOwner, map::kRunEnd, 77, session_), ModbusException::none);
   EXPECT_EQ(bench_->node().state(), NodeState::operation_enabled);
 }
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 
 #include "hal/modbus/modbus_map.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
@@ -19,15 +18,6 @@ using testing::HasSubstr;
 
 const ModbusSupervisorOptions kQuick = {0.01, 0.02, 0.1};
 
-/// Waits for an event; ten seconds allow for a busy machine.
-bool comes(const std::function<bool()>& condition) {
-  for (int i = 0; i < 2000; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return false;
-}
-
 bool fresh(const ModbusSupervisor& supervisor) {
   return supervisor.snapshot().t_ns != 0 && supervisor.trouble().empty();
 }
@@ -35,20 +25,21 @@ bool fresh(const ModbusSupervisor& supervisor) {
 TEST(ModbusSupervisor, ShowsThePlant) {
   const ModbusBench bench;
   const ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
-  ASSERT_TRUE(comes([&] { return fresh(supervisor); })) << supervisor.trouble();
+  ASSERT_TRUE(test::comes([&] { return fresh(supervisor); })) << supervisor.trouble();
   const PlantSnapshot snapshot = supervisor.snapshot();
   EXPECT_TRUE(snapshot.interlock_closed);
   EXPECT_FALSE(snapshot.enabled);
   EXPECT_EQ(snapshot.state, NodeState::switch_on_disabled);
   EXPECT_EQ(snapshot.gravity_compensator_n, (std::vector<double>{50.0, 51.5}));
   EXPECT_EQ(snapshot.temperature_k, std::vector<double>{295.25});
-  EXPECT_TRUE(comes([&] { return supervisor.snapshot().heartbeat > snapshot.heartbeat + 2; }));
+  EXPECT_TRUE(
+      test::comes([&] { return supervisor.snapshot().heartbeat > snapshot.heartbeat + 2; }));
 }
 
 TEST(ModbusSupervisor, GivesEveryCommandOnceAndTellsTheAnswer) {
   ModbusBench bench({}, true);
   ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
-  ASSERT_TRUE(comes([&] { return fresh(supervisor); })) << supervisor.trouble();
+  ASSERT_TRUE(test::comes([&] { return fresh(supervisor); })) << supervisor.trouble();
   EXPECT_TRUE(supervisor.request(SupervisorCommand::enable).accepted);
   EXPECT_EQ(bench.node().state(), NodeState::operation_enabled);
   EXPECT_TRUE(supervisor.request(SupervisorCommand::disable).accepted);
@@ -64,8 +55,8 @@ TEST(ModbusSupervisor, GivesEveryCommandOnceAndTellsTheAnswer) {
 TEST(ModbusSupervisor, AHeartbeatThatStandsStillMakesNoFreshSnapshot) {
   const ModbusBench bench({"heartbeat@20"});
   const ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
-  ASSERT_TRUE(comes([&] { return fresh(supervisor); }));
-  ASSERT_TRUE(comes([&] { return !supervisor.trouble().empty(); }));
+  ASSERT_TRUE(test::comes([&] { return fresh(supervisor); }));
+  ASSERT_TRUE(test::comes([&] { return !supervisor.trouble().empty(); }));
   EXPECT_THAT(supervisor.trouble(), HasSubstr("the heartbeat stopped"));
   const std::int64_t last_ns = supervisor.snapshot().t_ns;
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -76,10 +67,10 @@ TEST(ModbusSupervisor, OneFailedPollIsRepeatedWithoutTrouble) {
   for (const char* fault : {"late_reply@10:0.6", "half_frame@10", "exception@10:6"}) {
     const ModbusBench bench({fault}, true);
     const ModbusSupervisor supervisor(bench.address(), test::kQuickTiming, kQuick);
-    ASSERT_TRUE(comes([&] { return fresh(supervisor); }));
+    ASSERT_TRUE(test::comes([&] { return fresh(supervisor); }));
     bool trouble = false;
     const std::uint32_t begin = supervisor.snapshot().heartbeat;
-    EXPECT_TRUE(comes([&] {
+    EXPECT_TRUE(test::comes([&] {
       trouble |= !supervisor.trouble().empty();
       return supervisor.snapshot().heartbeat > begin + 15;
     })) << fault;
@@ -91,12 +82,12 @@ TEST(ModbusSupervisor, ConnectsAgainWhenTheServerIsBack) {
   ModbusBench bench;
   const ModbusAddress address = bench.address();
   ModbusSupervisor supervisor(address, test::kQuickTiming, kQuick);
-  ASSERT_TRUE(comes([&] { return fresh(supervisor); }));
+  ASSERT_TRUE(test::comes([&] { return fresh(supervisor); }));
   bench.stop();
-  ASSERT_TRUE(comes([&] { return !supervisor.trouble().empty(); }));
+  ASSERT_TRUE(test::comes([&] { return !supervisor.trouble().empty(); }));
   EXPECT_FALSE(supervisor.request(SupervisorCommand::enable).accepted);
   bench.restart(address.port);
-  EXPECT_TRUE(comes([&] { return fresh(supervisor); })) << supervisor.trouble();
+  EXPECT_TRUE(test::comes([&] { return fresh(supervisor); })) << supervisor.trouble();
   EXPECT_TRUE(supervisor.request(SupervisorCommand::enable).accepted);
 }
 
@@ -120,7 +111,7 @@ TEST(ModbusSupervisor, AnotherDeviceOrMapIsNamed) {
     const ModbusSupervisor supervisor(server.address(), test::kQuickTiming, kQuick);
     const char* wanted =
         version == 0 ? "check the unit" : "different protocol version (register map 1; expected 2)";
-    EXPECT_TRUE(comes([&] { return supervisor.trouble().find(wanted) != std::string::npos; }))
+    EXPECT_TRUE(test::comes([&] { return supervisor.trouble().find(wanted) != std::string::npos; }))
         << supervisor.trouble();
     EXPECT_EQ(supervisor.snapshot().t_ns, 0);
   }
@@ -134,7 +125,7 @@ TEST(ModbusSupervisor, ANodeNoticesThatItsSupervisorIsGone) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     EXPECT_EQ(bench.node().state(), NodeState::operation_enabled) << "while it counts";
   }
-  EXPECT_TRUE(comes([&] { return bench.node().state() == NodeState::fault; }));
+  EXPECT_TRUE(test::comes([&] { return bench.node().state() == NodeState::fault; }));
   EXPECT_EQ(bench.node().cause(), FaultCause::host_heartbeat);
 }
 

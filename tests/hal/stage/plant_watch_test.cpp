@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/stage/pacer.hpp"
+#include "tests/hal/stage_bench.hpp"
 
 namespace stageid {
 namespace test_plant_watch {
@@ -93,11 +94,8 @@ class FakeSupervisor final : public Supervisor {
   std::vector<SupervisorCommand> requests_;
 };
 
-/// Waits for a flag; ten seconds allow for a busy machine.
 bool trips(const PlantWatch& watch) {
-  for (int i = 0; i < 2000 && !watch.tripped(); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  return watch.tripped();
+  return test::comes([&] { return watch.tripped().load(); });
 }
 
 TEST(PlantWatch, EnablesWatchesAndDisables) {
