@@ -47,10 +47,7 @@ bool CanLink::answers(const CanState& state, std::uint16_t sequence) const noexc
 bool CanLink::take(const CanFrame& frame) noexcept {
   if (frame.id == kCanStateId) {
     CanState state;
-    if (!decode_can_state(frame, state)) {
-      ++damaged_;
-      return true;
-    }
+    if (!decode_can_state(frame, state)) return true;
     if (boot_ != 0 && state.boot != boot_) {
       other_node_ = true;
       return true;

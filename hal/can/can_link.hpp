@@ -43,7 +43,6 @@ class CanLink {
   bool other_node() const noexcept { return other_node_; }
   /// Last text message of the node.
   std::string text() const;
-  std::uint64_t damaged() const noexcept { return damaged_; }
 
   std::uint32_t host() const noexcept { return host_; }
   /// Key of the run; 0: no run has begun.
@@ -68,7 +67,6 @@ class CanLink {
   CanState state_;
   CanState answer_;  // to the last command
   std::uint64_t states_ = 0;
-  std::uint64_t damaged_ = 0;
   std::vector<CanFrame> inbox_;
   std::vector<std::string> text_;
 };

@@ -26,7 +26,6 @@ CanResidentStage::CanResidentStage(StageInfo info, const CanSpec& spec,
                                    std::unique_ptr<CanTransport> transport,
                                    const CanHostOptions& options)
     : info_(std::move(info)),
-      spec_(spec),
       layout_(can_layout(spec, info_)),
       transport_(std::move(transport)),
       link_(*transport_, layout_.fingerprint, options.interrupted),

@@ -40,7 +40,6 @@ class CanResidentStage final : public ResidentStage {
   bool read(CanMemory memory, std::vector<std::uint8_t>& bytes, std::size_t& chunks_done);
 
   StageInfo info_;
-  CanSpec spec_;
   CanLayout layout_;
   std::unique_ptr<CanTransport> transport_;
   CanLink link_;

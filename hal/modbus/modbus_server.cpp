@@ -17,7 +17,6 @@
 #include <thread>
 #include <utility>
 
-#include "hal/modbus/modbus_frame.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
@@ -206,7 +205,7 @@ void ModbusServer::answer_next(Line& line) {
   const bool complete = request.status == FrameStatus::complete;
   if (complete) {
     line.last_request_ns = monotonic_ns();
-    answer(line, request.transaction, request.unit, request.pdu);
+    answer(line, request);
   }
   line.closed |= request.status == FrameStatus::broken;
   // An incomplete TCP request remains in the buffer.
@@ -222,14 +221,13 @@ void ModbusServer::answer_next(Line& line) {
   }
 }
 
-void ModbusServer::answer(Line& line, std::uint16_t transaction, std::uint8_t unit,
-                          std::span<const std::uint8_t> request) {
+void ModbusServer::answer(Line& line, ModbusRequest request) {
   using Kind = ModbusFault::Kind;
   std::array<std::uint8_t, kLargestPdu> out{};
-  if (unit != static_cast<std::uint8_t>(address_.unit)) {
+  if (request.unit != static_cast<std::uint8_t>(address_.unit)) {
     if (address_.serial()) return;
-    const std::size_t bytes = exception_reply(request[0], ModbusException::gateway_target, out);
-    reply(line, transaction, unit, std::span(out).first(bytes));
+    const std::size_t bytes = exception_reply(request.pdu[0], ModbusException::gateway_target, out);
+    reply(line, request, std::span(out).first(bytes));
     return;
   }
   if (faults_ != nullptr) faults_->next_request();
@@ -241,20 +239,20 @@ void ModbusServer::answer(Line& line, std::uint16_t transaction, std::uint8_t un
   }
   std::size_t bytes = 0;
   if (const ModbusFault* refusal = fault(Kind::exception)) {
-    bytes = exception_reply(request[0], static_cast<ModbusException>(refusal->value), out);
+    bytes = exception_reply(request.pdu[0], static_cast<ModbusException>(refusal->value), out);
   } else {
-    bytes = answer_request(request, line.connection, registers_, out);
+    bytes = answer_request(request.pdu, line.connection, registers_, out);
   }
   if (fault(Kind::wrong_unit) != nullptr) {
     std::fill(out.begin() + 2, out.end(), std::uint8_t{0});
-    ++unit;
+    ++request.unit;
   }
-  reply(line, transaction, unit, std::span(out).first(bytes));
+  reply(line, request, std::span(out).first(bytes));
 }
 
-void ModbusServer::reply(Line& line, std::uint16_t transaction, std::uint8_t unit,
-                         std::span<const std::uint8_t> pdu) {
-  line.unsent = address_.serial() ? rtu_frame(unit, pdu) : tcp_frame(transaction, unit, pdu);
+void ModbusServer::reply(Line& line, const ModbusRequest& to, std::span<const std::uint8_t> pdu) {
+  line.unsent =
+      address_.serial() ? rtu_frame(to.unit, pdu) : tcp_frame(to.transaction, to.unit, pdu);
   line.owing_since_ns = monotonic_ns();
   if (fault(ModbusFault::Kind::half_frame) != nullptr) line.unsent.resize(line.unsent.size() / 2);
   if (const ModbusFault* late = fault(ModbusFault::Kind::late_reply)) {

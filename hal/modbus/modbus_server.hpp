@@ -7,6 +7,7 @@
 
 #include "hal/modbus/modbus_address.hpp"
 #include "hal/modbus/modbus_fault.hpp"
+#include "hal/modbus/modbus_frame.hpp"
 #include "hal/modbus/modbus_pdu.hpp"
 
 namespace stageid {
@@ -56,10 +57,8 @@ class ModbusServer {
   bool make_room();
   void receive(Line& line);
   void answer_next(Line& line);
-  void answer(Line& line, std::uint16_t transaction, std::uint8_t unit,
-              std::span<const std::uint8_t> request);
-  void reply(Line& line, std::uint16_t transaction, std::uint8_t unit,
-             std::span<const std::uint8_t> pdu);
+  void answer(Line& line, ModbusRequest request);
+  void reply(Line& line, const ModbusRequest& to, std::span<const std::uint8_t> pdu);
   void send(Line& line);
   void look_at_time(Line& line);
   void hang_up(const Line& line);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 
 #include "hal/stage/motion_controller.hpp"
 #include "tests/hal/can/can_rig.hpp"
@@ -54,11 +53,9 @@ class Rows final : public TraceSink {
     EXPECT_EQ(first_cycle, outcome.size());
     value.insert(value.end(), values.begin(), values.end());
     outcome.insert(outcome.end(), outcomes.begin(), outcomes.end());
-    if (after_block) after_block();
   }
   std::vector<double> value;
   std::vector<Outcome> outcome;
-  std::function<void()> after_block;
 };
 
 Waveforms waveforms(int periods = 2) {
