@@ -93,11 +93,13 @@ void no_value(CanSaid& said) {
   reseal(*said.frame);
 }
 
-void every_state(CanSaid& said, const std::function<void(CanState&)>& change) {
-  CanState state;
-  if (said.frame->id != kCanStateId || !decode_can_state(*said.frame, state)) return;
-  change(state);
-  *said.frame = encode_can_state(state);
+std::function<void(CanSaid&)> every_state(std::function<void(CanState&)> change) {
+  return [change = std::move(change)](CanSaid& said) {
+    CanState state;
+    if (said.frame->id != kCanStateId || !decode_can_state(*said.frame, state)) return;
+    change(state);
+    *said.frame = encode_can_state(state);
+  };
 }
 
 class CanPeer : public testing::TestWithParam<CanRow> {};
@@ -188,20 +190,15 @@ INSTANTIATE_TEST_SUITE_P(
                }},
         CanRow{PeerStatus::other_node, with_state([](CanState& s) { s.boot ^= 8U; })},
         CanRow{PeerStatus::first_sample_missing, no_value, true},
-        CanRow{PeerStatus::in_fault,
-               [](CanSaid& s) {
-                 every_state(s, [](CanState& told) { told.state = NodeState::fault; });
-               },
+        CanRow{PeerStatus::in_fault, every_state([](CanState& s) { s.state = NodeState::fault; }),
                true},
         CanRow{PeerStatus::two_nodes,
                [](CanSaid& s) {
                  if (s.frame->id == kCanStateId) s.state([](CanState& told) { told.boot ^= 8U; });
                },
                true},
-        CanRow{PeerStatus::other_version,
-               [](CanSaid& s) { every_state(s, [](CanState& told) { told.version = 1; }); }, true},
-        CanRow{PeerStatus::other_stage,
-               [](CanSaid& s) { every_state(s, [](CanState& told) { told.fingerprint ^= 1U; }); },
+        CanRow{PeerStatus::other_version, every_state([](CanState& s) { s.version = 1; }), true},
+        CanRow{PeerStatus::other_stage, every_state([](CanState& s) { s.fingerprint ^= 1U; }),
                true}),
     name_of<CanSaid>);
 
