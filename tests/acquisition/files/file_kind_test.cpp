@@ -14,8 +14,7 @@
 #include "acquisition/files/system_reason.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_file_kind {
+namespace stageid::test_file_kind {
 
 using testing::StartsWith;
 
@@ -97,5 +96,4 @@ TEST(Counted, OneHasNoS) {
   EXPECT_EQ(listed({}, 2), "");
 }
 
-}  // namespace test_file_kind
-}  // namespace stageid
+}  // namespace stageid::test_file_kind

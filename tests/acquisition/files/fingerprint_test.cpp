@@ -9,8 +9,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_fingerprint {
+namespace stageid::test_fingerprint {
 
 // Computed by XXH3_128bits() of libxxhash 0.8.1, called from Python.
 constexpr const char* kOfNothing = "99aa06d3014798d86001c324468d497f";
@@ -48,5 +47,4 @@ TEST(Fingerprint, SaysWhichFileCannotBeRead) {
     test::expect_error<FileError>([&] { fingerprint_of_file(file); }, file, "cannot be read");
 }
 
-}  // namespace test_fingerprint
-}  // namespace stageid
+}  // namespace stageid::test_fingerprint

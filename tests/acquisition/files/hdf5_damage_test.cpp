@@ -14,8 +14,7 @@
 #include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_hdf5_damage {
+namespace stageid::test_hdf5_damage {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -171,5 +170,4 @@ TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
   }
 }
 
-}  // namespace test_hdf5_damage
-}  // namespace stageid
+}  // namespace stageid::test_hdf5_damage

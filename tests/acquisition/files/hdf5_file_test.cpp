@@ -19,8 +19,7 @@
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_hdf5_file {
+namespace stageid::test_hdf5_file {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -272,5 +271,4 @@ TEST(Hdf5File, CloseTwiceIsOnce) {
   EXPECT_TRUE(Hdf5File::open(directory / "f.h5").exists("/"));
 }
 
-}  // namespace test_hdf5_file
-}  // namespace stageid
+}  // namespace stageid::test_hdf5_file

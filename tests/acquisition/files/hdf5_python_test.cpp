@@ -10,8 +10,7 @@
 #include "tests/support/process/python_script.hpp"
 
 /// Reads files of h5py, and lets h5py read stageid's files.
-namespace stageid {
-namespace test_hdf5_python {
+namespace stageid::test_hdf5_python {
 
 using Hdf5Python = test::PythonScriptTest;
 
@@ -161,5 +160,4 @@ assert int(f.attrs['seed']) == 5
 )");
 }
 
-}  // namespace test_hdf5_python
-}  // namespace stageid
+}  // namespace stageid::test_hdf5_python

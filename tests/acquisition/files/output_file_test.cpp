@@ -14,8 +14,7 @@
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_output_file {
+namespace stageid::test_output_file {
 
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
@@ -135,5 +134,4 @@ TEST(OutputFile, CommitSaysThatTheTemporaryFileIsGone) {
   expect_file_error([&] { output.commit(); }, directory / "out", std::strerror(ENOENT));
 }
 
-}  // namespace test_output_file
-}  // namespace stageid
+}  // namespace stageid::test_output_file

@@ -14,8 +14,7 @@
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_convert_log {
+namespace stageid::test_convert_log {
 
 /// Two complete runs and an incomplete one.
 std::unique_ptr<LogReader> write_log(const std::filesystem::path& file) {
@@ -165,5 +164,4 @@ TEST(ConvertLog, LeavesNothingHalfWritten) {
   EXPECT_EQ(files, 1U) << "the log alone";
 }
 
-}  // namespace test_convert_log
-}  // namespace stageid
+}  // namespace stageid::test_convert_log

@@ -12,8 +12,7 @@
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_hdf5_log {
+namespace stageid::test_hdf5_log {
 
 using test::kPeriod;
 using testing::AllOf;
@@ -369,5 +368,4 @@ TEST(ForeignLog, IsRead) {
   EXPECT_EQ(reader->excitation(25).rows(), 10000);
 }
 
-}  // namespace test_hdf5_log
-}  // namespace stageid
+}  // namespace stageid::test_hdf5_log

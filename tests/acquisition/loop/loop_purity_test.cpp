@@ -29,8 +29,7 @@
 #include "tests/support/stages/analytic_stage.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_loop_purity {
+namespace stageid::test_loop_purity {
 
 constexpr std::uint64_t kSamples = 2000;
 
@@ -226,5 +225,4 @@ TEST(LoopPurityControl, AMemoryMapWouldHaveBeenSeen) {
 
 INSTANTIATE_TEST_SUITE_P(VirtualAndWall, LoopPurity, testing::Values(0.0, 1.0));
 
-}  // namespace test_loop_purity
-}  // namespace stageid
+}  // namespace stageid::test_loop_purity

@@ -10,8 +10,7 @@
 #include "acquisition/loop/measurement_loop.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
-namespace stageid {
-namespace test_measurement_loop_instants {
+namespace stageid::test_measurement_loop_instants {
 
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr std::int64_t kDelay_ns = 300'000;  // from the instant of the setpoint to the arrival
@@ -147,5 +146,4 @@ TEST(MeasurementLoopInstants, ArrivalAndTimeOfTheNodeAreInTheRows) {
             static_cast<std::uint16_t>((kNode_ns + 50 * kPeriod_ns + 5'000) / 1000));
 }
 
-}  // namespace test_measurement_loop_instants
-}  // namespace stageid
+}  // namespace stageid::test_measurement_loop_instants

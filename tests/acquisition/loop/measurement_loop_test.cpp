@@ -13,8 +13,7 @@
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
-namespace stageid {
-namespace test_measurement_loop {
+namespace stageid::test_measurement_loop {
 
 using namespace test::measurement_loop;
 using test::AnalyticStage;
@@ -511,5 +510,4 @@ TEST_F(MeasurementLoopTest, RefusesWhatDoesNotFit) {
   EXPECT_EQ(loop.step(), LoopStatus::ended);
 }
 
-}  // namespace test_measurement_loop
-}  // namespace stageid
+}  // namespace stageid::test_measurement_loop

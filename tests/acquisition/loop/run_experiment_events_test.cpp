@@ -13,8 +13,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
-namespace stageid {
-namespace test_run_experiment_events {
+namespace stageid::test_run_experiment_events {
 
 using test::AnalyticStage;
 using testing::HasSubstr;
@@ -154,5 +153,4 @@ TEST_F(RunExperimentEvents, HoldingIsToldAsNotRecorded) {
   EXPECT_THAT(holds[0], testing::Not(HasSubstr("\"cycles_not_recorded\":0}")));
 }
 
-}  // namespace test_run_experiment_events
-}  // namespace stageid
+}  // namespace stageid::test_run_experiment_events

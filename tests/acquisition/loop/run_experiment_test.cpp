@@ -16,8 +16,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
-namespace stageid {
-namespace test_run_experiment {
+namespace stageid::test_run_experiment {
 
 using test::AnalyticStage;
 using testing::HasSubstr;
@@ -412,5 +411,4 @@ TEST_F(RunExperiment, ALimitBetweenRunsStopsAHeldStageAndKeepsTheRun) {
   EXPECT_GE(result.runs_done, 1);
 }
 
-}  // namespace test_run_experiment
-}  // namespace stageid
+}  // namespace stageid::test_run_experiment

@@ -13,8 +13,7 @@
 #include "tests/acquisition/loop/small_plan.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_run_resident {
+namespace stageid::test_run_resident {
 
 using testing::HasSubstr;
 
@@ -167,5 +166,4 @@ TEST_F(RunResident, ALogOfAnotherPlanIsRefused) {
   EXPECT_THROW(run_resident_experiment(another, stage_, log, {}), std::invalid_argument);
 }
 
-}  // namespace test_run_resident
-}  // namespace stageid
+}  // namespace stageid::test_run_resident

@@ -4,8 +4,7 @@
 
 #include <thread>
 
-namespace stageid {
-namespace test_sample_ring {
+namespace stageid::test_sample_ring {
 
 TEST(SampleRing, GivesRowsBackInOrderAndSaysWhenFull) {
   SampleRing ring(3, 4);
@@ -76,5 +75,4 @@ TEST(SampleRing, TwoThreadsLoseNothing) {
   EXPECT_TRUE(ring.front(1).empty());
 }
 
-}  // namespace test_sample_ring
-}  // namespace stageid
+}  // namespace stageid::test_sample_ring

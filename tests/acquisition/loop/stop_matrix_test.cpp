@@ -12,8 +12,7 @@
 #include "tests/acquisition/loop/stop_links.hpp"
 #include "tests/acquisition/loop/stop_table.hpp"
 
-namespace stageid {
-namespace test_stop_matrix {
+namespace stageid::test_stop_matrix {
 
 using Kind = WaferStageSpec::Fault::Kind;
 using testing::HasSubstr;
@@ -191,5 +190,4 @@ INSTANTIATE_TEST_SUITE_P(Links, StopMatrix,
                                           kLinkEvents),
                          name_of);
 
-}  // namespace test_stop_matrix
-}  // namespace stageid
+}  // namespace stageid::test_stop_matrix

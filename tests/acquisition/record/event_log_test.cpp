@@ -12,8 +12,7 @@
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_event_log {
+namespace stageid::test_event_log {
 
 using testing::HasSubstr;
 
@@ -117,5 +116,4 @@ TEST_F(EventLogTest, AStageThatFailsAllTheTimeDoesNotFillTheDisk) {
   EXPECT_THAT(lines.back(), HasSubstr(R"("misses_not_told":800)"));
 }
 
-}  // namespace test_event_log
-}  // namespace stageid
+}  // namespace stageid::test_event_log

@@ -15,8 +15,7 @@
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_experiment_plan_file {
+namespace stageid::test_experiment_plan_file {
 
 namespace fs = std::filesystem;
 using test::expect_error;
@@ -204,5 +203,4 @@ TEST(ExperimentPlanFile, RefusesOtherFiles) {
                             directory / "text.h5", "not an HDF5 file");
 }
 
-}  // namespace test_experiment_plan_file
-}  // namespace stageid
+}  // namespace stageid::test_experiment_plan_file

@@ -9,8 +9,7 @@
 
 #include "acquisition/slog/slog_json.hpp"
 
-namespace stageid {
-namespace test_run_timing {
+namespace stageid::test_run_timing {
 
 TEST(TimingHistogram, EveryNumberLiesInItsBinAndBinsAreNarrow) {
   std::mt19937_64 engine(3);
@@ -91,5 +90,4 @@ TEST(RunTiming, ABinThatIsNoneIsRefused) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("33 ns")));
 }
 
-}  // namespace test_run_timing
-}  // namespace stageid
+}  // namespace stageid::test_run_timing

@@ -5,8 +5,7 @@
 #include <cstdlib>
 #include <ctime>
 
-namespace stageid {
-namespace test_utc_time {
+namespace stageid::test_utc_time {
 
 std::time_t parsed(const std::string& text) {
   std::tm time{};
@@ -34,5 +33,4 @@ TEST(UtcTime, IsTheSameInEveryTimeZone) {
   }
 }
 
-}  // namespace test_utc_time
-}  // namespace stageid
+}  // namespace stageid::test_utc_time

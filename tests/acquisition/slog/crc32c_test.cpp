@@ -6,8 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace stageid {
-namespace test_crc32c {
+namespace stageid::test_crc32c {
 
 using Function = std::uint32_t (*)(std::span<const std::byte>, std::uint32_t) noexcept;
 
@@ -56,5 +55,4 @@ TEST_P(Crc32c, AgreesWithTheDefinitionBitByBitAtEveryLengthAndCut) {
 INSTANTIATE_TEST_SUITE_P(Both, Crc32c, testing::Values(&crc32c, &crc32c_portable),
                          [](const auto& which) { return which.index == 0 ? "Fast" : "Portable"; });
 
-}  // namespace test_crc32c
-}  // namespace stageid
+}  // namespace stageid::test_crc32c

@@ -10,8 +10,7 @@
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_slog_damage {
+namespace stageid::test_slog_damage {
 
 using test::TemporaryDirectory;
 
@@ -300,5 +299,4 @@ TEST_F(SlogRecover, VerifyCountsAndNamesTheDamage) {
   EXPECT_EQ(report.damage[0].bytes, slog_block_bytes(blocks_[damaged].header));
 }
 
-}  // namespace test_slog_damage
-}  // namespace stageid
+}  // namespace stageid::test_slog_damage

@@ -15,8 +15,7 @@
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_slog_kill {
+namespace stageid::test_slog_kill {
 
 /// A counter that outlives the counting process.
 class SharedCounter {
@@ -89,5 +88,4 @@ TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
   EXPECT_EQ(with_rows, 20);
 }
 
-}  // namespace test_slog_kill
-}  // namespace stageid
+}  // namespace stageid::test_slog_kill

@@ -14,8 +14,7 @@
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_slog_reader {
+namespace stageid::test_slog_reader {
 
 using test::TemporaryDirectory;
 using testing::AllOf;
@@ -243,5 +242,4 @@ TEST(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
-}  // namespace test_slog_reader
-}  // namespace stageid
+}  // namespace stageid::test_slog_reader

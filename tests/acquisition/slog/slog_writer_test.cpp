@@ -12,8 +12,7 @@
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_slog_writer {
+namespace stageid::test_slog_writer {
 
 using test::TemporaryDirectory;
 using testing::HasSubstr;
@@ -242,5 +241,4 @@ TEST(SlogWriter, ResumeDoesNotThrowIntactBlocksAway) {
   EXPECT_EQ(test::bytes_of(file), bytes);
 }
 
-}  // namespace test_slog_writer
-}  // namespace stageid
+}  // namespace stageid::test_slog_writer

@@ -13,8 +13,7 @@
 
 #include "excitation/multisine/random_stream.hpp"
 
-namespace stageid {
-namespace test_dft {
+namespace stageid::test_dft {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -117,5 +116,4 @@ TEST(RealDft, RefusesImpossibleSizes) {
   EXPECT_THROW(dft.inverse(Eigen::VectorXcd::Zero(8)), std::invalid_argument);
 }
 
-}  // namespace test_dft
-}  // namespace stageid
+}  // namespace stageid::test_dft

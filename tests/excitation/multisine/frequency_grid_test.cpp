@@ -12,8 +12,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/excitation/reference/multisine_reference.hpp"
 
-namespace stageid {
-namespace test_frequency_grid {
+namespace stageid::test_frequency_grid {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -132,5 +131,4 @@ TEST(FrequencyGrid, RefusesWhatBreaksItsInvariant) {
                std::invalid_argument);
 }
 
-}  // namespace test_frequency_grid
-}  // namespace stageid
+}  // namespace stageid::test_frequency_grid

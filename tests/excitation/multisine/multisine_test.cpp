@@ -17,8 +17,7 @@
 #include "excitation/multisine/random_stream.hpp"
 #include "tests/excitation/reference/multisine_reference.hpp"
 
-namespace stageid {
-namespace test_multisine {
+namespace stageid::test_multisine {
 
 namespace reference = test::reference;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -253,5 +252,4 @@ TEST(LineSpectrum, RefusesMoreSamplesThanAnIntCounts) {
   EXPECT_THROW(LineSpectrum(grid, 4), std::invalid_argument);
 }
 
-}  // namespace test_multisine
-}  // namespace stageid
+}  // namespace stageid::test_multisine

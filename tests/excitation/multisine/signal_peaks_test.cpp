@@ -8,8 +8,7 @@
 
 #include "excitation/plan/experiment_plan.hpp"
 
-namespace stageid {
-namespace test_signal_peaks {
+namespace stageid::test_signal_peaks {
 
 using Eigen::Index;
 
@@ -197,5 +196,4 @@ TEST(SignalPeaks, APeriodThatCannotBeDoubledIsRefused) {
   EXPECT_THROW(SignalPredictor{grid}, std::invalid_argument);
 }
 
-}  // namespace test_signal_peaks
-}  // namespace stageid
+}  // namespace stageid::test_signal_peaks

@@ -15,8 +15,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/excitation/reference/multisine_reference.hpp"
 
-namespace stageid {
-namespace test_experiment_plan {
+namespace stageid::test_experiment_plan {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -300,5 +299,4 @@ TEST(ExperimentPlan, RefusesRunsThatItDoesNotHave) {
   EXPECT_THROW(plan.phase_rad(3), std::invalid_argument);
 }
 
-}  // namespace test_experiment_plan
-}  // namespace stageid
+}  // namespace stageid::test_experiment_plan

@@ -6,8 +6,7 @@
 
 #include "tests/acquisition/files/expect_error.hpp"
 
-namespace stageid {
-namespace test_hadamard {
+namespace stageid::test_hadamard {
 
 TEST(Hadamard, EverySizeItPromisesIsOrthogonal) {
   int sizes = 0;
@@ -39,5 +38,4 @@ TEST(Hadamard, NamesTheNearestSizes) {
   EXPECT_THROW(hadamard_matrix(0), std::invalid_argument);
 }
 
-}  // namespace test_hadamard
-}  // namespace stageid
+}  // namespace stageid::test_hadamard

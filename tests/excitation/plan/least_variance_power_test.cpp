@@ -7,8 +7,7 @@
 #include "excitation/multisine/random_stream.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
 
-namespace stageid {
-namespace test_least_variance_power {
+namespace stageid::test_least_variance_power {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -83,5 +82,4 @@ TEST(LeastVariancePower, RefusesWhatHasNoAnswer) {
   refuse(c, open, "entry 1 is unbounded");
 }
 
-}  // namespace test_least_variance_power
-}  // namespace stageid
+}  // namespace stageid::test_least_variance_power

@@ -10,8 +10,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_limited_design {
+namespace stageid::test_limited_design {
 
 using Eigen::Index;
 
@@ -173,5 +172,4 @@ TEST(JointCrest, LowersAllSignalsTogetherAndKeepsTheAmplitudes) {
   EXPECT_EQ(reduce_joint_crest(easy, before, 200), before);
 }
 
-}  // namespace test_limited_design
-}  // namespace stageid
+}  // namespace stageid::test_limited_design

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace stageid {
-namespace test_worker_pool {
+namespace stageid::test_worker_pool {
 
 TEST(WorkerPool, EveryTaskRunsOnce) {
   std::vector<int> count(1000, 0);
@@ -40,5 +39,4 @@ TEST(WorkerPool, TasksWithoutAWorkerRunOnceAndPassExceptionsOn) {
                std::runtime_error);
 }
 
-}  // namespace test_worker_pool
-}  // namespace stageid
+}  // namespace stageid::test_worker_pool

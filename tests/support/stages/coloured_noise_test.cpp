@@ -8,8 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace stageid {
-namespace test_coloured_noise {
+namespace stageid::test_coloured_noise {
 
 constexpr double kRateHz = 1000.0;
 
@@ -88,5 +87,4 @@ TEST(ColouredNoise, RefusesAReferenceAboveHalfTheRate) {
   EXPECT_THROW(ColouredNoise(spec_of(NoiseColour::drift, 500.0)), std::invalid_argument);
 }
 
-}  // namespace test_coloured_noise
-}  // namespace stageid
+}  // namespace stageid::test_coloured_noise

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_dahl_friction {
+namespace stageid::test_dahl_friction {
 
 TEST(DahlFriction, IsASpringForSmallMotion) {
   DahlFriction friction(2.0, 1e6);
@@ -47,5 +46,4 @@ TEST(DahlFriction, CostsTheHysteresisOfACycle) {
   EXPECT_NEAR(work / expected, 1.0, 1e-4);
 }
 
-}  // namespace test_dahl_friction
-}  // namespace stageid
+}  // namespace stageid::test_dahl_friction
