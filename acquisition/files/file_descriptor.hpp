@@ -42,15 +42,22 @@ inline bool write_whole(const FileDescriptor& to, std::string_view text) noexcep
   return true;
 }
 
-/// Appends everything up to the end. @returns false if the system fails, with its reason in errno
-inline bool read_to_end(const FileDescriptor& from, std::string& text) {
+/// Calls take(std::string_view) with everything up to the end, piece by piece.
+/// @returns false if the system fails, with its reason in errno
+template <typename Take>
+bool read_pieces(const FileDescriptor& from, Take take) {
   std::string piece(std::size_t{1} << 18, '\0');
   while (true) {
     const ssize_t got = ::read(from.get(), piece.data(), piece.size());
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return got == 0;
-    text.append(piece, 0, static_cast<std::size_t>(got));
+    take(std::string_view(piece.data(), static_cast<std::size_t>(got)));
   }
+}
+
+/// Appends everything up to the end. @returns false if the system fails, with its reason in errno
+inline bool read_to_end(const FileDescriptor& from, std::string& text) {
+  return read_pieces(from, [&](std::string_view piece) { text += piece; });
 }
 
 }  // namespace stageid

@@ -7,23 +7,23 @@
 #include <string>
 #include <string_view>
 
+struct XXH3_state_s;
+
 namespace stageid {
 
 /// XXH3-128 of a stream of bytes: identifies inputs in outputs. Not a protection against forgery.
 class Fingerprint {
  public:
   Fingerprint();
-  ~Fingerprint();
-  Fingerprint(Fingerprint&&) noexcept;
-  Fingerprint& operator=(Fingerprint&&) noexcept;
-
   void add(std::span<const std::byte> bytes);
   void add(std::string_view text);
   std::string hex() const;  ///< 32 hexadecimal digits
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  struct Free {
+    void operator()(XXH3_state_s* state) const noexcept;
+  };
+  std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
 std::string fingerprint_of(std::string_view text);

@@ -9,6 +9,7 @@
 
 #include "acquisition/loop/excited_actuators.hpp"
 #include "excitation/decompositions/decompositions.hpp"
+#include "excitation/multisine/bounded_signal.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "hal/stage/motion_controller.hpp"
 
@@ -42,20 +43,6 @@ ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) 
   return loop;
 }
 
-/// Largest rms over an exponential window, in steady state.
-double thermal_rms(const Eigen::VectorXd& u, double rate_hz, double time_constant_s) {
-  const double a = std::exp(-1.0 / (rate_hz * time_constant_s));
-  double mean_square = u.squaredNorm() / static_cast<double>(u.size());
-  double largest = mean_square;
-  // The first period settles to within the ripple of a period, the second is evaluated.
-  for (int pass = 0; pass < 2; ++pass)
-    for (const double value : u) {
-      mean_square = a * mean_square + (1.0 - a) * value * value;
-      largest = std::max(largest, mean_square);
-    }
-  return std::sqrt(largest);
-}
-
 void compare(ChannelPrediction& channel, const char* what, double value,
              const Eigen::VectorXd& limits, Eigen::Index index, const char* per = "") {
   if (limits.size() == 0 || !(value > limits[index])) return;
@@ -71,8 +58,8 @@ class Predictor {
     result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
     if (!why_unpredictable(stage).empty()) return;
     loop_ = closed_loop(plan, stage);
-    for (const Channel& channel : stage.info.actuators) add(result_.actuators, channel);
-    for (const Channel& channel : stage.info.sensors) add(result_.sensors, channel);
+    for (const Channel& c : stage.info.actuators) result_.actuators.push_back({c.name, c.unit});
+    for (const Channel& c : stage.info.sensors) result_.sensors.push_back({c.name, c.unit});
   }
 
   DesignPrediction predict() {
@@ -87,13 +74,6 @@ class Predictor {
   }
 
  private:
-  static void add(std::vector<ChannelPrediction>& list, const Channel& channel) {
-    ChannelPrediction prediction;
-    prediction.name = channel.name;
-    prediction.unit = channel.unit;
-    list.push_back(std::move(prediction));
-  }
-
   void add_run(RunId run) {
     const Eigen::MatrixXd r = plan_.excitation(run);
     for (Eigen::Index axis = 0; axis < r.cols(); ++axis)
@@ -113,7 +93,7 @@ class Predictor {
       const double rate_hz = stage_.info.sample_rate_hz;
       channel.slew_per_s = std::max(channel.slew_per_s, step * rate_hz);
       channel.thermal_rms = std::max(
-          channel.thermal_rms, thermal_rms(u, rate_hz, stage_.limits.thermal_time_constant_s));
+          channel.thermal_rms, windowed_rms(u, rate_hz, stage_.limits.thermal_time_constant_s));
     }
     for (std::size_t i = 0; i < result_.sensors.size(); ++i)
       add_period(result_.sensors[i], period(loop_.to_y, R, static_cast<Eigen::Index>(i)));

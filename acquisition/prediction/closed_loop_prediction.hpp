@@ -17,7 +17,7 @@ struct ChannelPrediction {
   double peak = 0.0;         ///< largest absolute sample
   double slew_per_s = 0.0;   ///< actuators: largest change from sample to sample, times the rate
   double thermal_rms = 0.0;  ///< actuators: largest rms over the exponential window of the limit
-  std::vector<std::string> violations;  ///< one line each; empty: within all limits
+  std::vector<std::string> violations = {};  ///< one line each; empty: within all limits
 };
 
 struct DesignPrediction {

@@ -70,99 +70,71 @@ void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
 }
 
 MatrixXcd unmixed_spectrum(const MatrixXd& amplitude, const MatrixXd& phase_rad) {
-  MatrixXcd spectrum(amplitude.rows(), amplitude.cols());
-  for (Index p = 0; p < amplitude.rows(); ++p) {
-    spectrum.row(p) =
-        line_coefficients(1.0, amplitude.row(p).transpose(), phase_rad.row(p).transpose())
-            .transpose();
-  }
-  return spectrum;
+  return axis_coefficients(Eigen::VectorXcd::Ones(amplitude.rows()), amplitude, phase_rad);
 }
 
 // Reading --------------------------------------------------------------------------------------
 
-/// Reads the parts of a plan from an Hdf5File.
-class PlanReader {
- public:
-  explicit PlanReader(const std::filesystem::path& path)
-      : path_(path), file_(Hdf5File::open(path)) {}
+[[noreturn]] void fail(const Hdf5File& file, const std::string& place, const std::string& what) {
+  throw FormatError(file.path(), place, what);
+}
 
-  [[noreturn]] void fail(const std::string& place, const std::string& what) const {
-    throw FormatError(path_, place, what);
+int read_integer(const Hdf5File& file, const char* name, int least) {
+  const long long value = file.read_integer_attribute("/", name);
+  if (value < least || value > std::numeric_limits<int>::max()) {
+    fail(file, "/", fmt::format("attribute '{}' is {}; must be at least {}", name, value, least));
   }
-  int integer(const char* name, int least) const {
-    const long long value = file_.read_integer_attribute("/", name);
-    if (value < least || value > std::numeric_limits<int>::max()) {
-      fail("/", fmt::format("attribute '{}' is {}; must be at least {}", name, value, least));
-    }
-    return static_cast<int>(value);
-  }
-  template <typename Scalar = double>
-  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> matrix(const std::string& dataset,
-                                                               Index rows, Index columns) const {
-    require_shape(file_, dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
-    const std::vector<Scalar> values = read_array<Scalar>(file_, dataset);
-    return Eigen::Map<const RowMajor<Scalar>>(values.data(), rows, columns);
-  }
+  return static_cast<int>(value);
+}
 
-  void check_format() const {
-    require_format(file_, kFormat, "a designed excitation");
-    require_version(file_, kVersion);
-  }
-  FrequencyGrid grid() const;
-  ExperimentSpec spec(const FrequencyGrid& grid) const;
-  std::vector<MatrixXd> phases(const ExperimentSpec& spec, const FrequencyGrid& grid) const;
-  void check_agrees(const ExperimentPlan& plan) const;
+template <typename Scalar = double>
+Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> read_matrix(const Hdf5File& file,
+                                                                  const std::string& dataset,
+                                                                  Index rows, Index columns) {
+  require_shape(file, dataset, {static_cast<hsize_t>(rows), static_cast<hsize_t>(columns)});
+  const std::vector<Scalar> values = read_array<Scalar>(file, dataset);
+  return Eigen::Map<const RowMajor<Scalar>>(values.data(), rows, columns);
+}
 
- private:
-  template <typename Enum>
-  Enum word(const char* attribute) const;
-  std::vector<ExcitationAxis> axes(const FrequencyGrid& grid) const;
-  std::uint64_t seed() const;
-
-  std::filesystem::path path_;
-  Hdf5File file_;
-};
-
-FrequencyGrid PlanReader::grid() const {
-  const std::vector<double> numbers = file_.read_reals("/lines");
+FrequencyGrid read_grid(const Hdf5File& file) {
+  const std::vector<double> numbers = file.read_reals("/lines");
   std::vector<int> lines;
   for (const double number : numbers) {
     if (!(number >= 1.0 && number <= std::numeric_limits<int>::max()) ||
         number != std::floor(number)) {
-      fail("/lines", fmt::format("contains {}; expected positive integers", number));
+      fail(file, "/lines", fmt::format("contains {}; expected positive integers", number));
     }
     lines.push_back(static_cast<int>(number));
   }
-  return {file_.read_real_attribute("/", "sample_rate_hz"), integer("period_samples", 3),
+  return {file.read_real_attribute("/", "sample_rate_hz"), read_integer(file, "period_samples", 3),
           std::move(lines)};
 }
 
 template <typename Enum>
-Enum PlanReader::word(const char* attribute) const {
-  const std::string word = file_.read_text_attribute("/", attribute);
+Enum read_word(const Hdf5File& file, const char* attribute) {
+  const std::string word = file.read_text_attribute("/", attribute);
   if (const auto value = from_word<Enum>(word)) return *value;
-  fail("/",
+  fail(file, "/",
        fmt::format("attribute '{}' is '{}'; must be {}", attribute, word, one_of(kWords<Enum>)));
 }
 
-std::uint64_t PlanReader::seed() const {
-  const std::string text = file_.read_text_attribute("/", "seed");
+std::uint64_t read_seed(const Hdf5File& file) {
+  const std::string text = file.read_text_attribute("/", "seed");
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
   if (error != std::errc() || end != text.data() + text.size()) {
-    fail("/", "attribute 'seed' is '" + text + "'; expected an unsigned decimal number");
+    fail(file, "/", "attribute 'seed' is '" + text + "'; expected an unsigned decimal number");
   }
   return seed;
 }
 
-std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
-  const std::vector<std::string> channels = file_.read_texts("/axes");
+std::vector<ExcitationAxis> read_axes(const Hdf5File& file, const FrequencyGrid& grid) {
+  const std::vector<std::string> channels = file.read_texts("/axes");
   const auto count = static_cast<Index>(channels.size());
-  require_shape(file_, "/level", {channels.size()});
-  const std::vector<double> levels = file_.read_reals("/level");
-  const MatrixXd shape = file_.exists("/shape") ? matrix("/shape", count, grid.size())
-                                                : MatrixXd::Zero(count, grid.size());
+  require_shape(file, "/level", {channels.size()});
+  const std::vector<double> levels = file.read_reals("/level");
+  const MatrixXd shape = file.exists("/shape") ? read_matrix(file, "/shape", count, grid.size())
+                                               : MatrixXd::Zero(count, grid.size());
   std::vector<ExcitationAxis> axes;
   for (Index p = 0; p < count; ++p) {
     const auto i = static_cast<std::size_t>(p);
@@ -172,64 +144,64 @@ std::vector<ExcitationAxis> PlanReader::axes(const FrequencyGrid& grid) const {
   return axes;
 }
 
-ExperimentSpec PlanReader::spec(const FrequencyGrid& grid) const {
+ExperimentSpec read_spec(const Hdf5File& file, const FrequencyGrid& grid) {
   ExperimentSpec spec;
-  spec.scaling = word<AmplitudeScaling>("scaling");
-  spec.scheme = word<ExcitationScheme>("scheme");
-  spec.axes = axes(grid);
-  spec.realizations = integer("realizations", 1);
-  spec.periods = integer("periods", 1);
-  spec.transient_periods = integer("transient_periods", 0);
-  spec.crest_iterations = integer("crest_iterations", 0);
-  spec.seed = seed();
-  const std::size_t stored = file_.children("/realizations").size();
+  spec.scaling = read_word<AmplitudeScaling>(file, "scaling");
+  spec.scheme = read_word<ExcitationScheme>(file, "scheme");
+  spec.axes = read_axes(file, grid);
+  spec.realizations = read_integer(file, "realizations", 1);
+  spec.periods = read_integer(file, "periods", 1);
+  spec.transient_periods = read_integer(file, "transient_periods", 0);
+  spec.crest_iterations = read_integer(file, "crest_iterations", 0);
+  spec.seed = read_seed(file);
+  const std::size_t stored = file.children("/realizations").size();
   if (stored != static_cast<std::size_t>(spec.realizations)) {
-    fail("/realizations",
+    fail(file, "/realizations",
          fmt::format("contains {} realizations; expected {} according to attribute 'realizations'",
                      stored, spec.realizations));
   }
   return spec;
 }
 
-std::vector<MatrixXd> PlanReader::phases(const ExperimentSpec& spec,
-                                         const FrequencyGrid& grid) const {
+std::vector<MatrixXd> read_phases(const Hdf5File& file, const ExperimentSpec& spec,
+                                  const FrequencyGrid& grid) {
   const auto axes = static_cast<Index>(spec.axes.size());
   constexpr double kTurn = 2.0 * std::numbers::pi;
   std::vector<MatrixXd> phases;
   for (int m = 0; m < spec.realizations; ++m) {
     const std::string dataset = realization_group(m) + "/phase_rad";
-    phases.push_back(matrix(dataset, axes, grid.size()));
+    phases.push_back(read_matrix(file, dataset, axes, grid.size()));
     const auto values = phases.back().array();
     if (!(values >= 0.0 && values < kTurn).all()) {
-      fail(dataset,
+      fail(file, dataset,
            "contains phases that are out of range (0 to 2 pi) or NaN; run 'stageid design' again");
     }
   }
   return phases;
 }
 
-void PlanReader::check_agrees(const ExperimentPlan& plan) const {
+void check_agrees(const Hdf5File& file, const ExperimentPlan& plan) {
   // Far above the rounding of other machines, far below any relevant change.
   constexpr double kTolerance = 1e-9;
-  const auto check = [this](const auto& stored, const auto& wanted, const std::string& dataset) {
+  const auto check = [&file](const auto& stored, const auto& wanted, const std::string& dataset) {
     const double largest = wanted.cwiseAbs().maxCoeff();
     const double difference = (stored - wanted).cwiseAbs().maxCoeff();
     if (!stored.allFinite() || !(difference <= kTolerance * largest)) {
-      fail(dataset,
+      fail(file, dataset,
            "does not match the seed and the other fields of this file, which was altered or is "
            "damaged; run 'stageid design' again");
     }
   };
   const Index axes = plan.axes();
   const Index lines = plan.grid().size();
-  check(matrix("/amplitude", axes, lines), plan.amplitude(), "/amplitude");
-  check(matrix<std::complex<double>>("/mixing", axes, plan.experiments()), plan.mixing(),
+  check(read_matrix(file, "/amplitude", axes, lines), plan.amplitude(), "/amplitude");
+  check(read_matrix<std::complex<double>>(file, "/mixing", axes, plan.experiments()), plan.mixing(),
         "/mixing");
   for (int m = 0; m < plan.spec().realizations; ++m) {
     const std::string group = realization_group(m);
     const MatrixXd phase_rad = plan.phase_rad(m);
-    check(matrix(group + "/phase_rad", axes, lines), phase_rad, group + "/phase_rad");
-    check(matrix<std::complex<double>>(group + "/spectrum", axes, lines),
+    check(read_matrix(file, group + "/phase_rad", axes, lines), phase_rad, group + "/phase_rad");
+    check(read_matrix<std::complex<double>>(file, group + "/spectrum", axes, lines),
           unmixed_spectrum(plan.amplitude(), phase_rad), group + "/spectrum");
   }
 }
@@ -255,17 +227,18 @@ void write_experiment_plan(const std::filesystem::path& file, const ExperimentPl
 }
 
 ExperimentPlan read_experiment_plan(const std::filesystem::path& file) {
-  const PlanReader reader(file);
-  reader.check_format();
+  const Hdf5File hdf5 = Hdf5File::open(file);
+  require_format(hdf5, kFormat, "a designed excitation");
+  require_version(hdf5, kVersion);
   try {
-    FrequencyGrid grid = reader.grid();
-    ExperimentSpec spec = reader.spec(grid);
+    FrequencyGrid grid = read_grid(hdf5);
+    ExperimentSpec spec = read_spec(hdf5, grid);
     // Reduced phases are read from the file: on another machine, hundreds of transforms with other rounding may
     // have converged elsewhere.
     std::vector<MatrixXd> reduced;
-    if (spec.crest_iterations > 0) reduced = reader.phases(spec, grid);
+    if (spec.crest_iterations > 0) reduced = read_phases(hdf5, spec, grid);
     ExperimentPlan plan(std::move(grid), std::move(spec), std::move(reduced));
-    reader.check_agrees(plan);
+    check_agrees(hdf5, plan);
     return plan;
   } catch (const std::invalid_argument& e) {
     throw FormatError(file, "", std::string(e.what()) + "; run 'stageid design' again");

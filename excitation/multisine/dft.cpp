@@ -14,37 +14,28 @@ namespace stageid {
 struct RealDft::Plan {
   explicit Plan(int n)
       : length(n),
-        real(fftw_alloc_real(static_cast<std::size_t>(n))),
-        half(fftw_alloc_complex(static_cast<std::size_t>(n) / 2 + 1)) {
-    const std::lock_guard guard(fft_planner().lock);
-    if (real != nullptr && half != nullptr) {
-      forward = fftw_plan_dft_r2c_1d(n, real, half, fft_planner().flags);
-      inverse = fftw_plan_dft_c2r_1d(n, half, real, fft_planner().flags);
+        real(fftw_alloc_real(static_cast<std::size_t>(n)), &fftw_free),
+        half(fftw_alloc_complex(static_cast<std::size_t>(n) / 2 + 1), &fftw_free) {
+    if (!real || !half) throw std::bad_alloc();
+    {
+      const std::lock_guard guard(fft_planner().lock);
+      forward.reset(fftw_plan_dft_r2c_1d(n, real.get(), half.get(), fft_planner().flags));
+      inverse.reset(fftw_plan_dft_c2r_1d(n, half.get(), real.get(), fft_planner().flags));
     }
-    if (forward == nullptr || inverse == nullptr) {
-      release();
-      throw std::bad_alloc();
-    }
-  }
-  ~Plan() {
-    const std::lock_guard guard(fft_planner().lock);
-    release();
-  }
-  Plan(const Plan&) = delete;
-  Plan& operator=(const Plan&) = delete;
-
-  void release() noexcept {
-    if (forward != nullptr) fftw_destroy_plan(forward);
-    if (inverse != nullptr) fftw_destroy_plan(inverse);
-    fftw_free(real);
-    fftw_free(half);
+    if (!forward || !inverse) throw std::bad_alloc();
   }
 
+  struct Destroy {
+    void operator()(fftw_plan plan) const {
+      const std::lock_guard guard(fft_planner().lock);
+      fftw_destroy_plan(plan);
+    }
+  };
   int length;
-  double* real;
-  fftw_complex* half;
-  fftw_plan forward = nullptr;
-  fftw_plan inverse = nullptr;
+  std::unique_ptr<double, void (*)(void*)> real;
+  std::unique_ptr<fftw_complex, void (*)(void*)> half;
+  std::unique_ptr<fftw_plan_s, Destroy> forward;
+  std::unique_ptr<fftw_plan_s, Destroy> inverse;
 };
 
 RealDft::RealDft(int length) {
@@ -58,19 +49,19 @@ RealDft& RealDft::operator=(RealDft&&) noexcept = default;
 int RealDft::length() const noexcept { return plan_->length; }
 
 std::span<double> RealDft::input() noexcept {
-  return {plan_->real, static_cast<std::size_t>(plan_->length)};
+  return {plan_->real.get(), static_cast<std::size_t>(plan_->length)};
 }
 
 std::span<const std::complex<double>> RealDft::forward() {
-  fftw_execute(plan_->forward);
+  fftw_execute(plan_->forward.get());
   // FFTW documents that fftw_complex and std::complex<double> have the same layout.
-  return {reinterpret_cast<const std::complex<double>*>(plan_->half),
+  return {reinterpret_cast<const std::complex<double>*>(plan_->half.get()),
           static_cast<std::size_t>(half_size())};
 }
 
 std::span<const std::complex<double>> RealDft::forward(
     const Eigen::Ref<const Eigen::VectorXd>& samples) {
-  std::copy_n(samples.data(), samples.size(), plan_->real);
+  std::copy_n(samples.data(), samples.size(), plan_->real.get());
   return forward();
 }
 
@@ -79,9 +70,9 @@ Eigen::VectorXd RealDft::inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_
     throw std::invalid_argument("inverse DFT: the half spectrum must have length / 2 + 1 entries");
   }
   std::copy(half_spectrum.data(), half_spectrum.data() + half_spectrum.size(),
-            reinterpret_cast<std::complex<double>*>(plan_->half));
-  fftw_execute(plan_->inverse);
-  return Eigen::Map<const Eigen::VectorXd>(plan_->real, plan_->length);
+            reinterpret_cast<std::complex<double>*>(plan_->half.get()));
+  fftw_execute(plan_->inverse.get());
+  return Eigen::Map<const Eigen::VectorXd>(plan_->real.get(), plan_->length);
 }
 
 }  // namespace stageid
