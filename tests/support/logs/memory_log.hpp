@@ -11,6 +11,17 @@
 
 namespace stageid::test {
 
+/// prefix1, prefix2, ...
+inline ChannelList channels(const std::string& prefix, Eigen::Index count,
+                            const std::string& unit) {
+  ChannelList list;
+  for (Eigen::Index i = 1; i <= count; ++i) {
+    list.names.push_back(prefix + std::to_string(i));
+    list.units.push_back(unit);
+  }
+  return list;
+}
+
 /// A log that lives in memory. Everything is public: tests spoil it on purpose.
 class MemoryLog : public LogReader {
  public:

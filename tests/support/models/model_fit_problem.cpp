@@ -1,17 +1,15 @@
 #include "tests/support/models/model_fit_problem.hpp"
 
-#include <fmt/format.h>
-
 #include <numbers>
+
+#include "tests/support/logs/memory_log.hpp"
 
 namespace stageid::test {
 
 AdditiveModel named_model(int outputs, int inputs) {
   AdditiveModel model;
-  for (int y = 1; y <= outputs; ++y) model.outputs.names.push_back(fmt::format("z{}", y));
-  for (int u = 1; u <= inputs; ++u) model.inputs.names.push_back(fmt::format("a{}", u));
-  model.outputs.units.assign(model.outputs.size(), "m");
-  model.inputs.units.assign(model.inputs.size(), "N");
+  model.outputs = channels("z", outputs, "m");
+  model.inputs = channels("a", inputs, "N");
   model.input_delay_s = Eigen::VectorXd::Zero(inputs);
   model.output_delay_s = Eigen::VectorXd::Zero(outputs);
   return model;

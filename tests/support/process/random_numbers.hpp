@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstdint>
@@ -12,53 +13,49 @@ namespace stageid::test {
 class RandomNumbers {
  public:
   explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
-  double uniform(double low = 0.0, double high = 1.0);
-  int integer(int low, int high);  ///< both included
-  double normal();
-  std::complex<double> circular();     ///< E|v|^2 = 1, E v^2 = 0
-  double chi_square_mean(double dof);  ///< chi^2 of 2 dof real degrees over its mean
+  double uniform(double low = 0.0, double high = 1.0) {
+    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
+  }
+  int integer(int low, int high) {  ///< both included
+    return low + static_cast<int>(uniform() * static_cast<double>(high - low + 1));
+  }
+  double normal() {
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+    return radius * std::cos(2.0 * std::numbers::pi * uniform());
+  }
+  std::complex<double> circular() {  ///< E|v|^2 = 1, E v^2 = 0
+    const double radius = std::sqrt(-std::log(1.0 - uniform()));
+    return std::polar(radius, 2.0 * std::numbers::pi * uniform());
+  }
+  /// chi^2 of 2 dof real degrees over its mean. A sum of dof exponential numbers; above 30 the normal approximation
+  /// of its cube root (Wilson and Hilferty) is as good.
+  double chi_square_mean(double dof) {
+    if (dof <= 30.0) {
+      double sum = 0.0;
+      for (int i = 0; i < static_cast<int>(dof); ++i) sum -= std::log(1.0 - uniform());
+      return sum / dof;
+    }
+    const double spread = 1.0 / (9.0 * dof);
+    const double root = 1.0 - spread + normal() * std::sqrt(spread);
+    return root * root * root;
+  }
 
  private:
-  std::uint64_t next();
+  std::uint64_t next() {  // splitmix64
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return z ^ (z >> 31);
+  }
+
   std::uint64_t state_;
 };
 
-inline std::uint64_t RandomNumbers::next() {  // splitmix64
-  std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31);
-}
-
-inline double RandomNumbers::uniform(double low, double high) {
-  return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-}
-
-inline int RandomNumbers::integer(int low, int high) {
-  return low + static_cast<int>(uniform() * static_cast<double>(high - low + 1));
-}
-
-inline double RandomNumbers::normal() {
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-  return radius * std::cos(2.0 * std::numbers::pi * uniform());
-}
-
-inline std::complex<double> RandomNumbers::circular() {
-  const double radius = std::sqrt(-std::log(1.0 - uniform()));
-  return std::polar(radius, 2.0 * std::numbers::pi * uniform());
-}
-
-inline double RandomNumbers::chi_square_mean(double dof) {
-  // Sum of dof exponential numbers; above 30 the normal approximation of its cube root (Wilson and
-  // Hilferty) is as good.
-  if (dof <= 30.0) {
-    double sum = 0.0;
-    for (int i = 0; i < static_cast<int>(dof); ++i) sum -= std::log(1.0 - uniform());
-    return sum / dof;
-  }
-  const double spread = 1.0 / (9.0 * dof);
-  const double root = 1.0 - spread + normal() * std::sqrt(spread);
-  return root * root * root;
+/// The upper median.
+inline double median_of(Eigen::VectorXd values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,

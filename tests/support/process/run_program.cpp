@@ -7,22 +7,14 @@
 
 #include <chrono>
 #include <csignal>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <thread>
 
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test {
 namespace {
-
-std::string read_whole(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 void redirect(const char* file, int flags, int descriptor) {
   const int opened = ::open(file, flags, 0600);
@@ -88,7 +80,7 @@ ProgramResult run_program(const std::filesystem::path& program,
   int status = 0;
   ::waitpid(child, &status, 0);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return {code, read_whole(out), read_whole(err)};
+  return {code, bytes_of(out), bytes_of(err)};
 }
 
 }  // namespace stageid::test

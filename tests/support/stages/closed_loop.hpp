@@ -70,16 +70,6 @@ class ComplexNoise {
   std::mt19937_64 engine_;
 };
 
-inline ChannelList channels(const std::string& prefix, Eigen::Index count,
-                            const std::string& unit) {
-  ChannelList list;
-  for (Eigen::Index i = 1; i <= count; ++i) {
-    list.names.push_back(prefix + std::to_string(i));
-    list.units.push_back(unit);
-  }
-  return list;
-}
-
 /// One period of channels x lines coefficients (DFT / samples): samples x channels.
 inline Eigen::MatrixXd synthesize(const Eigen::MatrixXcd& spectrum, const std::vector<int>& lines,
                                   RealDft& dft) {
@@ -170,28 +160,36 @@ inline LogSamples simulate_run(const ClosedLoop& loop, const LoopExperiment& x,
   return record;
 }
 
-/// Channels: excitation and actuators a1, a2, ... [N], sensors z1, z2, ... [m].
-inline MemoryLog simulate_log(const ClosedLoop& loop, const LoopExperiment& x) {
-  const Eigen::Index n_y = loop.plant(1.0).rows();
-  const Eigen::Index n_u = loop.plant(1.0).cols();
+/// A log with the samples of run(experiment, R, period of r, random, dft). Channels: excitation and actuators a1, a2, ... [N],
+/// sensors z1, z2, ... [m].
+template <typename Run>
+MemoryLog log_of_runs(const LoopExperiment& x, Eigen::Index n_y, Eigen::Index n_u, Run run) {
   MemoryLog log;
   log.log_info.sample_rate_hz = x.sample_rate_hz;
   log.log_info.period_samples = x.period_samples;
   log.log_info.transient_periods = x.transient_periods;
-  log.log_info.excitation = channels("a", n_u, "N");
-  log.log_info.actuators = channels("a", n_u, "N");
+  log.log_info.excitation = log.log_info.actuators = channels("a", n_u, "N");
   log.log_info.sensors = channels("z", n_y, "m");
   ComplexNoise random(x.seed);
   RealDft dft(x.period_samples);
   for (int m = 0; m < x.realizations; ++m) {
     const std::vector<Eigen::MatrixXcd> R = excitation_spectra(x, n_u, random);
     for (std::size_t e = 0; e < R.size(); ++e) {
-      log.append(
-          m, static_cast<int>(e), synthesize(R[e], x.lines, dft),
-          simulate_run(loop, x, R[e], random, dft, x.noise_scale.empty() ? 1.0 : x.noise_scale[e]));
+      const Eigen::MatrixXd period = synthesize(R[e], x.lines, dft);
+      log.append(m, static_cast<int>(e), period, run(e, R[e], period, random, dft));
     }
   }
   return log;
+}
+
+inline MemoryLog simulate_log(const ClosedLoop& loop, const LoopExperiment& x) {
+  const Eigen::MatrixXcd G = loop.plant(1.0);
+  return log_of_runs(x, G.rows(), G.cols(),
+                     [&](std::size_t e, const Eigen::MatrixXcd& R, const Eigen::MatrixXd&,
+                         ComplexNoise& random, RealDft& dft) {
+                       return simulate_run(loop, x, R, random, dft,
+                                           x.noise_scale.empty() ? 1.0 : x.noise_scale[e]);
+                     });
 }
 
 /// A stage in small: rigid body, two modes with non-symmetric shapes, a delay; 2 sensors, 3

@@ -1,12 +1,11 @@
 #include "tests/support/stages/dense_plant.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "tests/support/logs/memory_log.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
@@ -24,10 +23,8 @@ void add_mode(AdditiveModel& model, double frequency_hz, double damping_ratio,
 }
 
 void add_channels(AdditiveModel& model, int outputs, int inputs) {
-  for (int y = 0; y < outputs; ++y) model.outputs.names.push_back(fmt::format("y{}", y + 1));
-  for (int u = 0; u < inputs; ++u) model.inputs.names.push_back(fmt::format("u{}", u + 1));
-  model.outputs.units.assign(model.outputs.names.size(), "m");
-  model.inputs.units.assign(model.inputs.names.size(), "N");
+  model.outputs = channels("y", outputs, "m");
+  model.inputs = channels("u", inputs, "N");
   model.input_delay_s = Eigen::VectorXd::Zero(inputs);
   model.output_delay_s = Eigen::VectorXd::Zero(outputs);
 }

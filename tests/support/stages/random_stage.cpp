@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/support/logs/memory_log.hpp"
 #include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
@@ -57,10 +58,8 @@ Eigen::VectorXd draw_shape(RandomNumbers& random, int size) {
 
 AdditiveModel draw_model(RandomNumbers& random, const RandomStageSpec& spec, int count, int pairs) {
   AdditiveModel model;
-  for (int y = 0; y < spec.outputs; ++y) model.outputs.names.push_back(fmt::format("z{}", y + 1));
-  for (int u = 0; u < spec.inputs; ++u) model.inputs.names.push_back(fmt::format("a{}", u + 1));
-  model.outputs.units.assign(model.outputs.size(), "m");
-  model.inputs.units.assign(model.inputs.size(), "N");
+  model.outputs = channels("z", spec.outputs, "m");
+  model.inputs = channels("a", spec.inputs, "N");
   model.sample_rate_hz = spec.sample_rate_hz;
   model.hold = HoldModel::exact;
 
@@ -89,12 +88,6 @@ Eigen::VectorXd lines_of(const RandomStageSpec& spec) {
   return Eigen::VectorXd::LinSpaced(
       count, spec.band_low_hz,
       spec.band_low_hz + spec.line_spacing_hz * static_cast<double>(count - 1));
-}
-
-double median(Eigen::VectorXd values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -142,7 +135,7 @@ RandomStage draw_random_stage(std::uint64_t seed, const RandomStageSpec& spec) {
   stage.variance.resize(stage.exact.rows(), stage.exact.cols());
   for (Eigen::Index c = 0; c < stage.exact.rows(); ++c) {
     const Eigen::ArrayXd magnitude = stage.exact.row(c).cwiseAbs().transpose().array();
-    const double level = median(magnitude * slope) * std::pow(10.0, stage.noise_db / 20.0);
+    const double level = median_of(magnitude * slope) * std::pow(10.0, stage.noise_db / 20.0);
     stage.variance.row(c) = (level / slope).square().matrix().transpose();
   }
   frf.response = stage.exact;

@@ -98,24 +98,10 @@ inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExpe
 /// As simulate_log(), from rest. x.transient_periods are periods like all others, only declared.
 inline MemoryLog simulate_sampled_log(const SampledPlant& plant, const LoopExperiment& x,
                                       double noise_std, double cubic = 0.0) {
-  MemoryLog log;
-  log.log_info.sample_rate_hz = x.sample_rate_hz;
-  log.log_info.period_samples = x.period_samples;
-  log.log_info.transient_periods = x.transient_periods;
-  log.log_info.excitation = channels("a", plant.B.cols(), "N");
-  log.log_info.actuators = channels("a", plant.B.cols(), "N");
-  log.log_info.sensors = channels("z", plant.C.rows(), "m");
-  ComplexNoise random(x.seed);
-  RealDft dft(x.period_samples);
-  for (int m = 0; m < x.realizations; ++m) {
-    const std::vector<Eigen::MatrixXcd> R = excitation_spectra(x, plant.B.cols(), random);
-    for (std::size_t e = 0; e < R.size(); ++e) {
-      const Eigen::MatrixXd period = synthesize(R[e], x.lines, dft);
-      log.append(m, static_cast<int>(e), period,
-                 simulate_sampled_run(plant, x, period, noise_std, random, cubic));
-    }
-  }
-  return log;
+  return log_of_runs(
+      x, plant.C.rows(), plant.B.cols(),
+      [&](std::size_t, const Eigen::MatrixXcd&, const Eigen::MatrixXd& period, ComplexNoise& random,
+          RealDft&) { return simulate_sampled_run(plant, x, period, noise_std, random, cubic); });
 }
 
 }  // namespace stageid::test

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "excitation/decompositions/decompositions.hpp"
+#include "tests/support/logs/memory_log.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
@@ -80,12 +81,6 @@ void draw_body(RandomNumbers& random, double lowest_hz, AdditiveModel& model) {
   model.submodels.push_back({0, {1.0, a[0], a[1]}, {body * a[1]}, {}, {}});
 }
 
-double median(Eigen::VectorXd values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 std::string VariedPlant::description() const {
@@ -121,10 +116,8 @@ VariedPlant draw_varied_plant(std::uint64_t seed) {
   VariedPlant plant;
   AdditiveModel& model = plant.truth;
   const Size& size = kSizes[static_cast<std::size_t>(random.integer(0, 7))];
-  for (int y = 0; y < size.outputs; ++y) model.outputs.names.push_back(fmt::format("y{}", y + 1));
-  for (int u = 0; u < size.inputs; ++u) model.inputs.names.push_back(fmt::format("u{}", u + 1));
-  model.outputs.units.assign(model.outputs.size(), "m");
-  model.inputs.units.assign(model.inputs.size(), "N");
+  model.outputs = channels("y", size.outputs, "m");
+  model.inputs = channels("u", size.inputs, "N");
   model.sample_rate_hz = 10000.0;
   model.hold = HoldModel::exact;
 
@@ -178,7 +171,7 @@ VariedPlant draw_varied_plant(std::uint64_t seed) {
   const Eigen::ArrayXd rise = (frf.frequency_hz.array() / high_hz).pow(slope);
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
     const Eigen::ArrayXd magnitude = frf.response.row(c).cwiseAbs().transpose().array();
-    const double level = median(magnitude * rise) * std::pow(10.0, plant.noise_db / 20.0);
+    const double level = median_of(magnitude * rise) * std::pow(10.0, plant.noise_db / 20.0);
     for (Eigen::Index k = 0; k < lines; ++k) {
       const double deviation = level / rise[k];
       frf.response(c, k) += deviation * random.circular();
