@@ -11,8 +11,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/directory_test.hpp"
 #include "tests/support/process/file_bytes.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_hdf5_damage {
 
@@ -59,36 +59,35 @@ Everything read_everything(const fs::path& path) {
   return all;
 }
 
-TEST(DamagedHdf5, IsToldFromMissingAndForeignFiles) {
-  const TemporaryDirectory directory;
-  expect_error<FileError>([&] { Hdf5File::open(directory / "absent.h5"); }, directory / "absent.h5",
-                          std::strerror(ENOENT));
-  expect_error<FileError>([&] { Hdf5File::open(directory.path()); }, directory.path(),
+using DamagedHdf5 = test::DirectoryTest;
+
+TEST_F(DamagedHdf5, IsToldFromMissingAndForeignFiles) {
+  expect_error<FileError>([&] { Hdf5File::open(directory_ / "absent.h5"); },
+                          directory_ / "absent.h5", std::strerror(ENOENT));
+  expect_error<FileError>([&] { Hdf5File::open(directory_.path()); }, directory_.path(),
                           "is not a regular file");
-  write_bytes(directory / "text.h5", "this is not HDF5\n");
-  expect_error<FormatError>([&] { Hdf5File::open(directory / "text.h5"); }, directory / "text.h5",
+  write_bytes(directory_ / "text.h5", "this is not HDF5\n");
+  expect_error<FormatError>([&] { Hdf5File::open(directory_ / "text.h5"); }, directory_ / "text.h5",
                             "not an HDF5 file");
-  write_bytes(directory / "empty.h5", "");
-  expect_error<FormatError>([&] { Hdf5File::open(directory / "empty.h5"); }, directory / "empty.h5",
-                            "not an HDF5 file");
+  write_bytes(directory_ / "empty.h5", "");
+  expect_error<FormatError>([&] { Hdf5File::open(directory_ / "empty.h5"); },
+                            directory_ / "empty.h5", "not an HDF5 file");
 }
 
-TEST(DamagedHdf5, CutShortAnywhereIsAFormatError) {
-  const TemporaryDirectory directory;
-  const std::string healthy = healthy_file(directory);
-  EXPECT_NO_THROW(read_everything(directory / "healthy.h5"));
+TEST_F(DamagedHdf5, CutShortAnywhereIsAFormatError) {
+  const std::string healthy = healthy_file(directory_);
+  EXPECT_NO_THROW(read_everything(directory_ / "healthy.h5"));
   for (std::size_t length = 0; length < healthy.size(); length += 97) {
-    write_bytes(directory / "cut.h5", healthy.substr(0, length));
-    EXPECT_THROW(read_everything(directory / "cut.h5"), FormatError) << length << " bytes";
+    write_bytes(directory_ / "cut.h5", healthy.substr(0, length));
+    EXPECT_THROW(read_everything(directory_ / "cut.h5"), FormatError) << length << " bytes";
   }
-  write_bytes(directory / "cut.h5", healthy.substr(0, healthy.size() - 1));
-  expect_error<FormatError>([&] { read_everything(directory / "cut.h5"); }, directory / "cut.h5",
+  write_bytes(directory_ / "cut.h5", healthy.substr(0, healthy.size() - 1));
+  expect_error<FormatError>([&] { read_everything(directory_ / "cut.h5"); }, directory_ / "cut.h5",
                             "truncated");
 }
 
-TEST(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {
-  const TemporaryDirectory directory;
-  const fs::path path = directory / "hostile.h5";
+TEST_F(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {
+  const fs::path path = directory_ / "hostile.h5";
   for (const hsize_t rows : {hsize_t{1} << 34, hsize_t{1} << 61}) {
     {
       // Datasets that were declared and never written have a shape and no bytes.
@@ -119,20 +118,19 @@ TEST(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {
   }
 }
 
-TEST(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
+TEST_F(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
   // Checksums guard structure and data. (Not the letters of attributes: those stand in a heap that
   // has no checksum.) Unused bytes may change.
-  const TemporaryDirectory directory;
-  const std::string healthy = healthy_file(directory);
-  const Everything truth = read_everything(directory / "healthy.h5");
+  const std::string healthy = healthy_file(directory_);
+  const Everything truth = read_everything(directory_ / "healthy.h5");
   int noticed = 0;
   int harmless = 0;
   const auto flip = [&](std::size_t at, int bits) {
     std::string damaged = healthy;
     damaged[at] = static_cast<char>(damaged[at] ^ bits);
-    write_bytes(directory / "damaged.h5", damaged);
+    write_bytes(directory_ / "damaged.h5", damaged);
     try {
-      const Everything read = read_everything(directory / "damaged.h5");
+      const Everything read = read_everything(directory_ / "damaged.h5");
       if (has_nan(read)) {
         ++noticed;  // detected by the caller, who needs numbers
       } else {
@@ -152,9 +150,8 @@ TEST(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
   EXPECT_GT(harmless, 10);
 }
 
-TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
-  const TemporaryDirectory directory;
-  const std::string healthy = healthy_file(directory);
+TEST_F(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
+  const std::string healthy = healthy_file(directory_);
   const std::size_t heap = healthy.find(std::string("GCOL\1\0\0\0", 8));
   ASSERT_NE(heap, std::string::npos);
   // The size of the collection, of its first text, and of the following free space: HDF5 1.10 crashes or hangs for
@@ -163,9 +160,9 @@ TEST(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
     for (const std::size_t byte : {0, 1, 5}) {
       std::string damaged = healthy;
       damaged[place + byte] = static_cast<char>(damaged[place + byte] ^ 0x80);
-      write_bytes(directory / "damaged.h5", damaged);
-      expect_error<FormatError>([&] { Hdf5File::open(directory / "damaged.h5"); },
-                                directory / "damaged.h5", "damaged");
+      write_bytes(directory_ / "damaged.h5", damaged);
+      expect_error<FormatError>([&] { Hdf5File::open(directory_ / "damaged.h5"); },
+                                directory_ / "damaged.h5", "damaged");
     }
   }
 }

@@ -15,15 +15,14 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/directory_test.hpp"
 #include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/file_size_limit.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_hdf5_file {
 
 namespace fs = std::filesystem;
 using test::expect_error;
-using test::TemporaryDirectory;
 using Complex = std::complex<double>;
 
 /// A file with objects of every kind.
@@ -55,10 +54,11 @@ void write_everything(const fs::path& path) {
   file.close();
 }
 
-TEST(Hdf5File, GivesBackAllThatWasWritten) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory / "f.h5");
+using Hdf5FileTest = test::DirectoryTest;
+
+TEST_F(Hdf5FileTest, GivesBackAllThatWasWritten) {
+  write_everything(directory_ / "f.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
 
   EXPECT_EQ(file.read_real_attribute("/", "rate"), 1.0 / 3.0);
   EXPECT_EQ(file.read_integer_attribute("/", "count"), -9'007'199'254'740'993LL);
@@ -84,10 +84,9 @@ TEST(Hdf5File, GivesBackAllThatWasWritten) {
             (std::vector<std::string>{"z1", "", "a long name with blanks "}));
 }
 
-TEST(Hdf5File, KnowsWhatThereIs) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory / "f.h5");
+TEST_F(Hdf5FileTest, KnowsWhatThereIs) {
+  write_everything(directory_ / "f.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
   EXPECT_TRUE(file.exists("/"));
   EXPECT_TRUE(file.exists("/runs/0001/reals"));
   EXPECT_FALSE(file.exists("/runs/0002"));
@@ -105,10 +104,9 @@ TEST(Hdf5File, KnowsWhatThereIs) {
   EXPECT_EQ(file.kind("/texts"), Hdf5Kind::text);
 }
 
-TEST(Hdf5File, ReadsRowsAnywhere) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory / "f.h5");
+TEST_F(Hdf5FileTest, ReadsRowsAnywhere) {
+  write_everything(directory_ / "f.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
   ASSERT_EQ(file.shape("/table"), (std::vector<hsize_t>{15, 2}));
   const std::vector<double> all = file.read_reals("/table");
   EXPECT_EQ(all[2 * 13], 4.5);  // row 13 is the second of the fifth block
@@ -126,11 +124,10 @@ TEST(Hdf5File, ReadsRowsAnywhere) {
   EXPECT_EQ(file.shape("/marks"), (std::vector<hsize_t>{15}));
 }
 
-TEST(Hdf5File, IntegersAndFloatsStandForEachOtherInAttributes) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "f.h5");
+TEST_F(Hdf5FileTest, IntegersAndFloatsStandForEachOtherInAttributes) {
+  write_everything(directory_ / "f.h5");
   {
-    Hdf5File file = Hdf5File::create(directory / "g.h5");
+    Hdf5File file = Hdf5File::create(directory_ / "g.h5");
     file.write_attribute("/", "float", 40'000.0);
     file.write_attribute("/", "half", 0.5);
     file.write_attribute("/", "huge", 1e300);
@@ -138,7 +135,7 @@ TEST(Hdf5File, IntegersAndFloatsStandForEachOtherInAttributes) {
     file.write_attribute("/", "integer", 3LL);
     file.close();
   }
-  const Hdf5File file = Hdf5File::open(directory / "g.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "g.h5");
   EXPECT_EQ(file.read_integer_attribute("/", "float"), 40'000);
   EXPECT_EQ(file.read_real_attribute("/", "integer"), 3.0);
   for (const char* name : {"half", "huge", "nan"}) {
@@ -146,18 +143,16 @@ TEST(Hdf5File, IntegersAndFloatsStandForEachOtherInAttributes) {
   }
 }
 
-TEST(Hdf5File, WritesTheSameBytesAtAnotherTime) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "first.h5");
+TEST_F(Hdf5FileTest, WritesTheSameBytesAtAnotherTime) {
+  write_everything(directory_ / "first.h5");
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // HDF5 stores whole seconds
-  write_everything(directory / "second.h5");
-  EXPECT_EQ(test::bytes_of(directory / "first.h5"), test::bytes_of(directory / "second.h5"));
+  write_everything(directory_ / "second.h5");
+  EXPECT_EQ(test::bytes_of(directory_ / "first.h5"), test::bytes_of(directory_ / "second.h5"));
 }
 
-TEST(Hdf5File, WritesEmptyThings) {
-  const TemporaryDirectory directory;
+TEST_F(Hdf5FileTest, WritesEmptyThings) {
   {
-    Hdf5File file = Hdf5File::create(directory / "f.h5");
+    Hdf5File file = Hdf5File::create(directory_ / "f.h5");
     file.write_reals("/none", {0, 3}, nullptr);
     file.write_texts("/no_texts", {});
     file.write_attribute("/", "nothing", std::vector<std::string>{});
@@ -166,7 +161,7 @@ TEST(Hdf5File, WritesEmptyThings) {
     file.write_reals("/scalar", {}, &value);
     file.close();
   }
-  const Hdf5File file = Hdf5File::open(directory / "f.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
   EXPECT_TRUE(file.read_reals("/none").empty());
   EXPECT_TRUE(file.read_texts("/no_texts").empty());
   EXPECT_TRUE(file.read_texts_attribute("/", "nothing").empty());
@@ -175,10 +170,9 @@ TEST(Hdf5File, WritesEmptyThings) {
   file.read_rows("/none", 0, 0, nullptr);
 }
 
-TEST(Hdf5File, NamesFilePlaceAndRemedyOfWhatIsWrong) {
-  const TemporaryDirectory directory;
-  write_everything(directory / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory / "f.h5");
+TEST_F(Hdf5FileTest, NamesFilePlaceAndRemedyOfWhatIsWrong) {
+  write_everything(directory_ / "f.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
   const std::string path = file.path().string();
   double sink[64];
   const auto wrong = [&](const auto& action, const std::string& place, const std::string& word) {
@@ -211,13 +205,12 @@ TEST(Hdf5File, NamesFilePlaceAndRemedyOfWhatIsWrong) {
   wrong([&] { file.read_reals_attribute("/", "units"); }, "/", "contains text; expected numbers");
 }
 
-TEST(Hdf5File, SaysThatWritingIsImpossible) {
-  const TemporaryDirectory directory;
-  expect_error<FileError>([&] { Hdf5File::create(directory / "absent/f.h5"); },
-                          directory / "absent/f.h5", std::strerror(ENOENT));
-  expect_error<FileError>([&] { Hdf5File::create(directory / "absent/.tmp", "shown.h5"); },
+TEST_F(Hdf5FileTest, SaysThatWritingIsImpossible) {
+  expect_error<FileError>([&] { Hdf5File::create(directory_ / "absent/f.h5"); },
+                          directory_ / "absent/f.h5", std::strerror(ENOENT));
+  expect_error<FileError>([&] { Hdf5File::create(directory_ / "absent/.tmp", "shown.h5"); },
                           "shown.h5", std::strerror(ENOENT));
-  Hdf5File file = Hdf5File::create(directory / "f.h5");
+  Hdf5File file = Hdf5File::create(directory_ / "f.h5");
   const double value = 1.0;
   file.write_reals("/twice", {1}, &value);
   file.write_attribute("/", "twice", 1.0);
@@ -236,11 +229,10 @@ TEST(Hdf5File, SaysThatWritingIsImpossible) {
                           name + "zero", "cannot be written");
 }
 
-TEST(Hdf5File, SaysThatTheDiskIsFull) {
-  const TemporaryDirectory directory;
+TEST_F(Hdf5FileTest, SaysThatTheDiskIsFull) {
   const std::vector<double> many(100'000, 1.0);
   const auto write = [&] {
-    Hdf5File file = Hdf5File::create(directory / "f.h5", "target.h5");
+    Hdf5File file = Hdf5File::create(directory_ / "f.h5", "target.h5");
     file.write_reals("/many", {many.size()}, many.data());
     file.create_growing("/growing", 0, H5T_IEEE_F64LE, 1000);
     file.append_rows("/growing", many.size(), many.data());
@@ -253,7 +245,7 @@ TEST(Hdf5File, SaysThatTheDiskIsFull) {
   write();  // the library keeps no data of it
 }
 
-TEST(Hdf5File, SaysThatADeviceIsFull) {
+TEST_F(Hdf5FileTest, SaysThatADeviceIsFull) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   const auto write = [] {
     Hdf5File file = Hdf5File::create("/dev/full");
@@ -263,12 +255,11 @@ TEST(Hdf5File, SaysThatADeviceIsFull) {
   expect_error<FileError>(write, "/dev/full", std::strerror(ENOSPC));
 }
 
-TEST(Hdf5File, CloseTwiceIsOnce) {
-  const TemporaryDirectory directory;
-  Hdf5File file = Hdf5File::create(directory / "f.h5");
+TEST_F(Hdf5FileTest, CloseTwiceIsOnce) {
+  Hdf5File file = Hdf5File::create(directory_ / "f.h5");
   file.close();
   file.close();
-  EXPECT_TRUE(Hdf5File::open(directory / "f.h5").exists("/"));
+  EXPECT_TRUE(Hdf5File::open(directory_ / "f.h5").exists("/"));
 }
 
 }  // namespace stageid::test_hdf5_file

@@ -12,7 +12,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_recover.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/process/directory_test.hpp"
 
 namespace stageid::test_convert_log {
 
@@ -28,17 +28,18 @@ std::unique_ptr<LogReader> write_log(const std::filesystem::path& file) {
   return open_log(file);
 }
 
-TEST(ConvertLog, HDF5HoldsTheSame) {
-  const test::TemporaryDirectory directory;
-  const auto native = write_log(directory / "a.slog");
+using ConvertLog = test::DirectoryTest;
+
+TEST_F(ConvertLog, HDF5HoldsTheSame) {
+  const auto native = write_log(directory_ / "a.slog");
   std::uint64_t done = 0;
-  convert_log(*native, directory / "a.h5",
+  convert_log(*native, directory_ / "a.h5",
               {.progress = [&](std::uint64_t rows, std::uint64_t total) {
                 EXPECT_EQ(total, 77U);
                 done = rows;
               }});
   EXPECT_EQ(done, 77U);
-  const auto hdf5 = open_log(directory / "a.h5");
+  const auto hdf5 = open_log(directory_ / "a.h5");
   EXPECT_TRUE(same_measurement(hdf5->info(), native->info()));
   EXPECT_EQ(hdf5->info().metadata_json, test::small_info().metadata_json);
   ASSERT_EQ(hdf5->runs().size(), 3U);
@@ -51,18 +52,17 @@ TEST(ConvertLog, HDF5HoldsTheSame) {
     EXPECT_EQ(read.started_utc, native->runs()[run].started_utc);
     EXPECT_EQ(hdf5->excitation(run), test::excitation_of(run));
   }
-  EXPECT_TRUE(verify_log(directory / "a.h5").intact());
-  EXPECT_EQ(verify_log(directory / "a.h5").rows, 77U);
-  const Hdf5File file = Hdf5File::open(directory / "a.h5");
+  EXPECT_TRUE(verify_log(directory_ / "a.h5").intact());
+  EXPECT_EQ(verify_log(directory_ / "a.h5").rows, 77U);
+  const Hdf5File file = Hdf5File::open(directory_ / "a.h5");
   EXPECT_EQ(file.read_integer_attribute("/runs/0001", "marked_samples"), 5);
 }
 
-TEST(ConvertLog, AnHDF5LogIsConvertedToTheSameAgain) {
-  const test::TemporaryDirectory directory;
-  convert_log(*write_log(directory / "a.slog"), directory / "a.h5");
-  convert_log(*open_log(directory / "a.h5"), directory / "b.h5");
-  const auto a = open_log(directory / "a.h5");
-  const auto b = open_log(directory / "b.h5");
+TEST_F(ConvertLog, AnHDF5LogIsConvertedToTheSameAgain) {
+  convert_log(*write_log(directory_ / "a.slog"), directory_ / "a.h5");
+  convert_log(*open_log(directory_ / "a.h5"), directory_ / "b.h5");
+  const auto a = open_log(directory_ / "a.h5");
+  const auto b = open_log(directory_ / "b.h5");
   LogSamples of_a;
   LogSamples of_b;
   for (std::size_t run = 0; run < 3; ++run) {
@@ -74,9 +74,8 @@ TEST(ConvertLog, AnHDF5LogIsConvertedToTheSameAgain) {
   }
 }
 
-TEST(ConvertLog, AMarkOfTimingStaysOneOfTiming) {
-  const test::TemporaryDirectory directory;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+TEST_F(ConvertLog, AMarkOfTimingStaysOneOfTiming) {
+  SlogWriter log = SlogWriter::create(directory_ / "a.slog", test::small_info());
   log.begin_run(test::run_of(0), test::excitation_of(0));
   std::vector<double> rows = test::rows_of(0, 0, 36);
   const std::size_t words = rows.size() / 36;
@@ -91,29 +90,27 @@ TEST(ConvertLog, AMarkOfTimingStaysOneOfTiming) {
   run.health.irregular = 1;
   log.end_run(run);
   log.close(3, "");
-  convert_log(*open_log(directory / "a.slog"), directory / "a.h5");
-  convert_log(*open_log(directory / "a.h5"), directory / "b.slog");
+  convert_log(*open_log(directory_ / "a.slog"), directory_ / "a.h5");
+  convert_log(*open_log(directory_ / "a.h5"), directory_ / "b.slog");
   for (const char* name : {"a.slog", "a.h5", "b.slog"}) {
     SCOPED_TRACE(name);
     LogSamples samples;
-    open_log(directory / name)->read(0, 3, 3, samples);
+    open_log(directory_ / name)->read(0, 3, 3, samples);
     EXPECT_THAT(std::vector<int>(samples.marked.begin(), samples.marked.end()),
                 testing::ElementsAre(kIrregularMark, kBadMark, 0));
   }
-  const Hdf5File file = Hdf5File::open(directory / "a.h5");
+  const Hdf5File file = Hdf5File::open(directory_ / "a.h5");
   EXPECT_EQ(file.read_integer_attribute("/runs/0000", "irregular_samples"), 1);
 }
 
-TEST(ConvertLog, RunsThatWereBrokenOffCanBeLeftOut) {
-  const test::TemporaryDirectory directory;
-  convert_log(*write_log(directory / "a.slog"), directory / "a.h5", {.incomplete_runs = false});
-  EXPECT_EQ(open_log(directory / "a.h5")->runs().size(), 2U);
+TEST_F(ConvertLog, RunsThatWereBrokenOffCanBeLeftOut) {
+  convert_log(*write_log(directory_ / "a.slog"), directory_ / "a.h5", {.incomplete_runs = false});
+  EXPECT_EQ(open_log(directory_ / "a.h5")->runs().size(), 2U);
 }
 
-TEST(ConvertLog, CsvReadsBackToTheSameNumbers) {
-  const test::TemporaryDirectory directory;
-  convert_log(*write_log(directory / "a.slog"), directory / "a.csv");
-  std::ifstream in(directory / "a.csv");
+TEST_F(ConvertLog, CsvReadsBackToTheSameNumbers) {
+  convert_log(*write_log(directory_ / "a.slog"), directory_ / "a.csv");
+  std::ifstream in(directory_ / "a.csv");
   std::string line;
   std::getline(in, line);
   EXPECT_EQ(line,
@@ -146,19 +143,19 @@ TEST(ConvertLog, CsvReadsBackToTheSameNumbers) {
   EXPECT_EQ(lines, 77U);
 }
 
-TEST(ConvertLog, LeavesNothingHalfWritten) {
-  const test::TemporaryDirectory directory;
-  const auto reader = write_log(directory / "a.slog");
-  EXPECT_THROW(convert_log(*reader, directory / "a.txt"), std::invalid_argument);
-  EXPECT_THROW(convert_log(*reader, directory / "none/a.h5"), FileError);
+TEST_F(ConvertLog, LeavesNothingHalfWritten) {
+  const auto reader = write_log(directory_ / "a.slog");
+  EXPECT_THROW(convert_log(*reader, directory_ / "a.txt"), std::invalid_argument);
+  EXPECT_THROW(convert_log(*reader, directory_ / "none/a.h5"), FileError);
   // The log is damaged after it was opened, so that the conversion fails.
-  std::string bytes = test::bytes_of(directory / "a.slog");
+  std::string bytes = test::bytes_of(directory_ / "a.slog");
   bytes[bytes.size() * 3 / 4] ^= 1;
-  test::write_bytes(directory / "a.slog", bytes);
-  EXPECT_THROW(convert_log(*reader, directory / "a.h5"), FormatError);
-  EXPECT_THROW(convert_log(*reader, directory / "a.csv"), FormatError);
+  test::write_bytes(directory_ / "a.slog", bytes);
+  EXPECT_THROW(convert_log(*reader, directory_ / "a.h5"), FormatError);
+  EXPECT_THROW(convert_log(*reader, directory_ / "a.csv"), FormatError);
   std::size_t files = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory.path())) {
+  for ([[maybe_unused]] const auto& entry :
+       std::filesystem::directory_iterator(directory_.path())) {
     ++files;
   }
   EXPECT_EQ(files, 1U) << "the log alone";

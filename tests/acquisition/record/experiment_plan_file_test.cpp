@@ -11,9 +11,9 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tests/acquisition/files/expect_error.hpp"
+#include "tests/support/process/directory_test.hpp"
 #include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/file_size_limit.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_experiment_plan_file {
 
@@ -40,25 +40,25 @@ ExperimentSpec spec(int crest_iterations = 0) {
   return spec;
 }
 
-TEST(ExperimentPlanFile, GivesAZipperedPlanBack) {
-  const TemporaryDirectory directory;
+using ExperimentPlanFile = test::DirectoryTest;
+
+TEST_F(ExperimentPlanFile, GivesAZipperedPlanBack) {
   ExperimentSpec zippered = spec(15);
   zippered.scheme = ExcitationScheme::zippered;
   const ExperimentPlan plan(grid(), zippered);
-  write_experiment_plan(directory / "plan.h5", plan);
-  const ExperimentPlan back = read_experiment_plan(directory / "plan.h5");
+  write_experiment_plan(directory_ / "plan.h5", plan);
+  const ExperimentPlan back = read_experiment_plan(directory_ / "plan.h5");
   EXPECT_EQ(back.spec().scheme, ExcitationScheme::zippered);
   EXPECT_EQ(back.experiments(), 1);
   ASSERT_EQ(back.mixing(), (Eigen::MatrixXcd::Ones(2, 1)));
   for (const RunId run : plan.runs()) EXPECT_EQ(back.excitation(run), plan.excitation(run));
 }
 
-TEST(ExperimentPlanFile, GivesTheSamePlanBack) {
-  const TemporaryDirectory directory;
+TEST_F(ExperimentPlanFile, GivesTheSamePlanBack) {
   for (const int crest_iterations : {0, 15}) {
     const ExperimentPlan plan(grid(), spec(crest_iterations));
-    write_experiment_plan(directory / "plan.h5", plan);
-    const ExperimentPlan back = read_experiment_plan(directory / "plan.h5");
+    write_experiment_plan(directory_ / "plan.h5", plan);
+    const ExperimentPlan back = read_experiment_plan(directory_ / "plan.h5");
 
     EXPECT_EQ(back.grid(), plan.grid());
     EXPECT_EQ(back.spec().scheme, plan.spec().scheme);
@@ -80,26 +80,24 @@ TEST(ExperimentPlanFile, GivesTheSamePlanBack) {
   }
 }
 
-TEST(ExperimentPlanFile, WritesTheSameBytesTwiceAndLeavesNothingElse) {
-  const TemporaryDirectory directory;
+TEST_F(ExperimentPlanFile, WritesTheSameBytesTwiceAndLeavesNothingElse) {
   const ExperimentPlan plan(grid(), spec());
-  write_experiment_plan(directory / "a.h5", plan);
-  write_experiment_plan(directory / "b.h5", plan);
-  EXPECT_EQ(test::bytes_of(directory / "a.h5"), test::bytes_of(directory / "b.h5"));
-  EXPECT_EQ(std::distance(fs::directory_iterator(directory.path()), fs::directory_iterator()), 2);
+  write_experiment_plan(directory_ / "a.h5", plan);
+  write_experiment_plan(directory_ / "b.h5", plan);
+  EXPECT_EQ(test::bytes_of(directory_ / "a.h5"), test::bytes_of(directory_ / "b.h5"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_.path()), fs::directory_iterator()), 2);
 }
 
-TEST(ExperimentPlanFile, AFullDiskLeavesNothingBehind) {
-  const TemporaryDirectory directory;
+TEST_F(ExperimentPlanFile, AFullDiskLeavesNothingBehind) {
   const ExperimentPlan plan(grid(), spec());
   {
     const test::FileSizeLimit limit(3000);
-    expect_error<FileError>([&] { write_experiment_plan(directory / "plan.h5", plan); },
-                            directory / "plan.h5", std::strerror(EFBIG));
+    expect_error<FileError>([&] { write_experiment_plan(directory_ / "plan.h5", plan); },
+                            directory_ / "plan.h5", std::strerror(EFBIG));
   }
-  EXPECT_TRUE(fs::is_empty(directory.path()));
-  expect_error<FileError>([&] { write_experiment_plan(directory / "no/plan.h5", plan); },
-                          directory / "no/plan.h5", std::strerror(ENOENT));
+  EXPECT_TRUE(fs::is_empty(directory_.path()));
+  expect_error<FileError>([&] { write_experiment_plan(directory_ / "no/plan.h5", plan); },
+                          directory_ / "no/plan.h5", std::strerror(ENOENT));
 }
 
 /// Writes a plan, lets `change` corrupt the HDF5 file, and expects `word` in the reader's message.
@@ -144,7 +142,7 @@ std::function<void(hid_t)> without(const std::string& name) {
   return [name](hid_t file) { ASSERT_GE(H5Ldelete(file, name.c_str(), H5P_DEFAULT), 0); };
 }
 
-TEST(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
+TEST_F(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::string word = "does not match the seed";
   for (const double value : {1e-3, nan}) {
@@ -168,7 +166,7 @@ TEST(ExperimentPlanFile, NoticesNumbersThatDoNotAgree) {
                 with_first("/realizations/0002/phase_rad", 7.0));
 }
 
-TEST(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
+TEST_F(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
   for (const char* name : {"/lines", "/axes", "/level", "/amplitude", "/mixing",
                            "/realizations/0002/spectrum", "/realizations/0002/phase_rad"}) {
     expect_spoilt(0, name, "missing", without(name));
@@ -194,13 +192,12 @@ TEST(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
   expect_spoilt(0, " ", "axes[0].level", with_first("/level", -1.0));
 }
 
-TEST(ExperimentPlanFile, RefusesOtherFiles) {
-  const TemporaryDirectory directory;
-  expect_error<FileError>([&] { read_experiment_plan(directory / "absent.h5"); },
-                          directory / "absent.h5", std::strerror(ENOENT));
-  std::ofstream(directory / "text.h5") << "text";
-  expect_error<FormatError>([&] { read_experiment_plan(directory / "text.h5"); },
-                            directory / "text.h5", "not an HDF5 file");
+TEST_F(ExperimentPlanFile, RefusesOtherFiles) {
+  expect_error<FileError>([&] { read_experiment_plan(directory_ / "absent.h5"); },
+                          directory_ / "absent.h5", std::strerror(ENOENT));
+  std::ofstream(directory_ / "text.h5") << "text";
+  expect_error<FormatError>([&] { read_experiment_plan(directory_ / "text.h5"); },
+                            directory_ / "text.h5", "not an HDF5 file");
 }
 
 }  // namespace stageid::test_experiment_plan_file

@@ -10,6 +10,7 @@
 
 #include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
+#include "tests/support/process/directory_test.hpp"
 #include "tests/support/process/file_bytes.hpp"
 
 namespace stageid::test {
@@ -119,5 +120,21 @@ inline void write_small_log(const std::filesystem::path& file, std::size_t runs 
   for (std::size_t run = 0; run < runs; ++run) write_run(log, run, 3 * kPeriod, block_rows);
   log.close(0, "done");
 }
+
+/// A test of a small log in a directory of its own.
+class SmallLogTest : public DirectoryTest {
+ protected:
+  SlogWriter create() const { return SlogWriter::create(file_, small_info()); }
+  SlogWriter resume() const { return SlogWriter::resume(file_, small_info()); }
+  /// A closed log with what write(log) writes.
+  template <typename Write>
+  void create(Write write) const {
+    SlogWriter log = create();
+    write(log);
+    log.close(0, "");
+  }
+
+  std::filesystem::path file_ = directory_ / "a.slog";
+};
 
 }  // namespace stageid::test

@@ -8,11 +8,8 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_recover.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_slog_damage {
-
-using test::TemporaryDirectory;
 
 /// The whole content of a log, or nothing if it is refused.
 std::optional<std::string> content(const std::filesystem::path& file) {
@@ -40,21 +37,21 @@ std::optional<std::string> content(const std::filesystem::path& file) {
   }
 }
 
-TEST(SlogDamage, EveryFlippedByteIsAnError) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 2, 18);
-  const std::string good = test::bytes_of(file);
-  ASSERT_TRUE(content(file).has_value());
+using SlogDamage = test::SmallLogTest;
+
+TEST_F(SlogDamage, EveryFlippedByteIsAnError) {
+  test::write_small_log(file_, 2, 18);
+  const std::string good = test::bytes_of(file_);
+  ASSERT_TRUE(content(file_).has_value());
   for (std::size_t at = 0; at < good.size(); ++at) {
     std::string bad = good;
     bad[at] ^= static_cast<char>(1U << (at % 8));
-    test::write_bytes(file, bad);
-    ASSERT_FALSE(content(file).has_value()) << "byte " << at << " of " << good.size();
+    test::write_bytes(file_, bad);
+    ASSERT_FALSE(content(file_).has_value()) << "byte " << at << " of " << good.size();
     if (at % 37 == 0) {
       const bool intact = [&] {
         try {
-          return verify_log(file).intact();
+          return verify_log(file_).intact();
         } catch (const FormatError&) {
           return false;
         }
@@ -64,19 +61,17 @@ TEST(SlogDamage, EveryFlippedByteIsAnError) {
   }
 }
 
-TEST(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 2, 9);
-  const std::string good = test::bytes_of(file);
+TEST_F(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
+  test::write_small_log(file_, 2, 9);
+  const std::string good = test::bytes_of(file_);
   std::uint64_t rows_before = 0;
   for (std::size_t size = 0; size < good.size(); ++size) {
-    test::write_bytes(file, good.substr(0, size));
-    ASSERT_THROW(open_log(file), FormatError) << size;
+    test::write_bytes(file_, good.substr(0, size));
+    ASSERT_THROW(open_log(file_), FormatError) << size;
     if (size == 0) continue;
     std::unique_ptr<LogReader> reader;
     try {
-      reader = open_log(file, false);
+      reader = open_log(file_, false);
     } catch (const FormatError&) {
       ASSERT_EQ(rows_before, 0U) << "byte " << size << ": what was there is gone";
       continue;
@@ -89,26 +84,24 @@ TEST(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
 }
 
 // The following tests cover failures of the disk, not of a process: the log is cut at any length, then resumed.
-TEST(SlogDamage, EveryTruncationCanBeResumed) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 1, 9);
-  const std::string good = test::bytes_of(file);
+TEST_F(SlogDamage, EveryTruncationCanBeResumed) {
+  test::write_small_log(file_, 1, 9);
+  const std::string good = test::bytes_of(file_);
   SlogBlockHeader first;
   std::memcpy(&first, good.data(), sizeof first);
   for (std::size_t size = slog_block_bytes(first); size < good.size(); size += 13) {
-    test::write_bytes(file, good.substr(0, size));
+    test::write_bytes(file_, good.substr(0, size));
     bool complete_before = false;
     {
-      const auto reader = open_log(file, false);
+      const auto reader = open_log(file_, false);
       complete_before = !reader->runs().empty() && reader->runs()[0].complete;
     }
     {
-      SlogWriter log = SlogWriter::resume(file, test::small_info());
+      SlogWriter log = resume();
       if (!complete_before) test::write_run(log, 0);
       log.close(0, "");
     }
-    const SlogReader reader(file);
+    const SlogReader reader(file_);
     const LogRun& last = reader.runs().back();
     ASSERT_TRUE(last.complete);
     LogSamples samples;
@@ -117,38 +110,35 @@ TEST(SlogDamage, EveryTruncationCanBeResumed) {
   }
 }
 
-TEST(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
-  const TemporaryDirectory directory;
-  test::write_small_log(directory / "a.slog");
-  test::write_small_log(directory / "b.slog");
-  const std::string a = test::bytes_of(directory / "a.slog");
-  const std::string b = test::bytes_of(directory / "b.slog");
+TEST_F(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
+  test::write_small_log(file_);
+  test::write_small_log(directory_ / "b.slog");
+  const std::string a = test::bytes_of(file_);
+  const std::string b = test::bytes_of(directory_ / "b.slog");
   ASSERT_EQ(a.size(), b.size());
   // As after a power failure: the second half was never written and contains an older file.
-  SlogSource source(directory / "a.slog");
+  SlogSource source(file_);
   const std::uint64_t cut = scan_slog(source, SlogScanDepth::headers).blocks[6].offset;
-  test::write_bytes(directory / "c.slog", a.substr(0, cut) + b.substr(cut));
-  EXPECT_THROW(open_log(directory / "c.slog"), FormatError);
-  EXPECT_LT(open_log(directory / "c.slog", false)->runs()[0].samples, 36U);
+  test::write_bytes(directory_ / "c.slog", a.substr(0, cut) + b.substr(cut));
+  EXPECT_THROW(open_log(directory_ / "c.slog"), FormatError);
+  EXPECT_LT(open_log(directory_ / "c.slog", false)->runs()[0].samples, 36U);
 }
 
-TEST(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 2, 9);
-  const std::string good = test::bytes_of(file);
+TEST_F(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
+  test::write_small_log(file_, 2, 9);
+  const std::string good = test::bytes_of(file_);
   const std::vector<SlogBlock> blocks = [&] {
-    return scan_slog(SlogSource(file), SlogScanDepth::headers).blocks;
+    return scan_slog(SlogSource(file_), SlogScanDepth::headers).blocks;
   }();
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    test::write_bytes(file, good.substr(0, blocks[k].offset) + good.substr(blocks[k].end()));
-    EXPECT_THROW(open_log(file), FormatError) << describe(blocks[k]);
+    test::write_bytes(file_, good.substr(0, blocks[k].offset) + good.substr(blocks[k].end()));
+    EXPECT_THROW(open_log(file_), FormatError) << describe(blocks[k]);
   }
 }
 
 // Recover ------------------------------------------------------------------------------------
 
-class SlogRecover : public testing::Test {
+class SlogRecover : public test::SmallLogTest {
  protected:
   void SetUp() override {
     test::write_small_log(file_, 3, 9);
@@ -175,8 +165,6 @@ class SlogRecover : public testing::Test {
     return bytes;
   }
 
-  TemporaryDirectory directory_;
-  std::filesystem::path file_ = directory_ / "a.slog";
   std::filesystem::path out_ = directory_ / "out.slog";
   std::string good_;
   std::vector<SlogBlock> blocks_;

@@ -12,11 +12,9 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/row_transpose.hpp"
 #include "tests/acquisition/record/small_log.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_slog_reader {
 
-using test::TemporaryDirectory;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -28,10 +26,11 @@ TEST(SlogStatus, PacksAndUnpacks) {
   EXPECT_EQ(unpack_status(0), SampleStatus{});
 }
 
-TEST(SlogReader, GivesEveryRangeOfRows) {
-  const TemporaryDirectory directory;
+using SlogReaderTest = test::SmallLogTest;
+
+TEST_F(SlogReaderTest, GivesEveryRangeOfRows) {
   for (const std::uint64_t block_rows : {1U, 7U, 10U, 36U}) {
-    const auto file = directory / ("a" + std::to_string(block_rows));
+    const auto file = directory_ / ("a" + std::to_string(block_rows));
     test::write_small_log(file, 2, block_rows);
     const SlogReader reader(file);
     LogSamples samples;
@@ -46,13 +45,10 @@ TEST(SlogReader, GivesEveryRangeOfRows) {
 }
 
 // Blocks larger than the reader's piece, to cover pieces, tiles and padding.
-TEST(SlogReader, GivesRowsOfLargeBlocks) {
-  const TemporaryDirectory directory;
+TEST_F(SlogReaderTest, GivesRowsOfLargeBlocks) {
   constexpr std::uint64_t kRows = 12 * 1751;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
-  test::write_run(log, 2, kRows, 9001);
-  log.close(0, "");
-  const SlogReader reader(directory / "a.slog");
+  create([](SlogWriter& log) { test::write_run(log, 2, kRows, 9001); });
+  const SlogReader reader(file_);
   std::mt19937_64 engine(5);
   LogSamples samples;
   for (int i = 0; i < 50; ++i) {
@@ -63,10 +59,9 @@ TEST(SlogReader, GivesRowsOfLargeBlocks) {
   }
 }
 
-TEST(SlogReader, DoesNotAllocateAnewForTheSameSize) {
-  const TemporaryDirectory directory;
-  test::write_small_log(directory / "a.slog");
-  const SlogReader reader(directory / "a.slog");
+TEST_F(SlogReaderTest, DoesNotAllocateAnewForTheSameSize) {
+  test::write_small_log(file_);
+  const SlogReader reader(file_);
   LogSamples samples;
   reader.read(0, 0, 12, samples);
   const double* const before = samples.actuators.data();
@@ -74,13 +69,12 @@ TEST(SlogReader, DoesNotAllocateAnewForTheSameSize) {
   EXPECT_EQ(samples.actuators.data(), before);
 }
 
-TEST(SlogReader, SeveralThreadsReadAtOnce) {
-  const TemporaryDirectory directory;
+TEST_F(SlogReaderTest, SeveralThreadsReadAtOnce) {
   constexpr std::uint64_t kRows = 12 * 400;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
-  for (std::size_t run = 0; run < 4; ++run) test::write_run(log, run, kRows, 1000);
-  log.close(0, "");
-  const SlogReader reader(directory / "a.slog");
+  create([](SlogWriter& log) {
+    for (std::size_t run = 0; run < 4; ++run) test::write_run(log, run, kRows, 1000);
+  });
+  const SlogReader reader(file_);
   std::vector<int> good(4, 0);
   std::vector<std::thread> threads;
   for (std::size_t run = 0; run < 4; ++run) {
@@ -96,10 +90,9 @@ TEST(SlogReader, SeveralThreadsReadAtOnce) {
   EXPECT_THAT(good, testing::Each(8));
 }
 
-TEST(SlogReader, RefusesRangesOutsideARun) {
-  const TemporaryDirectory directory;
-  test::write_small_log(directory / "a.slog");
-  const SlogReader reader(directory / "a.slog");
+TEST_F(SlogReaderTest, RefusesRangesOutsideARun) {
+  test::write_small_log(file_);
+  const SlogReader reader(file_);
   LogSamples samples;
   EXPECT_THROW(reader.read(2, 0, 1, samples), std::invalid_argument);
   EXPECT_THROW(reader.read(0, 36, 1, samples), std::invalid_argument);
@@ -107,83 +100,76 @@ TEST(SlogReader, RefusesRangesOutsideARun) {
   EXPECT_THROW(static_cast<void>(reader.excitation(2)), std::invalid_argument);
 }
 
-TEST(SlogReader, NamesTheChannelOfAValueThatIsNotFinite) {
-  const TemporaryDirectory directory;
+TEST_F(SlogReaderTest, NamesTheChannelOfAValueThatIsNotFinite) {
   for (const double value :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
         -std::numeric_limits<double>::infinity()}) {
-    const auto file = directory / "a.slog";
-    std::filesystem::remove(file);
-    SlogWriter log = SlogWriter::create(file, test::small_info());
-    log.begin_run(test::run_of(0), test::excitation_of(0));
+    std::filesystem::remove(file_);
     std::vector<double> rows = test::rows_of(0, 0, 36);
     rows[17 * 6 + 4] = value;  // sensor s2
-    log.write(rows);
-    log.end_run(test::run_of(0));
-    log.close(0, "");
-    const SlogReader reader(file);
+    create([&](SlogWriter& log) {
+      log.begin_run(test::run_of(0), test::excitation_of(0));
+      log.write(rows);
+      log.end_run(test::run_of(0));
+    });
+    const SlogReader reader(file_);
     LogSamples samples;
     EXPECT_THAT([&] { reader.read(0, 12, 24, samples); },
-                ThrowsMessage<FormatError>(AllOf(HasSubstr(file.string()), HasSubstr("0000"),
+                ThrowsMessage<FormatError>(AllOf(HasSubstr(file_.string()), HasSubstr("0000"),
                                                  HasSubstr("row 17"), HasSubstr("s2"))));
     EXPECT_NO_THROW(reader.read(0, 0, 17, samples));
   }
 }
 
-/// Writes one run of `rows` rows, marked complete.
-std::filesystem::path log_of_length(const TemporaryDirectory& directory, std::uint64_t rows) {
-  const auto file = directory / ("rows" + std::to_string(rows));
-  SlogWriter log = SlogWriter::create(file, test::small_info());
-  test::write_run(log, 0, rows);
-  log.close(0, "");
-  return file;
-}
-
-TEST(SlogReader, RefusesCompleteRunsOfNoWholePeriods) {
-  const TemporaryDirectory directory;
-  EXPECT_THAT([&] { SlogReader reader(log_of_length(directory, 35)); },
+TEST_F(SlogReaderTest, RefusesCompleteRunsOfNoWholePeriods) {
+  /// Reads one run of `rows` rows, marked complete.
+  const auto read = [&](std::uint64_t rows) {
+    std::filesystem::remove(file_);
+    create([&](SlogWriter& log) { test::write_run(log, 0, rows); });
+    const SlogReader reader(file_);
+  };
+  EXPECT_THAT([&] { read(35); },
               ThrowsMessage<FormatError>(AllOf(HasSubstr("/runs/0000"), HasSubstr("35 samples"))));
-  EXPECT_THROW(SlogReader reader(log_of_length(directory, 12)), FormatError) << "transient only";
-  EXPECT_THROW(SlogReader reader(log_of_length(directory, 0)), FormatError);
-  EXPECT_NO_THROW(SlogReader reader(log_of_length(directory, 24)));
+  EXPECT_THROW(read(12), FormatError) << "transient only";
+  EXPECT_THROW(read(0), FormatError);
+  EXPECT_NO_THROW(read(24));
 }
 
-TEST(SlogReader, RefusesTheSameCompleteRunTwice) {
-  const TemporaryDirectory directory;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
-  test::write_run(log, 1);
-  test::write_run(log, 1);
-  log.close(0, "");
-  EXPECT_THAT([&] { SlogReader reader(directory / "a.slog"); },
+TEST_F(SlogReaderTest, RefusesTheSameCompleteRunTwice) {
+  create([](SlogWriter& log) {
+    test::write_run(log, 1);
+    test::write_run(log, 1);
+  });
+  EXPECT_THAT([&] { SlogReader reader(file_); },
               ThrowsMessage<FormatError>(HasSubstr("duplicate realization")));
 }
 
-TEST(SlogReader, SaysThatALogWasNotClosed) {
-  const TemporaryDirectory directory;
+TEST_F(SlogReaderTest, SaysThatALogWasNotClosed) {
   {
-    SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+    SlogWriter log = create();
     test::write_run(log, 0);
     log.begin_run(test::run_of(1), test::excitation_of(1));
     log.write(test::rows_of(1, 0, 10));
   }
-  EXPECT_THAT([&] { open_log(directory / "a.slog"); },
+  EXPECT_THAT([&] { open_log(file_); },
               ThrowsMessage<FormatError>(HasSubstr("stageid log recover")));
-  const auto reader = open_log(directory / "a.slog", false);
+  const auto reader = open_log(file_, false);
   ASSERT_EQ(reader->runs().size(), 2U);
   EXPECT_TRUE(reader->runs()[0].complete);
   EXPECT_FALSE(reader->runs()[1].complete);
   EXPECT_EQ(reader->runs()[1].samples, 10U);
 }
 
-TEST(OpenLog, SaysWhatAFileIsNot) {
-  const TemporaryDirectory directory;
-  EXPECT_THROW(open_log(directory / "none"), FileError);
-  EXPECT_THROW(open_log(directory.path()), FileError);
-  test::write_bytes(directory / "empty", "");
-  EXPECT_THAT([&] { open_log(directory / "empty"); },
+using OpenLog = test::SmallLogTest;
+
+TEST_F(OpenLog, SaysWhatAFileIsNot) {
+  EXPECT_THROW(open_log(directory_ / "none"), FileError);
+  EXPECT_THROW(open_log(directory_.path()), FileError);
+  test::write_bytes(directory_ / "empty", "");
+  EXPECT_THAT([&] { open_log(directory_ / "empty"); },
               ThrowsMessage<FormatError>(HasSubstr("is empty")));
-  test::write_bytes(directory / "text", "time,u,y\n");
-  EXPECT_THAT([&] { open_log(directory / "text"); },
+  test::write_bytes(directory_ / "text", "time,u,y\n");
+  EXPECT_THAT([&] { open_log(directory_ / "text"); },
               ThrowsMessage<FormatError>(HasSubstr("neither")));
 }
 
@@ -217,15 +203,16 @@ TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
   }
 }
 
+using SlogFormat = test::SmallLogTest;
+
 // The numpy code in docs/formats.md is meant to be copied.
-TEST(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
+TEST_F(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0) {
     GTEST_SKIP() << "needs python3 with numpy";
   }
-  const TemporaryDirectory directory;
-  test::write_small_log(directory / "run.slog", 2, 10);
+  test::write_small_log(directory_ / "run.slog", 2, 10);
   std::ifstream document(std::string(STAGEID_SOURCE_DIR) + "/docs/formats.md");
-  std::ofstream script(directory / "read.py");
+  std::ofstream script(directory_ / "read.py");
   std::string line;
   while (std::getline(document, line) && line != "import numpy as np") {
   }
@@ -238,7 +225,7 @@ TEST(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
             "  marked = samples[run][:, 5].copy().view('<u8') >> 8 & 1\n"
             "  assert (marked == ((n + run) % 7 == 3)).all()\n";
   script.close();
-  const std::string command = "cd " + directory.path().string() + " && /usr/bin/python3 read.py";
+  const std::string command = "cd " + directory_.path().string() + " && /usr/bin/python3 read.py";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 

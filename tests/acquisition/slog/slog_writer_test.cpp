@@ -10,18 +10,17 @@
 #include "acquisition/slog/slog_reader.hpp"
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/file_size_limit.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_slog_writer {
 
-using test::TemporaryDirectory;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-TEST(SlogWriter, WhatIsWrittenIsReadBack) {
-  const TemporaryDirectory directory;
-  test::write_small_log(directory / "a.slog", 4, 11);
-  const SlogReader reader(directory / "a.slog");
+using SlogWriterTest = test::SmallLogTest;
+
+TEST_F(SlogWriterTest, WhatIsWrittenIsReadBack) {
+  test::write_small_log(file_, 4, 11);
+  const SlogReader reader(file_);
 
   EXPECT_TRUE(same_measurement(reader.info(), test::small_info()));
   EXPECT_EQ(reader.info().metadata_json, test::small_info().metadata_json);
@@ -44,8 +43,7 @@ TEST(SlogWriter, WhatIsWrittenIsReadBack) {
   }
 }
 
-TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
-  const TemporaryDirectory directory;
+TEST_F(SlogWriterTest, RowsWithTimeStampsAreReadBackAndResumed) {
   LogInfo info = test::small_info();
   info.stamps = true;
   const auto write = [](SlogWriter log, std::size_t run) {
@@ -62,43 +60,38 @@ TEST(SlogWriter, RowsWithTimeStampsAreReadBackAndResumed) {
     log.end_run(test::run_of(run));
     log.close(0, "");
   };
-  write(SlogWriter::create(directory / "a.slog", info), 0);
+  write(SlogWriter::create(file_, info), 0);
   // In virtual time, stamps are not requested.
-  write(SlogWriter::resume(directory / "a.slog", test::small_info()), 1);
-  const SlogReader reader(directory / "a.slog");
+  write(resume(), 1);
+  const SlogReader reader(file_);
   EXPECT_TRUE(reader.info().stamps);
   ASSERT_EQ(reader.runs().size(), 2U);
   EXPECT_EQ(test::good_rows(reader), 2 * 36U);
 }
 
-TEST(SlogWriter, ARunWithoutExcitationHasNone) {
-  const TemporaryDirectory directory;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+TEST_F(SlogWriterTest, ARunWithoutExcitationHasNone) {
+  SlogWriter log = create();
   log.begin_run(test::run_of(0), Eigen::MatrixXd::Zero(test::kPeriod, 3));
   log.write(test::rows_of(0, 0, 24));
   log.end_run(test::run_of(0));
   log.close(0, "");
-  EXPECT_EQ(SlogReader(directory / "a.slog").excitation(0),
-            Eigen::MatrixXd::Zero(test::kPeriod, 3));
+  EXPECT_EQ(SlogReader(file_).excitation(0), Eigen::MatrixXd::Zero(test::kPeriod, 3));
 }
 
-TEST(SlogWriter, RefusesAnExistingFileAndLeavesItAlone) {
-  const TemporaryDirectory directory;
-  test::write_bytes(directory / "a.slog", "precious");
-  EXPECT_THAT([&] { SlogWriter::create(directory / "a.slog", test::small_info()); },
-              ThrowsMessage<FileError>(HasSubstr("already exists")));
-  EXPECT_EQ(test::bytes_of(directory / "a.slog"), "precious");
-  EXPECT_THROW(SlogWriter::create(directory / "none/a.slog", test::small_info()), FileError);
-  EXPECT_THROW(SlogWriter::resume(directory / "none.slog", test::small_info()), FileError);
+TEST_F(SlogWriterTest, RefusesAnExistingFileAndLeavesItAlone) {
+  test::write_bytes(file_, "precious");
+  EXPECT_THAT([&] { create(); }, ThrowsMessage<FileError>(HasSubstr("already exists")));
+  EXPECT_EQ(test::bytes_of(file_), "precious");
+  EXPECT_THROW(SlogWriter::create(directory_ / "none/a.slog", test::small_info()), FileError);
+  EXPECT_THROW(SlogWriter::resume(directory_ / "none.slog", test::small_info()), FileError);
 }
 
-TEST(SlogWriter, RefusesInfosThatMakeNoSense) {
-  const TemporaryDirectory directory;
+TEST_F(SlogWriterTest, RefusesInfosThatMakeNoSense) {
   const auto refused = [&](auto spoil) {
     LogInfo info = test::small_info();
     spoil(info);
-    EXPECT_THROW(SlogWriter::create(directory / "a.slog", info), std::invalid_argument);
-    EXPECT_FALSE(std::filesystem::exists(directory / "a.slog"));
+    EXPECT_THROW(SlogWriter::create(file_, info), std::invalid_argument);
+    EXPECT_FALSE(std::filesystem::exists(file_));
   };
   refused([](LogInfo& info) { info.sample_rate_hz = 0.0; });
   refused([](LogInfo& info) { info.sample_rate_hz = std::numeric_limits<double>::infinity(); });
@@ -111,9 +104,8 @@ TEST(SlogWriter, RefusesInfosThatMakeNoSense) {
   refused([](LogInfo& info) { info.sensors.names[0] = "\xFF"; });
 }
 
-TEST(SlogWriter, RefusesCallsOutOfOrderAndOfWrongSize) {
-  const TemporaryDirectory directory;
-  SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
+TEST_F(SlogWriterTest, RefusesCallsOutOfOrderAndOfWrongSize) {
+  SlogWriter log = create();
   const Eigen::MatrixXd excitation = test::excitation_of(0);
   EXPECT_THROW(log.write(test::rows_of(0, 0, 1)), std::invalid_argument);
   EXPECT_THROW(log.end_run(test::run_of(0)), std::invalid_argument);
@@ -129,19 +121,15 @@ TEST(SlogWriter, RefusesCallsOutOfOrderAndOfWrongSize) {
   EXPECT_EQ(log.acknowledged_rows(), 0U);
 }
 
-TEST(SlogWriter, OneWriterAtATime) {
-  const TemporaryDirectory directory;
-  const SlogWriter log = SlogWriter::create(directory / "a.slog", test::small_info());
-  EXPECT_THAT([&] { SlogWriter::resume(directory / "a.slog", test::small_info()); },
-              ThrowsMessage<FileError>(HasSubstr("another process")));
+TEST_F(SlogWriterTest, OneWriterAtATime) {
+  const SlogWriter log = create();
+  EXPECT_THAT([&] { resume(); }, ThrowsMessage<FileError>(HasSubstr("another process")));
 }
 
-TEST(SlogWriter, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
+TEST_F(SlogWriterTest, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
   std::uint64_t acknowledged = 0;
   {
-    SlogWriter log = SlogWriter::create(file, test::small_info());
+    SlogWriter log = create();
     log.begin_run(test::run_of(0), test::excitation_of(0));
     log.write(test::rows_of(0, 0, 10));
     const test::FileSizeLimit limit(log.bytes() + 200);  // room for a part of the next block
@@ -149,32 +137,30 @@ TEST(SlogWriter, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
                 ThrowsMessage<FileError>(HasSubstr("are kept")));
     EXPECT_THROW(log.write(test::rows_of(0, 10, 1)), FileError) << "a gap would follow";
     acknowledged = log.acknowledged_rows();
-    EXPECT_EQ(std::filesystem::file_size(file), log.bytes());
+    EXPECT_EQ(std::filesystem::file_size(file_), log.bytes());
   }
   EXPECT_EQ(acknowledged, 10U);
-  SlogWriter log = SlogWriter::resume(file, test::small_info());
-  EXPECT_FALSE(std::filesystem::exists(directory / "a.slog.damaged"));
+  SlogWriter log = resume();
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "a.slog.damaged"));
   test::write_run(log, 0);
   log.close(0, "");
-  const SlogReader reader(file);
+  const SlogReader reader(file_);
   ASSERT_EQ(reader.runs().size(), 2U);
   EXPECT_FALSE(reader.runs()[0].complete);
   EXPECT_EQ(reader.runs()[0].samples, acknowledged);
   EXPECT_TRUE(reader.runs()[1].complete);
 }
 
-TEST(SlogWriter, ResumeAppendsToACleanlyClosedLog) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 1);
-  const std::string before = test::bytes_of(file);
+TEST_F(SlogWriterTest, ResumeAppendsToACleanlyClosedLog) {
+  test::write_small_log(file_, 1);
+  const std::string before = test::bytes_of(file_);
   {
-    SlogWriter log = SlogWriter::resume(file, test::small_info());
+    SlogWriter log = resume();
     test::write_run(log, 1);
     log.close(3, "later");
   }
-  EXPECT_EQ(test::bytes_of(file).substr(0, before.size()), before) << "append-only";
-  const SlogReader reader(file);
+  EXPECT_EQ(test::bytes_of(file_).substr(0, before.size()), before) << "append-only";
+  const SlogReader reader(file_);
   ASSERT_EQ(reader.runs().size(), 2U);
   EXPECT_EQ(reader.end()->exit_code, 3);
   EXPECT_EQ(test::good_rows(reader), 2 * 36U);
@@ -182,63 +168,57 @@ TEST(SlogWriter, ResumeAppendsToACleanlyClosedLog) {
     EXPECT_EQ(reader.excitation(run), test::excitation_of(run));
 }
 
-TEST(SlogWriter, ResumeRefusesAnotherExperiment) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 1);
-  const std::string before = test::bytes_of(file);
+TEST_F(SlogWriterTest, ResumeRefusesAnotherExperiment) {
+  test::write_small_log(file_, 1);
+  const std::string before = test::bytes_of(file_);
   LogInfo other = test::small_info();
   other.period_samples = 24;
-  EXPECT_THAT([&] { SlogWriter::resume(file, other); },
+  EXPECT_THAT([&] { SlogWriter::resume(file_, other); },
               ThrowsMessage<FormatError>(HasSubstr("a different experiment")));
   other = test::small_info();
   other.sensors.names[0] = "s9";
-  EXPECT_THROW(SlogWriter::resume(file, other), FormatError);
-  test::write_bytes(directory / "text", "no log at all");
-  EXPECT_THROW(SlogWriter::resume(directory / "text", other), FormatError);
+  EXPECT_THROW(SlogWriter::resume(file_, other), FormatError);
+  test::write_bytes(directory_ / "text", "no log at all");
+  EXPECT_THROW(SlogWriter::resume(directory_ / "text", other), FormatError);
   other = test::small_info();
   other.metadata_json = R"({"started":"another time"})";
-  EXPECT_NO_THROW(SlogWriter::resume(file, other));
-  EXPECT_EQ(test::bytes_of(file), before) << "nothing was written yet";
+  EXPECT_NO_THROW(SlogWriter::resume(file_, other));
+  EXPECT_EQ(test::bytes_of(file_), before) << "nothing was written yet";
 }
 
-TEST(SlogWriter, ResumeMovesADamagedTailAside) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
+TEST_F(SlogWriterTest, ResumeMovesADamagedTailAside) {
   for (const char* saved : {"a.slog.damaged", "a.slog.damaged.2"}) {
-    std::filesystem::remove(file);
+    std::filesystem::remove(file_);
     std::uint64_t intact = 0;
     {
-      SlogWriter log = SlogWriter::create(file, test::small_info());
+      SlogWriter log = create();
       log.begin_run(test::run_of(0), test::excitation_of(0));
       log.write(test::rows_of(0, 0, 20));
       intact = log.bytes();
       log.write(test::rows_of(0, 20, 10));
     }
-    const std::string whole = test::bytes_of(file);
-    test::write_bytes(file, whole.substr(0, whole.size() - 100));
-    SlogWriter log = SlogWriter::resume(file, test::small_info());
+    const std::string whole = test::bytes_of(file_);
+    test::write_bytes(file_, whole.substr(0, whole.size() - 100));
+    SlogWriter log = resume();
     EXPECT_EQ(log.bytes(), intact);
-    EXPECT_EQ(test::bytes_of(directory / saved), whole.substr(intact, whole.size() - 100 - intact));
+    EXPECT_EQ(test::bytes_of(directory_ / saved),
+              whole.substr(intact, whole.size() - 100 - intact));
     test::write_run(log, 0);
     log.close(0, "");
-    const SlogReader reader(file);
+    const SlogReader reader(file_);
     EXPECT_EQ(reader.runs()[0].samples, 20U);
     EXPECT_FALSE(reader.runs()[0].complete);
     EXPECT_TRUE(reader.runs()[1].complete);
   }
 }
 
-TEST(SlogWriter, ResumeDoesNotThrowIntactBlocksAway) {
-  const TemporaryDirectory directory;
-  const auto file = directory / "a.slog";
-  test::write_small_log(file, 2);
-  std::string bytes = test::bytes_of(file);
+TEST_F(SlogWriterTest, ResumeDoesNotThrowIntactBlocksAway) {
+  test::write_small_log(file_, 2);
+  std::string bytes = test::bytes_of(file_);
   bytes[bytes.size() / 2] ^= 1;
-  test::write_bytes(file, bytes);
-  EXPECT_THAT([&] { SlogWriter::resume(file, test::small_info()); },
-              ThrowsMessage<FormatError>(HasSubstr("recover")));
-  EXPECT_EQ(test::bytes_of(file), bytes);
+  test::write_bytes(file_, bytes);
+  EXPECT_THAT([&] { resume(); }, ThrowsMessage<FormatError>(HasSubstr("recover")));
+  EXPECT_EQ(test::bytes_of(file_), bytes);
 }
 
 }  // namespace stageid::test_slog_writer

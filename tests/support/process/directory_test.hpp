@@ -1,0 +1,15 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "tests/support/process/temporary_directory.hpp"
+
+namespace stageid::test {
+
+/// A test with an empty directory of its own.
+class DirectoryTest : public testing::Test {
+ protected:
+  TemporaryDirectory directory_;
+};
+
+}  // namespace stageid::test
