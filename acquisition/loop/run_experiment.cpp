@@ -23,6 +23,7 @@
 #include "acquisition/loop/side_thread.hpp"
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_index.hpp"
+#include "excitation/multisine/random_stream.hpp"
 
 namespace stageid {
 
@@ -41,12 +42,6 @@ ChannelList channel_list(const std::vector<Channel>& channels) {
     list.units.push_back(channel.unit);
   }
   return list;
-}
-
-std::uint64_t mix(std::uint64_t z) noexcept {
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-  return z ^ (z >> 31);
 }
 
 /// One experiment in progress.
@@ -419,9 +414,11 @@ std::string RunExperimentOptions::trip_reason() const {
 }
 
 std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
-  constexpr std::uint64_t kIncrement = 0x9E3779B97F4A7C15U;
-  const auto step = [](int index) { return kIncrement * (static_cast<std::uint64_t>(index) + 1); };
-  return mix(mix(mix(plan_seed + kIncrement) + step(run.realization)) + step(run.experiment));
+  const auto step = [](int index) {
+    return kSplitMix64Increment * static_cast<std::uint64_t>(index);
+  };
+  return splitmix64(splitmix64(splitmix64(plan_seed) + step(run.realization)) +
+                    step(run.experiment));
 }
 
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,

@@ -5,11 +5,13 @@
 
 namespace stageid {
 
+inline constexpr std::uint64_t kSplitMix64Increment = 0x9E3779B97F4A7C15U;
+
 /// The finalizer of SplitMix64, a bijection of 64-bit words that mixes every bit into every other.
 /// Source: G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number generators (2014);
 /// constants as in S. Vigna's splitmix64.c.
 constexpr std::uint64_t splitmix64(std::uint64_t word) noexcept {
-  word += 0x9E3779B97F4A7C15U;
+  word += kSplitMix64Increment;
   word = (word ^ (word >> 30U)) * 0xBF58476D1CE4E5B9U;
   word = (word ^ (word >> 27U)) * 0x94D049BB133111EBU;
   return word ^ (word >> 31U);

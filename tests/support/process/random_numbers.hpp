@@ -6,6 +6,9 @@
 #include <complex>
 #include <cstdint>
 #include <numbers>
+#include <utility>
+
+#include "excitation/multisine/random_stream.hpp"
 
 namespace stageid::test {
 
@@ -41,12 +44,7 @@ class RandomNumbers {
   }
 
  private:
-  std::uint64_t next() {  // splitmix64
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return z ^ (z >> 31);
-  }
+  std::uint64_t next() { return splitmix64(std::exchange(state_, state_ + kSplitMix64Increment)); }
 
   std::uint64_t state_;
 };
