@@ -1,5 +1,3 @@
-#include "acquisition/files/hdf5_heap_check.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <string_view>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/hdf5_support.hpp"
 
 namespace stageid::hdf5 {
 namespace {

@@ -61,4 +61,16 @@ herr_t collect_name(hid_t, const char* name, const Info*, void* names) {
   return 0;
 }
 
+/// Checks the global heaps of an HDF5 file, which contain texts of variable length.
+///
+/// HDF5 1.10 does not check them: a wrong length makes it read out of bounds or loop forever. Heaps are
+/// written near the beginning or the end, so only the first and the last megabytes are searched.
+/// @throws FormatError if a heap is damaged; FileError if the file cannot be read.
+void check_global_heaps(const std::filesystem::path& file);
+
+/// Visits every object, attribute and text of a file, so that a crash of HDF5 on a damaged one occurs here.
+/// @throws FormatError if the file refers to other files (external links, external storage, virtual datasets), which
+/// would show their contents as measured data, contains a group within itself, or has more than 20000 objects.
+void survey(const Hdf5File& file);
+
 }  // namespace stageid::hdf5

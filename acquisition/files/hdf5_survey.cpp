@@ -1,5 +1,3 @@
-#include "acquisition/files/hdf5_survey.hpp"
-
 #include <map>
 #include <string>
 

@@ -3,18 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstdio>
-#include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <string>
-#include <system_error>
+#include <string_view>
 
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/output_file.hpp"
-#include "acquisition/files/system_reason.hpp"
 #include "acquisition/formats/hdf5_log.hpp"
 #include "acquisition/slog/slog_index.hpp"
 #include "acquisition/slog/slog_reader.hpp"
@@ -134,15 +130,10 @@ void convert_to_hdf5(const LogReader& reader, const std::filesystem::path& tempo
 
 // CSV ----------------------------------------------------------------------------------------
 
-/// A text file with a large buffer that checks for errors.
+/// The text of an output, written in large pieces.
 class CsvFile {
  public:
-  explicit CsvFile(const std::filesystem::path& path)
-      : path_(path), file_(std::fopen(path.c_str(), "wb"), &std::fclose) {
-    if (!file_) fail();
-    text_.reserve(kFlushBytes + 4096);
-  }
-
+  explicit CsvFile(OutputFile& output) : output_(output) { text_.reserve(kFlushBytes + 4096); }
   void text(std::string_view text) { text_ += text; }
 
   /// A quoted cell: names may contain commas and quotes.
@@ -167,23 +158,15 @@ class CsvFile {
     if (text_.size() >= kFlushBytes) flush();
   }
 
-  void close() {
-    flush();
-    if (std::fclose(file_.release()) != 0) fail();
+  void flush() {
+    output_.append(text_);
+    text_.clear();
   }
 
  private:
   static constexpr std::size_t kFlushBytes = std::size_t{1} << 18;
-  void flush() {
-    if (std::fwrite(text_.data(), 1, text_.size(), file_.get()) != text_.size()) fail();
-    text_.clear();
-  }
-  [[noreturn]] void fail() const {
-    throw FileError(
-        fmt::format("{}: cannot be written: {}", shown_name(path_).string(), system_reason(errno)));
-  }
-  std::filesystem::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+
+  OutputFile& output_;
   std::string text_;
 };
 
@@ -231,15 +214,14 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
   read_pieces(reader, run, progress, write);
 }
 
-void convert_to_csv(const LogReader& reader, const std::filesystem::path& to,
-                    const ConvertOptions& options) {
+void convert_to_csv(const LogReader& reader, OutputFile& output, const ConvertOptions& options) {
   ConvertProgress progress(reader, options);
-  CsvFile csv(to);
+  CsvFile csv(output);
   write_csv_head(csv, reader.info());
   for (std::size_t run = 0; run < reader.runs().size(); ++run) {
     if (progress.wanted(reader.runs()[run])) convert_run_to_csv(reader, run, csv, progress);
   }
-  csv.close();
+  csv.flush();
 }
 
 // native -------------------------------------------------------------------------------------
@@ -287,7 +269,7 @@ void convert_log(const LogReader& reader, const std::filesystem::path& to,
   } else if (native) {
     convert_to_slog(reader, output.path(), options);
   } else {
-    convert_to_csv(reader, output.path(), options);
+    convert_to_csv(reader, output, options);
   }
   output.commit();
 }
