@@ -30,7 +30,7 @@ std::string line_of(std::string_view event, const std::vector<EventField>& field
 }  // namespace
 
 EventLog::EventLog(const std::filesystem::path& file)
-    : path_(file), file_(std::fopen(file.c_str(), "ae")) {
+    : path_(file), file_(std::fopen(file.c_str(), "ae"), &std::fclose) {
   if (!file_)
     throw FileError(fmt::format("{}: cannot be written: {}", file.string(), system_reason(errno)));
 }

@@ -38,14 +38,11 @@ class EventLog {
   std::string error() const;
 
  private:
-  struct Closer {
-    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-  };
   void append(std::string line);
 
   std::filesystem::path path_;
   mutable std::mutex mutex_;  // guards all members below
-  std::unique_ptr<std::FILE, Closer> file_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   std::vector<std::string> latest_;
   std::string error_;
 };

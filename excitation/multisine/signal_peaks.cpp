@@ -103,7 +103,22 @@ struct SignalPredictor::Work {
   }
 
   /// Includes the margin and the share added for doubt below the band.
-  double largest_from_rest(const BoundedSignal& signal, const Eigen::MatrixXcd& begun);
+  double largest_from_rest(const BoundedSignal& signal, const Eigen::MatrixXcd& begun) {
+    const HalfLines known(grid, signal);
+    Eigen::VectorXcd half(twofold.half_size());
+    for (Index i = 0; i < half.size(); ++i)
+      half[i] = known.product(i, begun.col(i)) *
+                kind_factor(signal.kind, 0.5 * static_cast<double>(i) * grid.resolution_hz(),
+                            grid.sample_rate_hz());
+    const auto largest = [&] {
+      return twofold.inverse(half).head(grid.samples_per_period()).cwiseAbs().maxCoeff();
+    };
+    const double of_all = (1.0 + signal.rest_margin) * largest();
+    if (!(signal.below_band_doubt > 0.0)) return of_all;
+    const Index lowest = 2 * Index{grid.lines().front()};
+    half.tail(half.size() - lowest).setZero();
+    return of_all + signal.below_band_doubt * largest();
+  }
 
   const FrequencyGrid& grid;
   int oversampling;
@@ -112,24 +127,6 @@ struct SignalPredictor::Work {
   RealDft twofold;
   double looseness;
 };
-
-double SignalPredictor::Work::largest_from_rest(const BoundedSignal& signal,
-                                                const Eigen::MatrixXcd& begun) {
-  const HalfLines known(grid, signal);
-  Eigen::VectorXcd half(twofold.half_size());
-  for (Index i = 0; i < half.size(); ++i)
-    half[i] = known.product(i, begun.col(i)) *
-              kind_factor(signal.kind, 0.5 * static_cast<double>(i) * grid.resolution_hz(),
-                          grid.sample_rate_hz());
-  const auto largest = [&] {
-    return twofold.inverse(half).head(grid.samples_per_period()).cwiseAbs().maxCoeff();
-  };
-  const double of_all = (1.0 + signal.rest_margin) * largest();
-  if (!(signal.below_band_doubt > 0.0)) return of_all;
-  const Index lowest = 2 * Index{grid.lines().front()};
-  half.tail(half.size() - lowest).setZero();
-  return of_all + signal.below_band_doubt * largest();
-}
 
 SignalPredictor::SignalPredictor(const FrequencyGrid& grid) {
   twice(grid.samples_per_period());  // rejects too long periods before allocating memory

@@ -111,23 +111,26 @@ Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& 
   return unit_rms_amplitude(grid, shape);
 }
 
-Eigen::VectorXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec,
-                               int realization, int axis) {
-  return multisine_phase_rad(grid, axis_amplitude(grid, spec, axis),
-                             stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
-                                         static_cast<std::uint64_t>(axis)),
-                             spec.crest_iterations);
+/// Of one realization, axes x lines.
+MatrixXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec, int realization) {
+  const int axes = static_cast<int>(spec.axes.size());
+  MatrixXd phase_rad(axes, grid.size());
+  for (int p = 0; p < axes; ++p) {
+    const std::uint64_t seed = stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
+                                           static_cast<std::uint64_t>(p));
+    phase_rad.row(p) =
+        multisine_phase_rad(grid, axis_amplitude(grid, spec, p), seed, spec.crest_iterations)
+            .transpose();
+  }
+  return phase_rad;
 }
 
 /// All phases of a plan with crest reduction, on all cores. Each realization is reduced separately, so the
 /// result does not depend on the distribution over threads.
 std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const ExperimentSpec& spec) {
-  const int axes = static_cast<int>(spec.axes.size());
-  std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations),
-                               MatrixXd(axes, grid.size()));
+  std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations));
   for_each_task(0, spec.realizations, [&](int m) {
-    for (int p = 0; p < axes; ++p)
-      phases[static_cast<std::size_t>(m)].row(p) = draw_phase_rad(grid, spec, m, p).transpose();
+    phases[static_cast<std::size_t>(m)] = draw_phase_rad(grid, spec, m);
   });
   return phases;
 }
@@ -184,11 +187,7 @@ void ExperimentPlan::check_run(RunId run) const {
 MatrixXd ExperimentPlan::phase_rad(int realization) const {
   check_run({realization, 0});
   if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[static_cast<std::size_t>(realization)];
-  MatrixXd phase_rad(axes(), grid_.size());
-  for (int p = 0; p < axes(); ++p) {
-    phase_rad.row(p) = draw_phase_rad(grid_, spec_, realization, p).transpose();
-  }
-  return phase_rad;
+  return draw_phase_rad(grid_, spec_, realization);
 }
 
 MatrixXcd ExperimentPlan::spectrum(RunId run) const {

@@ -149,12 +149,10 @@ class Designer {
 
   MatrixXd reduced(const MatrixXd& phase_rad) const {
     JointCrestProblem problem{grid_, plan_.mixing(), spec_.signals, amplitude_};
-    problem.enough = enough();
+    // If rms limits bound the amplitudes, peaks need not fall far below `safety` of their limits.
+    problem.enough = kEnough * spec_.safety;
     return reduce_joint_crest(problem, phase_rad, spec_.experiment.crest_iterations);
   }
-
-  /// If rms limits bound the amplitudes, peaks need not fall far below `safety` of their limits.
-  double enough() const { return kEnough * spec_.safety; }
 
   Peaks predicted(const MatrixXd& phase_rad) const {
     Peaks peaks(groups_.size(), std::vector<SignalPeak>(spec_.signals.size()));
@@ -173,13 +171,11 @@ class Designer {
     for_each_task(0, static_cast<int>(phases.size()), [&](int m) {
       peaks[static_cast<std::size_t>(m)] = predicted(phases[static_cast<std::size_t>(m)]);
     });
-    for (std::size_t i = 1; i < peaks.size(); ++i) include(peaks.front(), peaks[i]);
-    return std::move(peaks.front());
-  }
-
-  static void include(Peaks& all, const Peaks& more) {
-    for (std::size_t g = 0; g < all.size(); ++g)
-      for (std::size_t s = 0; s < all[g].size(); ++s) all[g][s].include(more[g][s]);
+    Peaks& all = peaks.front();
+    for (const Peaks& more : peaks)
+      for (std::size_t g = 0; g < all.size(); ++g)
+        for (std::size_t s = 0; s < all[g].size(); ++s) all[g][s].include(more[g][s]);
+    return std::move(all);
   }
 
   void take_crest_factors(const Peaks& peaks) {
