@@ -49,7 +49,7 @@ bool equal_but_for_case(std::string_view a, std::string_view b) {
 /// The only word that starts with `beginning`, of three letters or more: "conv" for "convert".
 std::string whole_word(const std::string& beginning, const std::vector<std::string>& allowed) {
   const auto begins = [&](const std::string& candidate) {
-    return candidate.compare(0, beginning.size(), beginning) == 0;
+    return candidate.starts_with(beginning);
   };
   if (beginning.size() < 3 || std::count_if(allowed.begin(), allowed.end(), begins) != 1) return "";
   return *std::find_if(allowed.begin(), allowed.end(), begins);

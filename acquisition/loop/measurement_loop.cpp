@@ -141,29 +141,18 @@ void MeasurementLoop::begin(std::uint64_t quiet_samples) noexcept {
   last_trouble_ = Outcome::ok;
   jitter_left_ns2_ = jitter_ns2_ * static_cast<double>(excitation_.samples);
   phase_ = Phase::leading;
-  begin_measuring();
-  lead_gain();
+  lead();
 }
 
-/// After a sample before the run.
+/// Sets the gain of the next sample, which is measured unless samples before the run are left.
 void MeasurementLoop::lead() noexcept {
-  --(quiet_left_ > 0 ? quiet_left_ : ramp_left_);
-  begin_measuring();
-  lead_gain();
-}
-
-/// Unless samples before the run are left.
-void MeasurementLoop::begin_measuring() noexcept {
+  gain_ = quiet_left_ > 0
+              ? 0.0
+              : 1.0 - static_cast<double>(ramp_left_) / static_cast<double>(ramp_samples_ + 1);
   if (quiet_left_ + ramp_left_ > 0) return;
   phase_ = Phase::measuring;
   health_ = {};
   timing_ = {};
-}
-
-void MeasurementLoop::lead_gain() noexcept {
-  gain_ = quiet_left_ > 0
-              ? 0.0
-              : 1.0 - static_cast<double>(ramp_left_) / static_cast<double>(ramp_samples_ + 1);
 }
 
 LoopStatus MeasurementLoop::step() noexcept {
@@ -372,6 +361,7 @@ LoopStatus MeasurementLoop::advance() noexcept {
   } else if (phase_ == Phase::holding) {
     return LoopStatus::held;
   } else if (phase_ == Phase::leading) {
+    --(quiet_left_ > 0 ? quiet_left_ : ramp_left_);
     lead();
     return LoopStatus::running;
   } else {

@@ -125,8 +125,6 @@ class MeasurementLoop {
 
   void begin(std::uint64_t quiet_samples) noexcept;
   void lead() noexcept;
-  void begin_measuring() noexcept;
-  void lead_gain() noexcept;
 
   void compute_command() noexcept;
   bool write_row(double* row) noexcept;

@@ -261,21 +261,16 @@ TEST_F(MeasurementLoopTest, AFullRingStopsNothingHalfWay) {
   EXPECT_EQ(stage_.stops(), 1);
 }
 
-TEST_F(MeasurementLoopTest, ALimitInTheRampBehindAGoodRunIsTold) {
-  for (std::uint64_t n = kSamples + 3; n < 200; ++n) stage_.outcomes[n] = Outcome::limit;
-  MeasurementLoop& loop = perform();
-  EXPECT_TRUE(loop.complete());
-  EXPECT_EQ(loop.reason(), StopReason::limit);
-  EXPECT_TRUE(marked(rows()).empty());
-}
-
-TEST_F(MeasurementLoopTest, AFaultInTheRampBehindAGoodRunIsTold) {
-  stage_.outcomes = {{kSamples + 3, Outcome::fault}};
-  MeasurementLoop& loop = perform();
-  EXPECT_TRUE(loop.complete());
-  EXPECT_EQ(loop.reason(), StopReason::fault);
-  EXPECT_EQ(loop.last_trouble(), Outcome::fault);
-  EXPECT_TRUE(marked(rows()).empty());
+TEST_F(MeasurementLoopTest, ALimitOrAFaultInTheRampBehindAGoodRunIsTold) {
+  for (const auto& [outcome, reason] : {std::pair(Outcome::limit, StopReason::limit),
+                                        std::pair(Outcome::fault, StopReason::fault)}) {
+    for (std::uint64_t n = kSamples + 3; n < 200; ++n) stage_.outcomes[n] = outcome;
+    MeasurementLoop& loop = perform();
+    EXPECT_TRUE(loop.complete());
+    EXPECT_EQ(loop.reason(), reason);
+    EXPECT_EQ(loop.last_trouble(), outcome);
+    EXPECT_TRUE(marked(rows()).empty());
+  }
 }
 
 TEST_F(MeasurementLoopTest, AStageThatBrakesIsWaitedForAndThenStopped) {

@@ -15,31 +15,28 @@ using Shape = std::vector<hsize_t>;
 
 inline constexpr std::uint64_t kRows = 3 * kPeriod;
 
-inline std::vector<double> actuators(std::size_t run, std::uint64_t rows = kRows) {
+/// value(row, column) row by row.
+template <typename Value>
+std::vector<double> values_of(std::uint64_t rows, int columns, Value value) {
   std::vector<double> values;
-  for (std::uint64_t n = 0; n < rows; ++n) {
-    for (int c = 0; c < 3; ++c) values.push_back(actuator_value(run, n, c));
-  }
+  for (std::uint64_t n = 0; n < rows; ++n)
+    for (int c = 0; c < columns; ++c) values.push_back(value(n, c));
   return values;
 }
 
+inline std::vector<double> actuators(std::size_t run, std::uint64_t rows = kRows) {
+  return values_of(rows, 3, [&](std::uint64_t n, int c) { return actuator_value(run, n, c); });
+}
+
 inline std::vector<double> sensors(std::size_t run, std::uint64_t rows = kRows) {
-  std::vector<double> values;
-  for (std::uint64_t n = 0; n < rows; ++n) {
-    for (int c = 0; c < 2; ++c) values.push_back(sensor_value(run, n, c));
-  }
-  return values;
+  return values_of(rows, 2, [&](std::uint64_t n, int c) { return sensor_value(run, n, c); });
 }
 
 inline std::vector<double> excitation(std::size_t run, std::uint64_t rows) {
   const Eigen::MatrixXd period = excitation_of(run);
-  std::vector<double> values;
-  for (std::uint64_t n = 0; n < rows; ++n) {
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      values.push_back(period(static_cast<Eigen::Index>(n % kPeriod), c));
-    }
-  }
-  return values;
+  return values_of(rows, 3, [&](std::uint64_t n, int c) {
+    return period(static_cast<Eigen::Index>(n % kPeriod), c);
+  });
 }
 
 /// A log of another program. Every part can be omitted or replaced.

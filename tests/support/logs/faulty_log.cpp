@@ -71,11 +71,72 @@ class Loop {
   /// @returns false if the loop ran away.
   /// @param before  the part of the measurement that lies before this run; `share`: that this run is
   bool run(const Eigen::MatrixXd& r, const Eigen::VectorXd& hidden, Eigen::Index samples,
-           std::uint64_t seed, double before, double share, LogSamples& record);
+           std::uint64_t seed, double before, double share, LogSamples& record) {
+    RandomNumbers random(seed);
+    plant_.reset();
+    late_.reset();
+    controller_.reset();
+    record.sensors.resize(samples, y_.size());
+    record.actuators.resize(samples, u_.size());
+    record.marked.setZero(samples);
+    for (Eigen::Index n = 0; n < samples; ++n) {
+      if (fault_.kind == Kind::drifting_mode && n % kRetuned == 0) {
+        const double passed =
+            before + share * static_cast<double>(n) / static_cast<double>(samples) - 0.5;
+        plant_.retune(fault_.a, mode_hz_ * (1.0 + fault_.value * passed), mode_damping_);
+      }
+      measure(random, n, samples);
+      if (!(y_.cwiseAbs().maxCoeff() < window_m_)) return false;
+      controller_.update(y_.data(), u_.data());
+      u_.head(r.cols()) += r.row(n % r.rows()).transpose();
+      if (fault_.kind == Kind::hidden_excitation) u_[fault_.a] += hidden[n % r.rows()];
+      if (fault_.kind == Kind::saturation && !fault_.of_sensor)
+        u_[fault_.a] = std::clamp(u_[fault_.a], -fault_.value, fault_.value);
+      record.sensors.row(n) = y_;
+      record.actuators.row(n) = u_;
+      push();
+    }
+    return true;
+  }
 
  private:
-  void measure(RandomNumbers& random, Eigen::Index n, Eigen::Index samples);
-  void push();
+  void measure(RandomNumbers& random, Eigen::Index n, Eigen::Index samples) {
+    const Kind kind = fault_.kind;
+    plant_.output(y_.data());
+    if (kind == Kind::wired_skew) {
+      late_.output(y_late_.data());
+      if (fault_.of_sensor)
+        y_[fault_.a] = y_late_[fault_.a];
+      else
+        y_ += y_late_;  // the two plants share the actuators
+    }
+    if (kind == Kind::wired_swap && fault_.of_sensor) std::swap(y_[fault_.a], y_[fault_.b]);
+    if (kind == Kind::wired_gain && fault_.of_sensor) y_[fault_.a] *= fault_.value;
+    if (kind == Kind::dead_sensor) y_[fault_.a] = 0.0;
+    for (double& value : y_) value += request_.plant.sensor_noise_m * random.normal();
+    if (kind == Kind::saturation && fault_.of_sensor)
+      y_[fault_.a] = std::clamp(y_[fault_.a], -fault_.value, fault_.value);
+    if (kind == Kind::stuck_sensor) {
+      if (n < samples / 2) stuck_ = y_[fault_.a];
+      y_[fault_.a] = stuck_;
+    }
+  }
+
+  void push() {
+    const Kind kind = fault_.kind;
+    force_ = u_;
+    if (kind == Kind::wired_swap && !fault_.of_sensor)
+      std::swap(force_[fault_.a], force_[fault_.b]);
+    if (kind == Kind::wired_gain && !fault_.of_sensor) force_[fault_.a] *= fault_.value;
+    if (kind == Kind::wired_skew && !fault_.of_sensor) {
+      Eigen::VectorXd one = Eigen::VectorXd::Zero(force_.size());
+      std::swap(one[fault_.a], force_[fault_.a]);
+      late_.step(one.data());
+    } else if (kind == Kind::wired_skew) {
+      late_.step(force_.data());
+    }
+    plant_.step(force_.data());
+  }
 
   const FaultyLogRequest& request_;
   const PlantedFault& fault_;
@@ -91,72 +152,6 @@ class Loop {
   double mode_hz_ = 0.0;
   double mode_damping_ = 0.0;
 };
-
-void Loop::measure(RandomNumbers& random, Eigen::Index n, Eigen::Index samples) {
-  const Kind kind = fault_.kind;
-  plant_.output(y_.data());
-  if (kind == Kind::wired_skew) {
-    late_.output(y_late_.data());
-    if (fault_.of_sensor)
-      y_[fault_.a] = y_late_[fault_.a];
-    else
-      y_ += y_late_;  // the two plants share the actuators
-  }
-  if (kind == Kind::wired_swap && fault_.of_sensor) std::swap(y_[fault_.a], y_[fault_.b]);
-  if (kind == Kind::wired_gain && fault_.of_sensor) y_[fault_.a] *= fault_.value;
-  if (kind == Kind::dead_sensor) y_[fault_.a] = 0.0;
-  for (double& value : y_) value += request_.plant.sensor_noise_m * random.normal();
-  if (kind == Kind::saturation && fault_.of_sensor)
-    y_[fault_.a] = std::clamp(y_[fault_.a], -fault_.value, fault_.value);
-  if (kind == Kind::stuck_sensor) {
-    if (n < samples / 2) stuck_ = y_[fault_.a];
-    y_[fault_.a] = stuck_;
-  }
-}
-
-void Loop::push() {
-  const Kind kind = fault_.kind;
-  force_ = u_;
-  if (kind == Kind::wired_swap && !fault_.of_sensor) std::swap(force_[fault_.a], force_[fault_.b]);
-  if (kind == Kind::wired_gain && !fault_.of_sensor) force_[fault_.a] *= fault_.value;
-  if (kind == Kind::wired_skew && !fault_.of_sensor) {
-    Eigen::VectorXd one = Eigen::VectorXd::Zero(force_.size());
-    std::swap(one[fault_.a], force_[fault_.a]);
-    late_.step(one.data());
-  } else if (kind == Kind::wired_skew) {
-    late_.step(force_.data());
-  }
-  plant_.step(force_.data());
-}
-
-bool Loop::run(const Eigen::MatrixXd& r, const Eigen::VectorXd& hidden, Eigen::Index samples,
-               std::uint64_t seed, double before, double share, LogSamples& record) {
-  RandomNumbers random(seed);
-  plant_.reset();
-  late_.reset();
-  controller_.reset();
-  record.sensors.resize(samples, y_.size());
-  record.actuators.resize(samples, u_.size());
-  record.marked.setZero(samples);
-  for (Eigen::Index n = 0; n < samples; ++n) {
-    if (fault_.kind == Kind::drifting_mode && n % kRetuned == 0) {
-      const double passed =
-          before + share * static_cast<double>(n) / static_cast<double>(samples) - 0.5;
-      plant_.retune(fault_.a, mode_hz_ * (1.0 + fault_.value * passed), mode_damping_);
-    }
-    measure(random, n, samples);
-    if (!(y_.cwiseAbs().maxCoeff() < window_m_)) return false;
-    controller_.update(y_.data(), u_.data());
-    u_.head(r.cols()) += r.row(n % r.rows()).transpose();
-    if (fault_.kind == Kind::hidden_excitation) u_[fault_.a] += hidden[n % r.rows()];
-    if (fault_.kind == Kind::saturation && !fault_.of_sensor)
-      u_[fault_.a] = std::clamp(u_[fault_.a], -fault_.value, fault_.value);
-    record.sensors.row(n) = y_;
-    record.actuators.row(n) = u_;
-    push();
-  }
-  return true;
-}
 
 FrequencyGrid grid_of(const FaultyLogRequest& request) {
   const double rate_hz = request.plant.info.sample_rate_hz;

@@ -34,8 +34,8 @@ class AnalyticStage final : public CyclicStage {
     info_.sample_rate_hz = rate_hz;
     info_.clock = clock;
     info_.pace = pace;
-    info_.actuators = channels('u', actuators, "N");
-    info_.sensors = channels('y', sensors, "m");
+    info_.actuators = channels("u", actuators, "N");
+    info_.sensors = channels("y", sensors, "m");
     sent_.reserve(10'000'000 / sizeof(double));
   }
 
@@ -107,13 +107,9 @@ class AnalyticStage final : public CyclicStage {
   void stop() noexcept override { ++stops_; }
 
  private:
-  static std::vector<Channel> channels(char letter, int count, const char* unit) {
-    std::vector<Channel> list(static_cast<std::size_t>(count));
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      list[i].name = letter;
-      list[i].name += std::to_string(i + 1);
-      list[i].unit = unit;
-    }
+  static std::vector<Channel> channels(const std::string& letter, int count, const char* unit) {
+    std::vector<Channel> list;
+    for (int i = 1; i <= count; ++i) list.push_back({letter + std::to_string(i), unit});
     return list;
   }
 
