@@ -11,7 +11,6 @@ namespace stageid {
 /// if the value is not an object. For optional figures: stageid writes null for those that it cannot compute.
 template <class Json>
 std::optional<double> number_in(const Json& object, const char* key) {
-  if (!object.is_object()) return std::nullopt;
   const auto found = object.find(key);
   if (found == object.end() || !found->is_number()) return std::nullopt;
   const double number = found->template get<double>();
@@ -22,7 +21,6 @@ std::optional<double> number_in(const Json& object, const char* key) {
 template <class Json>
 std::vector<double> numbers_in(const Json& object, const char* key) {
   std::vector<double> numbers;
-  if (!object.is_object()) return numbers;
   const auto found = object.find(key);
   if (found == object.end() || !found->is_array()) return numbers;
   for (const Json& entry : *found) {
@@ -35,7 +33,6 @@ std::vector<double> numbers_in(const Json& object, const char* key) {
 /// The same for text; empty if it is missing.
 template <class Json>
 std::string text_in(const Json& object, const char* key) {
-  if (!object.is_object()) return "";
   const auto found = object.find(key);
   return found != object.end() && found->is_string() ? found->template get<std::string>() : "";
 }

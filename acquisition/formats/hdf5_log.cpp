@@ -158,15 +158,13 @@ Hdf5LogReader::Dataset Hdf5LogReader::open_dataset(const std::string& name,
 
 Hdf5LogReader::Scaling Hdf5LogReader::read_scaling(const std::string& dataset,
                                                    std::size_t columns) const {
-  Scaling scaling;
   const bool has_scale = file_->has_attribute(dataset, "scale");
   const bool has_offset = file_->has_attribute(dataset, "offset");
-  if (!has_scale && !has_offset) return scaling;
-  scaling.scale = has_scale ? read_column_values(*file_, dataset, "scale", columns)
-                            : std::vector<double>(columns, 1.0);
-  scaling.offset = has_offset ? read_column_values(*file_, dataset, "offset", columns)
-                              : std::vector<double>(columns, 0.0);
-  return scaling;
+  if (!has_scale && !has_offset) return {};
+  return {has_scale ? read_column_values(*file_, dataset, "scale", columns)
+                    : std::vector<double>(columns, 1.0),
+          has_offset ? read_column_values(*file_, dataset, "offset", columns)
+                     : std::vector<double>(columns, 0.0)};
 }
 
 void Hdf5LogReader::check_excitation_length(const LogRun& run, const Dataset& excitation) const {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <complex>
 #include <memory>
 #include <span>
+
+struct fftw_plan_s;
 
 namespace stageid {
 
@@ -12,15 +15,12 @@ class RealDft {
  public:
   /// @throws std::invalid_argument if `length` < 2.
   explicit RealDft(int length);
-  ~RealDft();
-  RealDft(RealDft&&) noexcept;
-  RealDft& operator=(RealDft&&) noexcept;
 
-  int length() const noexcept;
-  int half_size() const noexcept { return length() / 2 + 1; }
+  int length() const noexcept { return length_; }
+  int half_size() const noexcept { return length_ / 2 + 1; }
 
   /// The object's aligned input buffer, size length(): fill it, then call forward().
-  std::span<double> input() noexcept;
+  std::span<double> input() noexcept { return {real_.get(), static_cast<std::size_t>(length_)}; }
 
   /// X(l) = sum_n x(n) exp(-2 pi j l n / N), l = 0 .. N/2; no scaling. Valid until the next call.
   std::span<const std::complex<double>> forward();
@@ -32,8 +32,15 @@ class RealDft {
   Eigen::VectorXd inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_spectrum);
 
  private:
-  struct Plan;
-  std::unique_ptr<Plan> plan_;
+  struct Destroy {
+    void operator()(fftw_plan_s* plan) const;
+  };
+
+  int length_;
+  std::unique_ptr<double, void (*)(void*)> real_;
+  std::unique_ptr<std::complex<double>, void (*)(void*)> half_;
+  std::unique_ptr<fftw_plan_s, Destroy> forward_;
+  std::unique_ptr<fftw_plan_s, Destroy> inverse_;
 };
 
 }  // namespace stageid

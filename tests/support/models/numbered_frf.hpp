@@ -13,32 +13,21 @@ inline FrfEstimate numbered_frf() {
   frf.frequency_hz = Eigen::VectorXd{{1.0, 2.5, 3.0, 10.0}};
   frf.inputs = {{"a1", "a2", "a3"}, {"N", "N", "Nm"}};
   frf.outputs = {{"z1", "z2"}, {"m", "m"}};
-  frf.response.resize(6, 4);
-  frf.covariance.resize(36, 4);
-  frf.input_factor.resize(9, 4);
-  frf.noise_variance.resize(6, 4);
-  frf.total_variance.resize(6, 4);
-  frf.residual_covariance_re.resize(4, 4);
-  frf.residual_covariance_im.resize(4, 4);
-  for (Eigen::Index k = 0; k < 4; ++k) {
-    const auto line = static_cast<double>(1000 * k);
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      const auto channel = static_cast<double>(c);
-      frf.response(c, k) = {line + channel, -line - 10.0 * channel};
-      frf.noise_variance(c, k) = line + channel + 0.25;
-      frf.total_variance(c, k) = line + channel + 0.5;
-    }
-    for (Eigen::Index c = 0; c < 36; ++c) {
-      frf.covariance(c, k) = {line + static_cast<double>(c), 0.125 * static_cast<double>(c)};
-    }
-    for (Eigen::Index c = 0; c < 9; ++c) {
-      frf.input_factor(c, k) = {line + 2.0 * static_cast<double>(c), 0.5 * static_cast<double>(c)};
-    }
-    for (Eigen::Index c = 0; c < 4; ++c) {
-      frf.residual_covariance_re(c, k) = line + static_cast<double>(c) + 0.75;
-      frf.residual_covariance_im(c, k) = -line - static_cast<double>(c);
-    }
-  }
+  // value(row, 1000 line)
+  const auto fill = [](auto& matrix, Eigen::Index rows, auto value) {
+    matrix.resize(rows, 4);
+    for (Eigen::Index k = 0; k < 4; ++k)
+      for (Eigen::Index c = 0; c < rows; ++c)
+        matrix(c, k) = value(static_cast<double>(c), static_cast<double>(1000 * k));
+  };
+  using Complex = std::complex<double>;
+  fill(frf.response, 6, [](double c, double line) { return Complex(line + c, -line - 10.0 * c); });
+  fill(frf.noise_variance, 6, [](double c, double line) { return line + c + 0.25; });
+  fill(frf.total_variance, 6, [](double c, double line) { return line + c + 0.5; });
+  fill(frf.covariance, 36, [](double c, double line) { return Complex(line + c, 0.125 * c); });
+  fill(frf.input_factor, 9, [](double c, double line) { return Complex(line + 2.0 * c, 0.5 * c); });
+  fill(frf.residual_covariance_re, 4, [](double c, double line) { return line + c + 0.75; });
+  fill(frf.residual_covariance_im, 4, [](double c, double line) { return -line - c; });
   frf.input_condition = Eigen::VectorXd{{1.0, 2.0, 3.0, 4.0}};
   frf.sample_rate_hz = 100.0;
   frf.hold = Hold::zoh;
