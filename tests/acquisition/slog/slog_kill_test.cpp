@@ -17,30 +17,14 @@
 
 namespace stageid::test_slog_kill {
 
-/// A counter that outlives the counting process.
-class SharedCounter {
- public:
-  SharedCounter()
-      : memory_(::mmap(nullptr, sizeof(Counter), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
-                       -1, 0)),
-        counter_(new (memory_) Counter(0)) {}
-  ~SharedCounter() { ::munmap(memory_, sizeof(Counter)); }
-  SharedCounter(const SharedCounter&) = delete;
-  SharedCounter& operator=(const SharedCounter&) = delete;
-  std::atomic<std::uint64_t>& operator*() const { return *counter_; }
-
- private:
-  using Counter = std::atomic<std::uint64_t>;
-  static_assert(Counter::is_always_lock_free);
-  void* memory_;
-  Counter* counter_;
-};
+using Counter = std::atomic<std::uint64_t>;
+static_assert(Counter::is_always_lock_free);
 
 constexpr std::uint64_t kRunRows = 12 * 5000;
 
 /// Writes runs until it is killed; acknowledged rows are counted over all of them.
 [[noreturn]] void write_until_killed(const std::filesystem::path& file, std::uint64_t block_rows,
-                                     std::atomic<std::uint64_t>& acknowledged) {
+                                     Counter& acknowledged) {
   SlogWriter log = SlogWriter::create(file, test::small_info());
   for (std::size_t run = 0;; ++run) {
     log.begin_run(test::run_of(run), test::excitation_of(run));
@@ -57,24 +41,28 @@ std::uint64_t intact_rows(const std::filesystem::path& file) {
 }
 
 TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
+  // Shared with the children, so that it outlives them.
+  void* const memory =
+      ::mmap(nullptr, sizeof(Counter), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(memory, MAP_FAILED);
   std::mt19937 engine(11);
   int with_rows = 0;
   for (int attempt = 0; attempt < 20; ++attempt) {
     const test::TemporaryDirectory directory;
     const auto file = directory / "a.slog";
-    const SharedCounter acknowledged;
+    Counter& acknowledged = *new (memory) Counter(0);
     const std::uint64_t block_rows = attempt % 2 == 0 ? 5 : 997;
     const pid_t child = ::fork();
     ASSERT_GE(child, 0);
-    if (child == 0) write_until_killed(file, block_rows, *acknowledged);
-    while ((*acknowledged).load() == 0) std::this_thread::yield();
+    if (child == 0) write_until_killed(file, block_rows, acknowledged);
+    while (acknowledged.load() == 0) std::this_thread::yield();
     std::this_thread::sleep_for(std::chrono::microseconds(engine() % 40'000));
     ::kill(child, SIGKILL);
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFSIGNALED(status));
 
-    const std::uint64_t promised = (*acknowledged).load();
+    const std::uint64_t promised = acknowledged.load();
     const std::uint64_t there = intact_rows(file);
     ASSERT_GE(there, promised);
     ASSERT_LE(there, promised + block_rows) << "one block may be written and not yet counted";
@@ -86,6 +74,7 @@ TEST(SlogKill, EveryAcknowledgedRowOutlivesTheProcess) {
     ASSERT_EQ(intact_rows(file), there);
   }
   EXPECT_EQ(with_rows, 20);
+  ::munmap(memory, sizeof(Counter));
 }
 
 }  // namespace stageid::test_slog_kill
