@@ -182,13 +182,7 @@ WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nomi
   return spec;
 }
 
-MemoryLog simulate_faulty_log(const FaultyLogRequest& asked, const PlantedFault& fault) {
-  FaultyLogRequest request = asked;
-  if (fault.kind == Kind::light_damping) {
-    std::vector<double>& damping = request.plant.flexible_damping;
-    damping.resize(std::max<std::size_t>(damping.size(), 2), damping.back());
-    damping.front() = fault.value;
-  }
+MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFault& fault) {
   const FrequencyGrid grid = grid_of(request);
   const Eigen::Index period = grid.samples_per_period();
   const Eigen::Index samples = period * (request.transient_periods + request.periods);

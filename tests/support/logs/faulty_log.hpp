@@ -32,7 +32,6 @@ struct PlantedFault {
     stuck_sensor,  ///< shows one value from the middle of every run on
     saturation,    ///< |channel| <= value; an actuator's force is limited with it
     drifting_mode,  ///< the frequency of mode `a` moves by the share `value`, evenly over the measurement
-    light_damping,     ///< the first flexible mode has this damping ratio, and rings from the start
     hidden_excitation  ///< an actuator gets `value` N rms more, on the excited lines, unrecorded
   };
   Kind kind = Kind::none;
