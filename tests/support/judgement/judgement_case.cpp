@@ -12,11 +12,13 @@
 #include <optional>
 #include <utility>
 
+#include "acquisition/files/json_members.hpp"
 #include "acquisition/formats/convert_log.hpp"
 #include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/response/distortion_variance.hpp"
 #include "hal/simulator/rigid_body.hpp"
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/run_program.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/steps/truth_comparison.hpp"
@@ -30,8 +32,7 @@ constexpr int kMostHalvings = 6;  // of a nonlinearity that makes the loop unsta
 
 /// NaN where JSON has null.
 double number(const Json& object, const char* key) {
-  return object.contains(key) && object[key].is_number() ? object[key].get<double>()
-                                                         : std::numeric_limits<double>::quiet_NaN();
+  return number_in(object, key).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 double children_seconds() {
@@ -201,10 +202,6 @@ bool names_any(std::string said, const std::vector<std::string>& causes) {
   });
 }
 
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
-}
-
 void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& session,
                const std::filesystem::path& directory, Json& result) {
   const auto path = [&](const char* name) { return (directory / name).string(); };
@@ -213,7 +210,7 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
       "frf",          path("log.h5"),   "-o",
       path("frf.h5"), "--realizations", realization_list(stage.realizations - 1)};
   if (stage.stage_file) {
-    write_text(directory / "stage.yaml", stage.nominal_text());
+    write_bytes(directory / "stage.yaml", stage.nominal_text());
     words.insert(words.end(), {"--stage", path("stage.yaml")});
   }
   const Command frf = session.run(words);

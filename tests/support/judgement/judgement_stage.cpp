@@ -102,12 +102,6 @@ void draw_body(RandomNumbers& random, const Sizes& sizes, WaferStageSpec& spec) 
   spec.delay_s = random.uniform(0.3, 1.7) / spec.info.sample_rate_hz;
 }
 
-Eigen::VectorXd draw_shape(RandomNumbers& random, std::size_t size, double scale) {
-  Eigen::VectorXd shape(static_cast<Eigen::Index>(size));
-  for (double& value : shape) value = scale * random.normal();
-  return shape;
-}
-
 /// `count` frequencies of the band, at least three half-power widths apart, and one or two above it.
 void draw_modes(RandomNumbers& random, int count, JudgementStage& stage) {
   WaferStageSpec& spec = stage.spec;
@@ -122,8 +116,8 @@ void draw_modes(RandomNumbers& random, int count, JudgementStage& stage) {
   const auto add = [&](double hz, double damping) {
     const double scale = random.uniform(0.3, 0.8) / std::sqrt(spec.mass_kg);
     spec.in_plane_modes.push_back({hz, damping,
-                                   draw_shape(random, spec.info.actuators.size(), scale),
-                                   draw_shape(random, spec.info.sensors.size(), scale)});
+                                   random_vector(random, spec.info.actuators.size(), scale),
+                                   random_vector(random, spec.info.sensors.size(), scale)});
   };
   const double first_hz = 0.2 * stage.band_high_hz;
   const double last_hz = 0.93 * stage.band_high_hz;

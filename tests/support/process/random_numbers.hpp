@@ -56,6 +56,12 @@ inline double median_of(Eigen::VectorXd values) {
   return *middle;
 }
 
+inline Eigen::VectorXd random_vector(RandomNumbers& random, Eigen::Index size, double scale = 1.0) {
+  Eigen::VectorXd out(size);
+  for (double& value : out) value = scale * random.normal();
+  return out;
+}
+
 inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,
                                      Eigen::Index columns) {
   Eigen::MatrixXd out(rows, columns);

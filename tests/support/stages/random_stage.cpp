@@ -50,12 +50,6 @@ std::vector<Mode> draw_modes(RandomNumbers& random, const RandomStageSpec& spec,
   return modes;
 }
 
-Eigen::VectorXd draw_shape(RandomNumbers& random, int size) {
-  Eigen::VectorXd shape(size);
-  for (double& value : shape) value = random.normal();
-  return shape;
-}
-
 AdditiveModel draw_model(RandomNumbers& random, const RandomStageSpec& spec, int count, int pairs) {
   AdditiveModel model;
   model.outputs = channels("z", spec.outputs, "m");
@@ -66,15 +60,15 @@ AdditiveModel draw_model(RandomNumbers& random, const RandomStageSpec& spec, int
   const double mass_kg = 20.0;
   Eigen::MatrixXd rigid = Eigen::MatrixXd::Zero(spec.outputs, spec.inputs);
   for (int degree = 0; degree < 3; ++degree) {
-    const Eigen::VectorXd phi = draw_shape(random, spec.outputs);
-    rigid += phi * draw_shape(random, spec.inputs).transpose() / mass_kg;
+    const Eigen::VectorXd phi = random_vector(random, spec.outputs);
+    rigid += phi * random_vector(random, spec.inputs).transpose() / mass_kg;
   }
   model.submodels.push_back({2, {1.0}, {rigid}, {}, {}});
   for (const Mode& mode : draw_modes(random, spec, count, pairs)) {
     const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
-    const Eigen::VectorXd phi = draw_shape(random, spec.outputs);
+    const Eigen::VectorXd phi = random_vector(random, spec.outputs);
     // phi psi^T / (m (s^2 + 2 zeta omega s + omega^2)), in the form B_0 / (1 + a_1 s + a_2 s^2)
-    const Eigen::MatrixXd residue = phi * draw_shape(random, spec.inputs).transpose() /
+    const Eigen::MatrixXd residue = phi * random_vector(random, spec.inputs).transpose() /
                                     (mass_kg * random.uniform(0.5, 2.0) * omega * omega);
     const std::vector<double> a = mode_coefficients(mode.frequency_hz, mode.damping_ratio);
     model.submodels.push_back({0, {1.0, a[0], a[1]}, {residue}, {}, {}});
