@@ -214,19 +214,15 @@ TEST_F(Hdf5FileTest, SaysThatWritingIsImpossible) {
   const double value = 1.0;
   file.write_reals("/twice", {1}, &value);
   file.write_attribute("/", "twice", 1.0);
-  const std::string name = file.path().string() + ":/";
-  expect_error<FileError>([&] { file.write_reals("/twice", {1}, &value); }, name + "twice",
-                          "exists");
-  expect_error<FileError>([&] { file.write_reals("/no/group", {1}, &value); }, name + "no/group",
-                          "cannot be written");
-  expect_error<FileError>([&] { file.write_attribute("/", "twice", 1.0); }, name,
-                          "attribute 'twice': already exists");
-  expect_error<FileError>([&] { file.create_group("/twice/below"); }, name + "twice/below",
-                          "cannot be written");
-  expect_error<FileError>([&] { file.append_rows("/twice", 1, &value); }, name + "twice",
-                          "cannot be written");
-  expect_error<FileError>([&] { file.create_growing("/zero", 1, H5T_IEEE_F64LE, 0); },
-                          name + "zero", "cannot be written");
+  const auto wrong = [&](const auto& action, const std::string& place, const char* word) {
+    expect_error<FileError>(action, file.path().string() + ":" + place, word);
+  };
+  wrong([&] { file.write_reals("/twice", {1}, &value); }, "/twice", "exists");
+  wrong([&] { file.write_reals("/no/group", {1}, &value); }, "/no/group", "cannot be written");
+  wrong([&] { file.write_attribute("/", "twice", 1.0); }, "/", "attribute 'twice': already exists");
+  wrong([&] { file.create_group("/twice/below"); }, "/twice/below", "cannot be written");
+  wrong([&] { file.append_rows("/twice", 1, &value); }, "/twice", "cannot be written");
+  wrong([&] { file.create_growing("/zero", 1, H5T_IEEE_F64LE, 0); }, "/zero", "cannot be written");
 }
 
 TEST_F(Hdf5FileTest, SaysThatTheDiskIsFull) {

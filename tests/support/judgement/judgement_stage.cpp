@@ -1,6 +1,7 @@
 #include "tests/support/judgement/judgement_stage.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -83,12 +84,12 @@ void draw_body(RandomNumbers& random, const Sizes& sizes, WaferStageSpec& spec) 
   spec.length_x_m = random.uniform(0.4, 0.8);
   spec.length_y_m = spec.length_x_m * random.uniform(0.7, 1.3);
   const double thickness_m = 0.1;
-  spec.inertia_kg_m2[0] =
-      spec.mass_kg * (std::pow(spec.length_y_m, 2) + std::pow(thickness_m, 2)) / 12.0;
-  spec.inertia_kg_m2[1] =
-      spec.mass_kg * (std::pow(spec.length_x_m, 2) + std::pow(thickness_m, 2)) / 12.0;
-  spec.inertia_kg_m2[2] =
-      spec.mass_kg * (std::pow(spec.length_x_m, 2) + std::pow(spec.length_y_m, 2)) / 12.0;
+  const auto inertia = [&](double a, double b) {
+    return spec.mass_kg * (std::pow(a, 2) + std::pow(b, 2)) / 12.0;
+  };
+  spec.inertia_kg_m2[0] = inertia(spec.length_y_m, thickness_m);
+  spec.inertia_kg_m2[1] = inertia(spec.length_x_m, thickness_m);
+  spec.inertia_kg_m2[2] = inertia(spec.length_x_m, spec.length_y_m);
   for (double& hz : spec.suspension_hz) hz = kSuspensionHz;
   spec.suspension_damping = 0.1;
   const int plane_sensors = sizes.in_plane ? 3 : 0;
@@ -265,10 +266,8 @@ double heave_motion(const JudgementStage& stage) {
 }
 
 std::string channel_text(const Channel& c, const char* rest) {
-  return fmt::format(
-      "  - {{name: {}, unit: {}, position_m: [{}, {}, {}], direction: [{}, {}, {}], {}}}\n", c.name,
-      c.unit, c.position_m[0], c.position_m[1], c.position_m[2], c.direction[0], c.direction[1],
-      c.direction[2], rest);
+  return fmt::format("  - {{name: {}, unit: {}, position_m: [{}], direction: [{}], {}}}\n", c.name,
+                     c.unit, fmt::join(c.position_m, ", "), fmt::join(c.direction, ", "), rest);
 }
 
 }  // namespace
@@ -301,22 +300,19 @@ std::string JudgementStage::nominal_text() const {
   text += "sensors:\n";
   for (const Channel& c : spec.info.sensors) text += channel_text(c, "window_m: 1");
   text += fmt::format(
-      "plant:\n  mass_kg: {}\n  inertia_kg_m2: [{}, {}, {}]\n  suspension_hz: [{}, {}, {}, {}, {}, "
-      "{}]\n"
+      "plant:\n  mass_kg: {}\n  inertia_kg_m2: [{}, {}, {}]\n  suspension_hz: [{}]\n"
       "  suspension_damping: {}\n  plate: {{length_x_m: {}, length_y_m: {}, first_mode_hz: 100, "
       "modes: 0, damping: [0.01]}}\n",
       off(spec.mass_kg), off(spec.inertia_kg_m2[0]), off(spec.inertia_kg_m2[1]),
-      off(spec.inertia_kg_m2[2]), spec.suspension_hz[0], spec.suspension_hz[1],
-      spec.suspension_hz[2], spec.suspension_hz[3], spec.suspension_hz[4], spec.suspension_hz[5],
-      spec.suspension_damping, spec.length_x_m, spec.length_y_m);
+      off(spec.inertia_kg_m2[2]), fmt::join(spec.suspension_hz, ", "), spec.suspension_damping,
+      spec.length_x_m, spec.length_y_m);
   text += "controller:\n";
   for (std::size_t i = 0; i < kRigidAxes; ++i) {
     const AxisController& axis = spec.controller.axes[i];
     if (axis.crossover_hz == 0.0) continue;
     text += fmt::format(
         "  {}: {{crossover_hz: {}, gain: {}, integrator_hz: {}, lead_zero_hz: {}, lead_pole_hz: "
-        "{}, "
-        "lowpass_hz: {}, lowpass_damping: {}}}\n",
+        "{}, lowpass_hz: {}, lowpass_damping: {}}}\n",
         kRigidAxisNames[i], axis.crossover_hz, axis.gain, axis.integrator_hz, axis.lead_zero_hz,
         axis.lead_pole_hz, axis.lowpass_hz, axis.lowpass_damping);
   }
