@@ -70,11 +70,11 @@ class LoopTransfers {
     const MotionController controller(stage.controller);
     for (Index k = 0; k < grid.size(); ++k)
       add_line(k, controller.response(grid.frequency_hz()[k]));
-    if (prior.below_band.empty()) return;
     const Eigen::VectorXd below_hz = below_band_hz(grid);
-    below_u.assign(stage.info.actuators.size(), MatrixXcd(n, below_hz.size()));
-    below_y.assign(stage.info.sensors.size(), MatrixXcd(n, below_hz.size()));
-    for (Index b = 0; b < below_hz.size(); ++b)
+    const Index below = prior.below_band.empty() ? 0 : below_hz.size();
+    below_u.assign(stage.info.actuators.size(), MatrixXcd(n, below));
+    below_y.assign(stage.info.sensors.size(), MatrixXcd(n, below));
+    for (Index b = 0; b < below; ++b)
       add_transfers(b, prior.below_band[static_cast<std::size_t>(b)],
                     controller.response(below_hz[b]), below_u, below_y);
   }
@@ -158,10 +158,8 @@ void add(BoundedLoop& loop, BoundedSignal signal, std::string unit) {
 void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const WaferStageSpec& stage,
                   std::size_t i) {
   const Channel& channel = stage.info.actuators[i];
-  BoundedSignal u;
-  u.name = channel.name;
-  u.transfer = transfers.to_u[i];
-  if (!transfers.below_u.empty()) u.below_band = transfers.below_u[i];
+  BoundedSignal u{
+      .name = channel.name, .transfer = transfers.to_u[i], .below_band = transfers.below_u[i]};
   BoundedSignal slew = u;
   const Eigen::VectorXd& feed_forward = stage.controller.feed_forward_n;
   const double bias = feed_forward.size() > 0 ? feed_forward[static_cast<Index>(i)] : 0.0;
@@ -184,10 +182,8 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Wafer
 void add_sensor(BoundedLoop& loop, const LoopTransfers& transfers, const WaferStageSpec& stage,
                 const Eigen::VectorXd& velocity_m_s, std::size_t i) {
   const Channel& channel = stage.info.sensors[i];
-  BoundedSignal y;
-  y.name = channel.name;
-  y.transfer = transfers.to_y[i];
-  if (!transfers.below_y.empty()) y.below_band = transfers.below_y[i];
+  BoundedSignal y{
+      .name = channel.name, .transfer = transfers.to_y[i], .below_band = transfers.below_y[i]};
   BoundedSignal velocity = y;
   y.peak_limit = limit_of(stage.limits.position_window_m, i);
   y.reserve = reserve_of(transfers.y_noise, i);
