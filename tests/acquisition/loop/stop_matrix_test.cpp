@@ -133,12 +133,15 @@ const auto kLinkEvents =
                     Case{"host killed", Kind::none, 0.0, 1.0, "", 2.0 * kStopWindow, 2e-3,
                          StopReason::none, LinkEvent::host_killed});
 
+/// `text` as the name of a test.
+std::string letters_of(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_'; });
+  return text;
+}
+
 std::string name_of(const testing::TestParamInfo<StopMatrix::ParamType>& at) {
   const auto& [link, c] = at.param;
-  std::string name;
-  for (const char letter : fmt::format("{}_{}", to_string(link), c.name))
-    if (std::isalnum(static_cast<unsigned char>(letter)) != 0 || letter == '_') name += letter;
-  return name;
+  return letters_of(fmt::format("{}_{}", to_string(link), c.name));
 }
 
 enum class Strategy : std::uint8_t { ramp, cut, brake };
@@ -172,12 +175,8 @@ TEST_P(StopStrategies, TheBrakeIsTheOnlyOneThatStopsEverything) {
   EXPECT_LT(brake.largest_m, 2.0 * kStopWindow);
 }
 
-INSTANTIATE_TEST_SUITE_P(Faults, StopStrategies, kFaults, [](const auto& at) {
-  std::string name;
-  for (const char letter : std::string(at.param.name))
-    if (std::isalnum(static_cast<unsigned char>(letter)) != 0) name += letter;
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Faults, StopStrategies, kFaults,
+                         [](const auto& at) { return letters_of(at.param.name); });
 INSTANTIATE_TEST_SUITE_P(Faults, StopMatrix,
                          testing::Combine(testing::Values(StopLink::sim, StopLink::plugin,
                                                           StopLink::can, StopLink::resident,

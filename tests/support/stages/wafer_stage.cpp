@@ -8,7 +8,7 @@
 namespace stageid::test {
 namespace {
 
-Channel channel(const char* name, const char* unit, double x_m, double y_m, char axis) {
+Channel channel(const std::string& name, const char* unit, double x_m, double y_m, char axis) {
   Channel c{name, unit, {x_m, y_m, 0.0}, {0.0, 0.0, 0.0}};
   c.direction[axis - 'x'] = 1.0;
   return c;
@@ -19,10 +19,9 @@ std::vector<Channel> actuators() {
                                 {0.11, -0.09},  {-0.26, 0.0}, {0.0, 0.0},    {0.26, 0.0},
                                 {-0.11, 0.09},  {0.11, 0.09}, {-0.26, 0.21}, {0.0, 0.26},
                                 {0.26, 0.21}};
-  constexpr const char* kNames[13] = {"z1", "z2", "z3",  "z4",  "z5",  "z6", "z7",
-                                      "z8", "z9", "z10", "z11", "z12", "z13"};
   std::vector<Channel> list;
-  for (int i = 0; i < 13; ++i) list.push_back(channel(kNames[i], "N", kZ[i][0], kZ[i][1], 'z'));
+  for (int i = 0; i < 13; ++i)
+    list.push_back(channel("z" + std::to_string(i + 1), "N", kZ[i][0], kZ[i][1], 'z'));
   list.push_back(channel("x1", "N", -0.28, -0.20, 'x'));
   list.push_back(channel("x2", "N", -0.28, 0.20, 'x'));
   list.push_back(channel("y1", "N", -0.20, -0.28, 'y'));
