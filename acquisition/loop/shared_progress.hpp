@@ -15,10 +15,7 @@ class SharedProgress {
  public:
   /// Publishes the timing too for a run on the wall clock.
   void publish(const RunHealth& health, const RunTiming& timing, bool wall) noexcept {
-    store(0, health.cycles);
-    store(1, health.late);
-    store(2, health.missing);
-    store(3, health.marked);
+    for (std::size_t i = 0; i < kCounts.size(); ++i) store(i, health.*kCounts[i]);
     store(4, static_cast<std::uint64_t>(health.largest_lateness_ns));
     if (!wall) return;
     store(5, timing.skipped);
@@ -29,10 +26,7 @@ class SharedProgress {
   }
   RunHealth health() const noexcept {
     RunHealth health;
-    health.cycles = load(0);
-    health.late = load(1);
-    health.missing = load(2);
-    health.marked = load(3);
+    for (std::size_t i = 0; i < kCounts.size(); ++i) health.*kCounts[i] = load(i);
     health.largest_lateness_ns = static_cast<std::int64_t>(load(4));
     return health;
   }
@@ -57,6 +51,8 @@ class SharedProgress {
   std::atomic<int> runs_done = 0;
 
  private:
+  static constexpr std::array kCounts = {&RunHealth::cycles, &RunHealth::late, &RunHealth::missing,
+                                         &RunHealth::marked};
   static constexpr std::size_t kFirstBin = 6;
   void store(std::size_t i, std::uint64_t value) noexcept {
     counts_[i].store(value, std::memory_order_relaxed);
