@@ -44,14 +44,9 @@ int exit_code_of(const Case& c) {
 
 WaferStageSpec spec_of(const Case& c) {
   WaferStageSpec spec = stop_stage_spec(c.controller_gain);
-  if (c.kind != Kind::none) {
-    WaferStageSpec::Fault fault;
-    fault.kind = c.kind;
-    fault.from_cycle = kFaultCycle;
-    fault.value = c.value;
-    fault.cycles = kStopSamples;
-    spec.faults = {fault};
-  }
+  if (c.kind != Kind::none)
+    spec.faults = {
+        {.kind = c.kind, .from_cycle = kFaultCycle, .cycles = kStopSamples, .value = c.value}};
   return spec;
 }
 
