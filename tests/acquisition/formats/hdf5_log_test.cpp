@@ -190,11 +190,10 @@ TEST_F(Hdf5Log, IntegersAreScaled) {
   EXPECT_EQ(reader->excitation(0), Eigen::MatrixXd(test::excitation_of(0).array() + 0.5));
   for (const std::vector<double>& bad :
        {std::vector<double>{1.0, 2.0}, std::vector<double>{1.0, std::nan(""), 1.0}}) {
-    Foreign foreign;
-    foreign.change = [&](Hdf5File& file) {
+    const auto change = [&](Hdf5File& file) {
       file.write_attribute("/runs/0001/actuators", "scale", bad);
     };
-    expect_refused(foreign, "/runs/0001/actuators", "scale");
+    expect_refused({.change = change}, "/runs/0001/actuators", "scale");
   }
 }
 
@@ -202,19 +201,17 @@ TEST_F(Hdf5Log, MarkedSamplesAreGiven) {
   std::vector<long long> marked(kRows, 0);
   marked[3] = 1;
   marked[20] = 255;
-  Foreign foreign;
-  foreign.change = [&](Hdf5File& file) {
-    file.write_integers("/runs/0001/marked", Shape{kRows}, marked.data());
+  const auto with_marks = [&](std::uint64_t rows) {
+    return Foreign{.change = [&marked, rows](Hdf5File& file) {
+      file.write_integers("/runs/0001/marked", Shape{rows}, marked.data());
+    }};
   };
-  write(foreign);
+  write(with_marks(kRows));
   LogSamples samples;
   open_log(path_)->read(1, 2, 30, samples);
   for (Eigen::Index r = 0; r < 30; ++r) EXPECT_EQ(samples.marked[r] != 0, r == 1 || r == 18);
 
-  foreign.change = [&](Hdf5File& file) {
-    file.write_integers("/runs/0001/marked", Shape{kRows - 1}, marked.data());
-  };
-  expect_refused(foreign, "/runs/0001/marked", "36");
+  expect_refused(with_marks(kRows - 1), "/runs/0001/marked", "36");
 }
 
 TEST_F(Hdf5Log, RefusesWhatIsMissing) {
@@ -242,28 +239,22 @@ TEST_F(Hdf5Log, RefusesAttributesThatMakeNoSense) {
 
 TEST_F(Hdf5Log, RefusesRunsOfNoWholePeriods) {
   // 36 samples are three periods of 12, but not a whole number of 10 or 11, and not more than 3 transient ones.
-  Foreign foreign;
-  foreign.period_samples = 7;
-  foreign.left_out = "excitation";
-  foreign.ids = {{0, 0}};
-  foreign.change = [](Hdf5File& file) {
+  const auto change = [](Hdf5File& file) {
     file.write_reals("/runs/0000/excitation", Shape{7, 3}, excitation(0, 7).data());
   };
-  expect_refused(foreign, "/runs/0000", "36 samples");
+  expect_refused({.period_samples = 7, .left_out = "excitation", .ids = {{0, 0}}, .change = change},
+                 "/runs/0000", "36 samples");
   expect_refused({.transient_periods = 3}, "/runs/0000", "36 samples");
   expect_refused({.transient_periods = 1LL << 30}, "/runs/0000", "36 samples");
 }
 
 TEST_F(Hdf5Log, RefusesWrongShapes) {
   const auto with = [&](const std::string& name, const Shape& shape, const std::string& reason) {
-    Foreign foreign;
-    foreign.left_out = name;
-    foreign.ids = {{0, 0}};
-    foreign.change = [&](Hdf5File& file) {
+    const auto change = [&](Hdf5File& file) {
       const std::vector<double> values(1000, 1.0);
       file.write_reals("/runs/0000/" + name, shape, values.data());
     };
-    expect_refused(foreign, "/runs/0000", reason);
+    expect_refused({.left_out = name, .ids = {{0, 0}}, .change = change}, "/runs/0000", reason);
   };
   with("sensors", {kRows, 3}, "[36 x 3]");
   with("sensors", {kRows}, "[36]");
@@ -283,14 +274,12 @@ TEST_F(Hdf5Log, RefusesRunsThatCannotBe) {
 }
 
 TEST_F(Hdf5Log, ARunThatWasBrokenOffMayHaveAnyLength) {
-  Foreign foreign;
-  foreign.change = [](Hdf5File& file) {
+  write({.change = [](Hdf5File& file) {
     // The same as run 0000, which is complete.
     add_run(file, "/runs/0002", 0, excitation(2, kPeriod), actuators(2, 5), sensors(2, 5));
     file.write_attribute("/runs/0002", "complete", 0LL);
     file.write_attribute("/runs/0002", "started_utc", std::string("2024-01-01T00:00:00Z"));
-  };
-  write(foreign);
+  }});
   const auto reader = open_log(path_);
   EXPECT_FALSE(reader->runs()[2].complete);
   EXPECT_EQ(reader->runs()[2].samples, 5U);
@@ -299,15 +288,12 @@ TEST_F(Hdf5Log, ARunThatWasBrokenOffMayHaveAnyLength) {
 
 TEST_F(Hdf5Log, NamesTheValueThatIsNotFinite) {
   for (const bool actuator : {true, false}) {
-    Foreign foreign;
-    foreign.ids = {};
-    foreign.change = [&](Hdf5File& file) {
-      std::vector<double> u = actuators(0);
-      std::vector<double> y = sensors(0);
-      (actuator ? u[3 * 17 + 1] : y[2 * 17 + 1]) = std::numeric_limits<double>::infinity();
-      add_run(file, "/runs/0000", 0, excitation(0, kPeriod), u, y);
-    };
-    write(foreign);
+    write({.ids = {}, .change = [&](Hdf5File& file) {
+             std::vector<double> u = actuators(0);
+             std::vector<double> y = sensors(0);
+             (actuator ? u[3 * 17 + 1] : y[2 * 17 + 1]) = std::numeric_limits<double>::infinity();
+             add_run(file, "/runs/0000", 0, excitation(0, kPeriod), u, y);
+           }});
     const auto reader = open_log(path_);
     LogSamples samples;
     EXPECT_THAT([&] { reader->read(0, 12, 12, samples); },

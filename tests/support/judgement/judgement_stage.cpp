@@ -273,10 +273,6 @@ std::string channel_text(const Channel& c, const char* rest) {
 }  // namespace
 
 ExperimentPlan JudgementStage::plan() const {
-  LineSpec lines;
-  lines.low_hz = band_low_hz;
-  lines.high_hz = band_high_hz;
-  lines.selection = LineSelection::odd;
   ExperimentSpec experiment;
   experiment.scheme = scheme;
   experiment.realizations = realizations;
@@ -284,7 +280,8 @@ ExperimentPlan JudgementStage::plan() const {
   experiment.transient_periods = transient_periods;
   experiment.seed = seed;
   for (const Channel& c : spec.info.actuators) experiment.axes.push_back({c.name, level_n});
-  return ExperimentPlan(FrequencyGrid::band(spec.info.sample_rate_hz, period_samples, lines),
+  return ExperimentPlan(FrequencyGrid::band(spec.info.sample_rate_hz, period_samples,
+                                            {.low_hz = band_low_hz, .high_hz = band_high_hz}),
                         experiment);
 }
 

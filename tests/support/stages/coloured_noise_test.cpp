@@ -13,14 +13,12 @@ namespace stageid::test_coloured_noise {
 constexpr double kRateHz = 1000.0;
 
 ColouredNoiseSpec spec_of(NoiseColour colour, double reference_hz) {
-  ColouredNoiseSpec spec;
-  spec.colour = colour;
-  spec.channels = 1;
-  spec.sample_rate_hz = kRateHz;
-  spec.density = 4.0;
-  spec.reference_hz = reference_hz;
-  spec.damping_ratio = 0.05;
-  return spec;
+  return {.colour = colour,
+          .channels = 1,
+          .sample_rate_hz = kRateHz,
+          .density = 4.0,
+          .reference_hz = reference_hz,
+          .damping_ratio = 0.05};
 }
 
 /// One-sided density at `hz`: mean of many periodograms of 1000 samples through a Hann window, whose power sums up to
