@@ -11,8 +11,6 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-
 [[noreturn]] void refuse_type(const char* name) {
   throw py::type_error(fmt::format("{}: expected an array of numbers", name));
 }

@@ -11,31 +11,32 @@
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
+#include "tools/python/bindings.hpp"
 
 namespace stageid {
 
 // Array arguments: arrays of any order and type, or objects that numpy can convert to one. All functions throw
-// pybind11::type_error "NAME: ..." for objects that are not numeric.
+// py::type_error "NAME: ..." for objects that are not numeric.
 
-using RealArray = pybind11::array_t<double, pybind11::array::forcecast>;
-using FlagArray = pybind11::array_t<std::uint8_t, pybind11::array::forcecast>;
+using RealArray = py::array_t<double, py::array::forcecast>;
+using FlagArray = py::array_t<std::uint8_t, py::array::forcecast>;
 
 /// Not copied if it is float64.
 /// @throws std::invalid_argument "NAME: ..." for complex numbers, whose imaginary part numpy would drop
-RealArray real_array(const pybind11::object& given, const char* name);
+RealArray real_array(const py::object& given, const char* name);
 
 /// The same with one axis; a single number is a vector of length one.
 /// @throws std::invalid_argument as real_array(), and for more axes
-Eigen::VectorXd real_vector(const pybind11::object& given, const char* name);
+Eigen::VectorXd real_vector(const py::object& given, const char* name);
 
 /// 1 for nonzero numbers. A cast to uint8 would convert 256 and 0.5 to 0.
-FlagArray flag_array(const pybind11::object& given, const char* name);
+FlagArray flag_array(const py::object& given, const char* name);
 
 /// Columns that are vec of an n_y x n_u matrix, as a copy: Python arrays have any order, and the estimate owns its memory.
 /// @throws std::invalid_argument "NAME: ..." unless the shape is N x n_y x n_u.
 template <typename Scalar>
 Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> columns_of(
-    const pybind11::array_t<Scalar, pybind11::array::forcecast>& array, const char* name) {
+    const py::array_t<Scalar, py::array::forcecast>& array, const char* name) {
   if (array.ndim() != 3)
     throw std::invalid_argument(std::string(name) + ": has " + std::to_string(array.ndim()) +
                                 " axes; expected [lines x outputs x inputs]");

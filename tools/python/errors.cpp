@@ -13,8 +13,6 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-
 // Borrowed from the module, which lives as long as the interpreter.
 PyObject* file_error = nullptr;
 PyObject* format_error = nullptr;

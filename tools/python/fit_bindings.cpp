@@ -3,12 +3,17 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <utility>
 
+#include "acquisition/files/fingerprint.hpp"
+#include "estimation/model/cmif.hpp"
+#include "estimation/start/stabilization.hpp"
 #include "tools/exchange/model/covariance_file.hpp"
 #include "tools/fit/fit_flags.hpp"
+#include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 #include "tools/python/interruptible.hpp"
@@ -19,8 +24,31 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-using py::literals::operator""_a;
+py::list candidate_modes(const FrfHandle& of, const std::string& kind, double prominence_db) {
+  PeakOptions options;
+  options.kind = pick<CmifKind>("kind", kind);
+  options.minimum_prominence_db = prominence_db;
+  py::list list;
+  for (const ModeCandidate& candidate : pick_modes(of.frf, options))
+    list.append(result("CandidateMode", "frequency_hz"_a = candidate.frequency_hz,
+                       "damping_ratio"_a = candidate.damping_ratio,
+                       "cmif_curve"_a = candidate.cmif_curve));
+  return list;
+}
+
+py::list poles_over_orders(const FrfHandle& of, int most_order, double delay_s) {
+  StabilizationOptions options;
+  options.most_order = most_order;
+  options.delay_s = delay_s;
+  const auto found = interruptible([&] { return stabilization(of.frf, options); });
+  py::list list;
+  for (const StabilizationPole& pole : found)
+    list.append(result("StabilizationPole", "order"_a = pole.order,
+                       "frequency_hz"_a = pole.frequency_hz, "damping_ratio"_a = pole.damping_ratio,
+                       "stable_frequency"_a = pole.stable_frequency,
+                       "stable_damping"_a = pole.stable_damping));
+  return list;
+}
 
 using Word = std::optional<std::string>;
 
@@ -46,6 +74,20 @@ std::shared_ptr<FrfHandle> frf_of(const py::object& given) {
   } catch (const py::cast_error&) {
     throw py::type_error("frf: expected an Frf or a file name");
   }
+}
+
+/// Identifies the content of a response without a file: frequencies, response and variances.
+std::string fingerprint_of_content(const FrfEstimate& frf) {
+  Fingerprint fingerprint;
+  const auto add = [&](const auto& matrix) {
+    fingerprint.add({reinterpret_cast<const std::byte*>(matrix.data()),
+                     static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
+  };
+  add(frf.frequency_hz);
+  add(frf.response);
+  add(frf.noise_variance);
+  add(frf.total_variance);
+  return fingerprint.hex();
 }
 
 FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band_hz,
@@ -107,6 +149,17 @@ py::object covariance_of(const py::object& self) {
 }  // namespace
 
 void define_fit(py::module_& module) {
+  module.def("modes", &candidate_modes, "frf"_a, py::kw_only(), "kind"_a = "accelerance",
+             "prominence_db"_a = PeakOptions{}.minimum_prominence_db, docstring("modes"));
+  module.def(
+      "cmif",
+      [](const FrfHandle& of, const std::string& kind) {
+        return cmif(of.frf, pick<CmifKind>("kind", kind));
+      },
+      "frf"_a, py::kw_only(), "kind"_a = "response", docstring("cmif"));
+  module.def("stabilization", &poles_over_orders, "frf"_a, py::kw_only(),
+             "most_order"_a = StabilizationOptions{}.most_order, "delay_s"_a = 0.0,
+             docstring("stabilization"));
   py::class_<FitResult, std::shared_ptr<FitResult>> c(module, "Fit", docstring("Fit"));
   c.def(py::pickle([](const FitResult& r) { return state_of(r); }, &fit_of_state));
   const auto property = [&](const char* name, auto get) {

@@ -4,7 +4,6 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
-#include <cstddef>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -27,9 +26,6 @@
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
-
-namespace py = pybind11;
-using py::literals::operator""_a;
 
 namespace {
 
@@ -210,19 +206,6 @@ void define_properties(Class& c) {
 
 FrfHandle read_frf_handle(const std::filesystem::path& file) {
   return {read_frf(file), file.filename().string(), fingerprint_of_file(file)};
-}
-
-std::string fingerprint_of_content(const FrfEstimate& frf) {
-  Fingerprint fingerprint;
-  const auto add = [&](const auto& matrix) {
-    fingerprint.add({reinterpret_cast<const std::byte*>(matrix.data()),
-                     static_cast<std::size_t>(matrix.size()) * sizeof(*matrix.data())});
-  };
-  add(frf.frequency_hz);
-  add(frf.response);
-  add(frf.noise_variance);
-  add(frf.total_variance);
-  return fingerprint.hex();
 }
 
 void define_frf(py::module_& module) {

@@ -17,7 +17,4 @@ struct FrfHandle {
 /// @throws FileError, FormatError
 FrfHandle read_frf_handle(const std::filesystem::path& file);
 
-/// Identifies the content of a response without a file: frequencies, response and variances.
-std::string fingerprint_of_content(const FrfEstimate& frf);
-
 }  // namespace stageid

@@ -1,17 +1,15 @@
 #include "tools/python/interruptible.hpp"
 
-#include <pybind11/pybind11.h>
-
 #include <chrono>
 #include <functional>
 #include <future>
 
+#include "tools/python/bindings.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
 
 void run_interruptibly(const std::function<void()>& work) {
-  namespace py = pybind11;
   constexpr std::chrono::milliseconds kLookForSignalsEvery{50};
   std::future<void> done = std::async(std::launch::async, std::cref(work));
   bool signalled = false;

@@ -22,9 +22,6 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-using py::literals::operator""_a;
-
 py::object mode_of(const ModeShape& shape, const Submodel& submodel) {
   const std::optional<ModeShapeDeviation>& deviations = submodel.shape_std;
   const auto deviation = [&](auto ModeShapeDeviation::*member) {

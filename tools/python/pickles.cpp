@@ -17,8 +17,6 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-
 std::filesystem::path scratch_name(const char* name) {
   return std::filesystem::temp_directory_path() / name;
 }

@@ -6,6 +6,7 @@
 
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/problem/fit_options.hpp"
+#include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
 
 namespace stageid {
@@ -13,17 +14,17 @@ namespace stageid {
 // The pickled state of the objects of the module: bytes and plain Python objects. The bytes are those of frf.h5 and
 // model.json, so that every number is restored exactly.
 
-pybind11::tuple state_of(const FrfHandle& frf);
-FrfHandle frf_of_state(const pybind11::tuple& state);
+py::tuple state_of(const FrfHandle& frf);
+FrfHandle frf_of_state(const py::tuple& state);
 
-pybind11::bytes state_of(const AdditiveModel& model);
-AdditiveModel model_of_state(const pybind11::bytes& state);
+py::bytes state_of(const AdditiveModel& model);
+AdditiveModel model_of_state(const py::bytes& state);
 
-pybind11::tuple state_of(const FitResult& fit);
-FitResult fit_of_state(const pybind11::tuple& state);
+py::tuple state_of(const FitResult& fit);
+FitResult fit_of_state(const py::tuple& state);
 
 /// For a log in memory its arrays, for a log in a file the absolute path of the file, which is opened again.
-pybind11::tuple state_of(const LogReader& log);
-std::shared_ptr<LogReader> log_of_state(const pybind11::tuple& state);
+py::tuple state_of(const LogReader& log);
+std::shared_ptr<LogReader> log_of_state(const py::tuple& state);
 
 }  // namespace stageid
