@@ -13,21 +13,18 @@
 namespace stageid {
 namespace {
 
-namespace py = pybind11;
-using Reals = ExperimentArrays::Reals;
-
 constexpr py::ssize_t kWord = sizeof(double);
 
 /// True if a sample's channels are neighbours, samples are whole words apart, and reading needs no care
 /// for alignment.
-bool rows_stand_together(const Reals& array) {
+bool rows_stand_together(const RealArray& array) {
   const bool aligned = reinterpret_cast<std::uintptr_t>(array.data()) % alignof(double) == 0 &&
                        array.strides(0) % kWord == 0 && array.strides(1) % kWord == 0;
   return aligned && array.strides(2) >= 0 && array.strides(2) % kWord == 0 &&
          (array.strides(3) == kWord || array.shape(3) == 1);
 }
 
-Eigen::MatrixXd period_of(const Reals& excitation, py::ssize_t realization,
+Eigen::MatrixXd period_of(const RealArray& excitation, py::ssize_t realization,
                           py::ssize_t experiment) {
   const auto in = excitation.unchecked<4>();  // needs no lock: shape and address only
   Eigen::MatrixXd period(in.shape(2), in.shape(3));
@@ -37,7 +34,7 @@ Eigen::MatrixXd period_of(const Reals& excitation, py::ssize_t realization,
   return period;
 }
 
-Reals with_rows_together(Reals array) {
+RealArray with_rows_together(RealArray array) {
   if (rows_stand_together(array)) return array;
   return py::array_t<double, py::array::c_style | py::array::forcecast>(array);
 }
@@ -108,7 +105,7 @@ void ArrayLog::check_shapes() const {
   same_samples("marked", *a.marked);
 }
 
-ArrayLog::Rows ArrayLog::rows_of(const Reals& array, py::ssize_t realization,
+ArrayLog::Rows ArrayLog::rows_of(const RealArray& array, py::ssize_t realization,
                                  py::ssize_t experiment) {
   if (array.size() == 0) return {};
   return {array.data(realization, experiment, 0, 0),

@@ -16,18 +16,16 @@ namespace stageid {
 /// Samples of a whole experiment, one array per group. M realizations of E experiments (runs) of S samples each, and
 /// one period of P samples of excitation.
 struct ExperimentArrays {
-  using Reals = RealArray;
-  using Flags = FlagArray;
-  Reals excitation;             ///< [M x E x P x n_r]
-  Reals actuators;              ///< [M x E x S x n_u]
-  Reals sensors;                ///< [M x E x S x n_y]
-  std::optional<Flags> marked;  ///< [M x E x S], nonzero: do not use
+  RealArray excitation;             ///< [M x E x P x n_r]
+  RealArray actuators;              ///< [M x E x S x n_u]
+  RealArray sensors;                ///< [M x E x S x n_y]
+  std::optional<FlagArray> marked;  ///< [M x E x S], nonzero: do not use
 };
 
 /// The arguments r, u, y and marked (None: nothing is marked) of a log.
 /// @throws as real_array() and flag_array()
-ExperimentArrays experiment_arrays(const pybind11::object& r, const pybind11::object& u,
-                                   const pybind11::object& y, const pybind11::object& marked);
+ExperimentArrays experiment_arrays(const py::object& r, const py::object& u, const py::object& y,
+                                   const py::object& marked);
 
 /// A log in Python arrays. They are not copied if the channels of a sample are contiguous (C order, slices of it,
 /// views of other records), otherwise once.
@@ -58,8 +56,7 @@ class ArrayLog final : public LogReader {
 
   void check_shapes() const;
   void locate_runs();
-  static Rows rows_of(const ExperimentArrays::Reals& array, pybind11::ssize_t realization,
-                      pybind11::ssize_t experiment);
+  static Rows rows_of(const RealArray& array, py::ssize_t realization, py::ssize_t experiment);
 
   std::filesystem::path name_;
   LogInfo info_;

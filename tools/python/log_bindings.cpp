@@ -3,7 +3,6 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include <bit>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -11,20 +10,15 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/formats/open_log.hpp"
-#include "acquisition/slog/slog_format.hpp"
 #include "tools/python/arguments.hpp"
 #include "tools/python/array_log.hpp"
 #include "tools/python/bindings.hpp"
-#include "tools/python/interruptible.hpp"
 #include "tools/python/pickles.hpp"
 #include "tools/python/results.hpp"
 #include "tools/python/simulate.hpp"
 
 namespace stageid {
 namespace {
-
-namespace py = pybind11;
-using py::literals::operator""_a;
 
 std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& u,
                                          const py::object& y, double sample_rate_hz,
@@ -49,49 +43,6 @@ std::shared_ptr<LogReader> log_of_arrays(const py::object& r, const py::object& 
   info.excitation = at_actuators ? info.actuators
                                  : channels("excitation", last_axis(period), "r", excitation, {});
   return std::make_shared<ArrayLog>("arrays", std::move(info), std::move(arrays));
-}
-
-/// Bytes from an element of each axis of a C-ordered array [M x E x S x words] to the next.
-std::vector<py::ssize_t> c_strides(py::ssize_t E, py::ssize_t S, py::ssize_t words) {
-  constexpr py::ssize_t kWord = sizeof(double);
-  return {E * S * words * kWord, S * words * kWord, words * kWord, kWord};
-}
-
-/// The rows that a simulation left, as arrays over the same memory.
-ExperimentArrays arrays_of(SimulatedExperiment experiment) {
-  const py::ssize_t M = experiment.realizations, E = experiment.experiments;
-  const auto S = static_cast<py::ssize_t>(experiment.samples);
-  RunMemory* memory = experiment.runs.get();
-  const auto n_u = static_cast<py::ssize_t>(memory->info().actuators.size());
-  const auto n_y = static_cast<py::ssize_t>(memory->info().sensors.size());
-  const auto n_r = static_cast<py::ssize_t>(memory->info().excitation.size());
-  const py::ssize_t words = n_u + n_y + 1;
-  const py::capsule owner(experiment.runs.release(),
-                          [](void* p) { delete static_cast<RunMemory*>(p); });
-
-  ExperimentArrays arrays;
-  const std::vector<double>& rows = memory->rows();
-  arrays.actuators =
-      ExperimentArrays::Reals({M, E, S, n_u}, c_strides(E, S, words), rows.data(), owner);
-  arrays.sensors =
-      ExperimentArrays::Reals({M, E, S, n_y}, c_strides(E, S, words), rows.data() + n_u, owner);
-  arrays.marked = ExperimentArrays::Flags({M, E, S});
-  std::uint8_t* marked = arrays.marked->mutable_data();
-  for (py::ssize_t n = 0; n < M * E * S; ++n) {
-    const double word = rows[static_cast<std::size_t>(n * words + words - 1)];
-    marked[n] = unpack_status(std::bit_cast<std::uint64_t>(word)).marked ? 1 : 0;
-  }
-  const auto P = static_cast<py::ssize_t>(memory->info().period_samples);
-  arrays.excitation = ExperimentArrays::Reals({M, E, P, n_r}, memory->excitation().data(), owner);
-  return arrays;
-}
-
-std::shared_ptr<LogReader> simulate(const std::filesystem::path& config) {
-  SimulatedExperiment experiment = interruptible([&] { return simulate_experiment(config); });
-  LogInfo info = experiment.runs->info();
-  std::filesystem::path name = experiment.name;
-  return std::make_shared<ArrayLog>(std::move(name), std::move(info),
-                                    arrays_of(std::move(experiment)));
 }
 
 py::object run_at(const LogReader& log, py::ssize_t index) {
