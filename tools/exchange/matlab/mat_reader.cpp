@@ -188,6 +188,23 @@ bool read_numbers(matio_types type, const void* data, std::size_t count, std::ve
   return false;
 }
 
+/// Real or complex numbers at `data`; empty if the type is not numeric.
+std::optional<NamedArray::Values> numbers_of(const matvar_t& variable, const void* data,
+                                             std::size_t count) {
+  std::vector<double> real, imaginary;
+  if (variable.isComplex == 0) {
+    if (!read_numbers(variable.data_type, data, count, real)) return std::nullopt;
+    return real;
+  }
+  const auto* parts = static_cast<const mat_complex_split_t*>(data);
+  if (count > 0 && (!read_numbers(variable.data_type, parts->Re, count, real) ||
+                    !read_numbers(variable.data_type, parts->Im, count, imaginary)))
+    return std::nullopt;
+  std::vector<std::complex<double>> values(count);
+  for (std::size_t k = 0; k < count; ++k) values[k] = {real[k], imaginary[k]};
+  return values;
+}
+
 class Reader {
  public:
   explicit Reader(ArrayList& list) : list_(list) {}
@@ -274,24 +291,11 @@ class Reader {
 
   void read_array(const matvar_t& variable, const std::string& name) {
     const std::size_t count = count_of(variable);
-    const std::vector<std::size_t> shape(variable.dims, variable.dims + variable.rank);
-    // Column-major: the shape reversed in C order.
-    NamedArray stored{name, {shape.rbegin(), shape.rend()}, {}};
-    std::vector<double> real;
     if (count > 0 && variable.data == nullptr) damaged(name);
-    if (variable.isComplex == 0) {
-      if (!read_numbers(variable.data_type, variable.data, count, real)) return;
-      stored.values = std::move(real);
-    } else {
-      const auto* parts = static_cast<const mat_complex_split_t*>(variable.data);
-      std::vector<double> imaginary;
-      if (count > 0 && (!read_numbers(variable.data_type, parts->Re, count, real) ||
-                        !read_numbers(variable.data_type, parts->Im, count, imaginary)))
-        return;
-      auto& values = stored.values.emplace<1>(count);
-      for (std::size_t k = 0; k < count; ++k) values[k] = {real[k], imaginary[k]};
-    }
-    list_.arrays.push_back(reversed(stored));
+    // Column-major: the shape reversed in C order.
+    const std::vector<std::size_t> shape(variable.dims, variable.dims + variable.rank);
+    if (auto values = numbers_of(variable, variable.data, count))
+      list_.arrays.push_back(reversed({name, {shape.rbegin(), shape.rend()}, std::move(*values)}));
   }
 
   /// As a full matrix, because channels and samples are full.
@@ -306,27 +310,19 @@ class Reader {
                                     "the needed part with full()",
                                     rows, columns));
     const std::size_t count = sparse->ndata;
-    std::vector<double> real, imaginary;
-    const auto* parts = static_cast<const mat_complex_split_t*>(sparse->data);
-    const bool complex = variable.isComplex != 0;
-    if (count > 0 &&
-        (sparse->data == nullptr ||
-         !read_numbers(variable.data_type, complex ? parts->Re : sparse->data, count, real) ||
-         (complex && !read_numbers(variable.data_type, parts->Im, count, imaginary))))
-      damaged(name);
-    NamedArray out{name, {rows, columns}, {}};
-    const auto place = [&](auto& values, auto value) {
+    if (count > 0 && sparse->data == nullptr) damaged(name);
+    const auto nonzero = numbers_of(variable, sparse->data, count);
+    if (count > 0 && !nonzero) damaged(name);
+    NamedArray out{name, {rows, columns}, nonzero.value_or(NamedArray::Values())};
+    const auto place = [&](auto& values) {
+      const auto given = std::exchange(values, std::decay_t<decltype(values)>(rows * columns));
       for (std::size_t c = 0; c < columns; ++c)
         for (std::size_t k = sparse->jc[c]; k < sparse->jc[c + 1]; ++k) {
           if (k >= count || k >= sparse->nir || sparse->ir[k] >= rows) damaged(name);
-          values[sparse->ir[k] * columns + c] = value(k);
+          values[sparse->ir[k] * columns + c] = given[k];
         }
     };
-    if (complex)
-      place(out.values.emplace<1>(rows * columns),
-            [&](std::size_t k) { return std::complex<double>(real[k], imaginary[k]); });
-    else
-      place(out.values.emplace<0>(rows * columns), [&](std::size_t k) { return real[k]; });
+    std::visit(place, out.values);
     list_.arrays.push_back(std::move(out));
   }
 
