@@ -29,71 +29,65 @@ std::string named(const ChannelList& channels) {
 
 }  // namespace
 
-void LogSummary::Power::add(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
-  if (squares.size() == 0) squares.setZero(columns.cols());
-  squares += columns.colwise().squaredNorm().transpose();
-  samples += static_cast<double>(columns.rows());
-}
-
 void LogSummary::add(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& period,
                      const Eigen::Ref<const Eigen::MatrixXd>& actuators,
                      const Eigen::Ref<const Eigen::MatrixXd>& sensors) {
-  runs_.emplace(run.realization, run.experiment);
-  samples_.push_back(static_cast<std::uint64_t>(actuators.rows()));
-  excitation_.add(period);
-  actuators_.add(actuators);
-  sensors_.add(sensors);
-  const auto experiment = static_cast<std::size_t>(run.experiment);
-  if (excited_.size() <= experiment) excited_.resize(experiment + 1);
+  runs_.push_back(run);
+  const auto add_squares = [](const auto& columns, Eigen::VectorXd& sums) {
+    if (sums.size() == 0) sums.setZero(columns.cols());
+    sums += columns.colwise().squaredNorm().transpose();
+  };
+  add_squares(period, excitation_);
+  add_squares(actuators, actuators_);
+  add_squares(sensors, sensors_);
+  std::set<Eigen::Index>& excited = excited_[run.experiment];
   for (Eigen::Index c = 0; c < period.cols(); ++c)
-    if (!period.col(c).isZero(0.0)) excited_[experiment].insert(c);
+    if (!period.col(c).isZero(0.0)) excited.insert(c);
 }
 
 ImportSummary LogSummary::summary(const LogInfo& info,
                                   const std::vector<std::string>& notes) const {
-  std::set<int> realizations, experiments;
-  for (const auto& [realization, experiment] : runs_) {
-    realizations.insert(realization);
-    experiments.insert(experiment);
-  }
+  std::set<int> realizations;
   std::vector<std::uint64_t> periods;
   double duration_s = 0.0;
-  for (const std::uint64_t samples : samples_) {
-    periods.push_back(samples / static_cast<std::uint64_t>(info.period_samples));
-    duration_s += static_cast<double>(samples) / info.sample_rate_hz;
+  std::uint64_t samples = 0;
+  for (const LogRun& run : runs_) {
+    realizations.insert(run.realization);
+    periods.push_back(run.samples / static_cast<std::uint64_t>(info.period_samples));
+    duration_s += static_cast<double>(run.samples) / info.sample_rate_hz;
+    samples += run.samples;
   }
   ImportSummary out;
   out.lines = notes;
   out.lines.push_back(
       fmt::format("{}: {} of {}, {} periods each ({} transient), {} samples per period",
                   counted(runs_.size(), "run"), counted(realizations.size(), "realization"),
-                  counted(experiments.size(), "experiment"), range_text(periods),
+                  counted(excited_.size(), "experiment"), range_text(periods),
                   info.transient_periods, info.period_samples));
   out.lines.push_back(
       fmt::format("sample rate {} Hz, total duration {:.6g} s", info.sample_rate_hz, duration_s));
   Json excited = Json::array();
-  for (std::size_t e = 0; e < excited_.size(); ++e) {
-    if (!experiments.contains(static_cast<int>(e))) continue;
+  for (const auto& [experiment, channels] : excited_) {
     std::vector<std::string> names;
-    for (const Eigen::Index c : excited_[e])
-      names.push_back(info.excitation.names[static_cast<std::size_t>(c)]);
-    out.lines.push_back(fmt::format("experiment {} excites {}", e + 1,
+    for (const Eigen::Index c : channels) names.push_back(info.excitation.name(c));
+    out.lines.push_back(fmt::format("experiment {} excites {}", experiment + 1,
                                     names.empty() ? std::string("nothing: the excitation is zero")
                                                   : fmt::format("{}", fmt::join(names, ", "))));
-    excited.push_back({{"experiment", e + 1}, {"excites", names}});
+    excited.push_back({{"experiment", experiment + 1}, {"excites", names}});
   }
   out.json = {{"kind", "log"},
               {"runs", runs_.size()},
               {"realizations", realizations.size()},
-              {"experiments", experiments.size()},
+              {"experiments", excited_.size()},
               {"periods", *std::min_element(periods.begin(), periods.end())},
               {"transient_periods", info.transient_periods},
               {"period_samples", info.period_samples},
               {"sample_rate_hz", info.sample_rate_hz},
               {"duration_s", duration_s},
               {"excited", excited}};
-  const auto add_rms = [&out](const char* group, const ChannelList& channels, const Power& power) {
-    const Eigen::VectorXd rms = (power.squares / power.samples).cwiseSqrt();
+  const auto add_rms = [&out](const char* group, const ChannelList& channels,
+                              const Eigen::VectorXd& squares, std::size_t rows) {
+    const Eigen::VectorXd rms = (squares / static_cast<double>(rows)).cwiseSqrt();
     std::vector<std::string> parts;
     Json& list = out.json[group] = Json::array();
     for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -103,9 +97,10 @@ ImportSummary LogSummary::summary(const LogInfo& info,
     }
     out.lines.push_back(fmt::format("rms of {}: {}", group, fmt::join(parts, ", ")));
   };
-  add_rms("excitation", info.excitation, excitation_);
-  add_rms("actuators", info.actuators, actuators_);
-  add_rms("sensors", info.sensors, sensors_);
+  const auto period_samples = static_cast<std::size_t>(info.period_samples);
+  add_rms("excitation", info.excitation, excitation_, runs_.size() * period_samples);
+  add_rms("actuators", info.actuators, actuators_, samples);
+  add_rms("sensors", info.sensors, sensors_, samples);
   out.json["notes"] = notes;
   return out;
 }

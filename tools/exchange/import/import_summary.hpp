@@ -1,10 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
@@ -21,7 +21,7 @@ struct ImportSummary {
 /// Collects the figures of a log run by run.
 class LogSummary {
  public:
-  /// @param period one period of the excitation x channels   @param actuators, sensors samples x channels
+  /// @param period one period of the excitation x channels   @param actuators, sensors run.samples x channels
   void add(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& period,
            const Eigen::Ref<const Eigen::MatrixXd>& actuators,
            const Eigen::Ref<const Eigen::MatrixXd>& sensors);
@@ -29,16 +29,9 @@ class LogSummary {
   ImportSummary summary(const LogInfo& info, const std::vector<std::string>& notes) const;
 
  private:
-  struct Power {
-    Eigen::VectorXd squares;  ///< per channel
-    double samples = 0.0;
-    void add(const Eigen::Ref<const Eigen::MatrixXd>& columns);
-  };
-  std::set<std::pair<int, int>> runs_;  ///< realization, experiment
-  /// per experiment: channels with nonzero excitation
-  std::vector<std::set<Eigen::Index>> excited_;
-  std::vector<std::uint64_t> samples_;
-  Power excitation_, actuators_, sensors_;
+  std::vector<LogRun> runs_;
+  std::map<int, std::set<Eigen::Index>> excited_;     ///< channels per experiment
+  Eigen::VectorXd excitation_, actuators_, sensors_;  ///< sums of squares per channel
 };
 
 ImportSummary summary_of(const FrfEstimate& frf, const std::vector<std::string>& notes);
