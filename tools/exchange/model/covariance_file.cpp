@@ -86,8 +86,9 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
   write_matrix(file, "/covariance/sandwich", covariance.sandwich);
   write_matrix(file, "/covariance/likelihood", covariance.likelihood);
   write_response(file, model, frequency_hz);
-  write_lines<double>(file, "/response_variance", covariance.response_variance, model.n_outputs());
-  write_lines<double>(file, "/confidence_radius", covariance.response_radius, model.n_outputs());
+  write_columns<double>(file, "/response_variance", covariance.response_variance,
+                        model.n_outputs());
+  write_columns<double>(file, "/confidence_radius", covariance.response_radius, model.n_outputs());
   file.write_attribute("/confidence_radius", "level", 0.95);
   file.close();
   output.commit();

@@ -24,9 +24,10 @@ void write_submodels(Hdf5File& file, const AdditiveModel& model) {
     file.write_attribute(group, "integrators", static_cast<long long>(s.integrators));
     write_vector(file, group + "/denominator", s.denominator);
     std::vector<double> numerator;
-    for (const Eigen::MatrixXd& B : s.numerator)
-      for (Eigen::Index i = 0; i < B.rows(); ++i)
-        for (Eigen::Index j = 0; j < B.cols(); ++j) numerator.push_back(B(i, j));
+    for (const Eigen::MatrixXd& B : s.numerator) {
+      const auto rows = B.reshaped<Eigen::RowMajor>();
+      numerator.insert(numerator.end(), rows.begin(), rows.end());
+    }
     file.write_reals(group + "/numerator",
                      {s.numerator.size(), size_of(model.n_outputs()), size_of(model.n_inputs())},
                      numerator.data());
@@ -167,8 +168,8 @@ void write_channels(Hdf5File& file, const AdditiveModel& model) {
 void write_response(Hdf5File& file, const AdditiveModel& model,
                     const Eigen::VectorXd& frequency_hz) {
   write_vector(file, "/frequency_hz", frequency_hz);
-  write_lines<std::complex<double>>(file, "/response", response(model, frequency_hz, model.hold),
-                                    model.n_outputs());
+  write_columns<std::complex<double>>(file, "/response", response(model, frequency_hz, model.hold),
+                                      model.n_outputs());
 }
 
 void write_model_hdf5(const std::filesystem::path& target, const AdditiveModel& model,
@@ -182,8 +183,7 @@ void write_model_hdf5(const std::filesystem::path& target, const AdditiveModel& 
   write_state_spaces(file, model);
   if (exported.frequency_hz.size() > 0) {
     write_response(file, model, exported.frequency_hz);
-    if (exported.variance.size() > 0)
-      write_lines<double>(file, "/response_variance", exported.variance, model.n_outputs());
+    write_columns<double>(file, "/response_variance", exported.variance, model.n_outputs());
   }
   file.close();
   output.commit();

@@ -22,13 +22,6 @@ struct ExportedResponse {
 
 /// /inputs and /outputs with their units.
 void write_channels(Hdf5File& file, const AdditiveModel& model);
-/// A dataset [lines x outputs x inputs] of columns vec(outputs x inputs).
-template <typename Scalar>
-void write_lines(Hdf5File& file, const std::string& dataset, const VecColumns<Scalar>& columns,
-                 Eigen::Index n_y) {
-  write_array(file, dataset, {size_of(columns.cols()), size_of(n_y), size_of(columns.rows() / n_y)},
-              to_c_order<Scalar>(columns, n_y).data());
-}
 /// /frequency_hz and /response.
 void write_response(Hdf5File& file, const AdditiveModel& model,
                     const Eigen::VectorXd& frequency_hz);
