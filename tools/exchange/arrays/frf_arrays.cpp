@@ -99,6 +99,14 @@ FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& be
   }
 }
 
+Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit) {
+  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
+  if (found != channels.names.end()) return found - channels.names.begin();
+  channels.names.push_back(name);
+  channels.units.push_back(unit);
+  return std::ssize(channels) - 1;
+}
+
 bool holds_frf(const ArrayList& list) {
   const NamedArray* format = list.find("@format");
   if (format == nullptr) format = list.find("format");

@@ -15,6 +15,9 @@ ArrayList arrays_of_frf(const FrfEstimate& frf, const std::filesystem::path& bes
 /// @throws FormatError naming the file of `list`.
 FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& beside);
 
+/// The place of the channel with this name, which is appended if there is none.
+Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit);
+
 /// True if the arrays have the format of a stageid frequency response.
 bool holds_frf(const ArrayList& list);
 

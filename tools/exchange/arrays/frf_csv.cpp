@@ -12,6 +12,7 @@
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
+#include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/terminal/text_lines.hpp"
 
 namespace stageid {
@@ -81,11 +82,7 @@ constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
 /// is the unit of the input.
 bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   const auto add = [](ChannelList& list, const std::string& name, const std::string& unit) {
-    const auto found = std::find(list.names.begin(), list.names.end(), name);
-    if (found != list.names.end()) return list.unit(found - list.names.begin()) == unit;
-    list.names.push_back(name);
-    list.units.push_back(unit);
-    return true;
+    return list.unit(place_in(list, name, unit)) == unit;
   };
   bool plain = true;
   for (const NamedArray& array : arrays.arrays) {

@@ -36,11 +36,6 @@ std::vector<std::size_t> source_places(const std::vector<std::size_t>& shape,
   return places;
 }
 
-[[noreturn]] void refuse(const ArrayList& list, const NamedArray& array, const char* holds,
-                         const char* wanted) {
-  throw FormatError(list.file, array.name, fmt::format("contains {}; expected {}", holds, wanted));
-}
-
 }  // namespace
 
 std::size_t NamedArray::size() const {
@@ -109,8 +104,9 @@ NamedArray reversed(const NamedArray& array) {
 }
 
 const std::vector<double>& real_values(const ArrayList& list, const NamedArray& array) {
-  if (array.is_text()) refuse(list, array, "text", "numbers");
-  if (array.is_complex()) refuse(list, array, "complex numbers", "real ones");
+  if (array.is_text()) throw FormatError(list.file, array.name, "contains text; expected numbers");
+  if (array.is_complex())
+    throw FormatError(list.file, array.name, "contains complex numbers; expected real ones");
   return std::get<0>(array.values);
 }
 
@@ -118,11 +114,6 @@ std::vector<std::complex<double>> complex_values(const ArrayList& list, const Na
   if (array.is_complex()) return std::get<1>(array.values);
   const std::vector<double>& real = real_values(list, array);
   return {real.begin(), real.end()};
-}
-
-std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array) {
-  if (!array.is_text()) refuse(list, array, "numbers", "text");
-  return std::get<2>(array.values);
 }
 
 }  // namespace stageid

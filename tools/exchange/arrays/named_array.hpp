@@ -57,7 +57,6 @@ NamedArray reversed(const NamedArray& array);
 /// @throws FormatError naming the file if the array has texts or, for real_values(), complex numbers.
 const std::vector<double>& real_values(const ArrayList& list, const NamedArray& array);
 std::vector<std::complex<double>> complex_values(const ArrayList& list, const NamedArray& array);
-std::vector<std::string> text_values(const ArrayList& list, const NamedArray& array);
 
 /// Reads a file in a child process (in_child), for the libraries that crash on damaged files.
 /// @throws FileError, FormatError

@@ -1,6 +1,7 @@
 #include "tools/exchange/arrays/npz_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <zip.h>
 
 #include <algorithm>
@@ -29,19 +30,11 @@ static_assert(std::endian::native == std::endian::little, ".npy members are writ
 
 constexpr zip_uint16_t kFirstDay = 0x0021;  // 1980-01-01, the zip format's zero
 
-std::string shape_text(const std::vector<std::size_t>& shape) {
-  std::string text;
-  for (const std::size_t extent : shape) text += fmt::format("{}, ", extent);
-  if (shape.size() > 1) text.resize(text.size() - 2);
-  if (shape.size() == 1) text.resize(text.size() - 1);
-  return "(" + text + ")";
-}
-
 /// Magic, version 1.0, length and a header that ends at a multiple of 64 bytes.
 std::string npy(const std::string& type, const std::vector<std::size_t>& shape,
                 std::string_view data) {
-  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}", type,
-                                   shape_text(shape));
+  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}{}), }}",
+                                   type, fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
   header.append(63 - (10 + header.size()) % 64, ' ');
   header += '\n';
   std::string bytes("\x93NUMPY\x01\x00", 8);

@@ -9,6 +9,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/line_datasets.hpp"
+#include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/import/import_rate.hpp"
 
 namespace stageid {
@@ -143,18 +144,13 @@ void read_whole_response(const ArrayList& arrays, const ImportMap& map, FrfEstim
   frf.total_variance = variance(map.total_variance);
 }
 
-std::vector<std::string> appearing(const ImportMap& map, std::string ImportMap::Channel::*name) {
-  std::vector<std::string> names;
-  for (const ImportMap::Channel& channel : map.channels)
-    if (std::find(names.begin(), names.end(), channel.*name) == names.end())
-      names.push_back(channel.*name);
-  return names;
-}
-
 void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& frf) {
-  frf.outputs.names =
-      map.outputs.empty() ? appearing(map, &ImportMap::Channel::output) : map.outputs;
-  frf.inputs.names = map.inputs.empty() ? appearing(map, &ImportMap::Channel::input) : map.inputs;
+  frf.outputs.names = map.outputs;
+  frf.inputs.names = map.inputs;
+  for (const ImportMap::Channel& channel : map.channels) {
+    if (map.outputs.empty()) place_in(frf.outputs, channel.output, "");
+    if (map.inputs.empty()) place_in(frf.inputs, channel.input, "");
+  }
   frf.response =
       Eigen::MatrixXcd::Constant(frf.n_outputs() * frf.n_inputs(), frf.lines(), std::nan(""));
   if (!map.channels.front().noise_variance.empty()) frf.noise_variance = frf.response.real();

@@ -11,6 +11,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/version.hpp"
+#include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/terminal/text_lines.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -171,14 +172,6 @@ std::string unit_of(const UffAxis& axis, int direction, bool other_units) {
   const Quantity* quantity = quantity_of(axis.type);
   if (quantity == nullptr) return "1";
   return std::abs(direction) > 3 ? quantity->rotation_unit : quantity->unit;
-}
-
-Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit) {
-  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
-  if (found != channels.names.end()) return found - channels.names.begin();
-  channels.names.push_back(name);
-  channels.units.push_back(unit);
-  return static_cast<Eigen::Index>(channels.size()) - 1;
 }
 
 /// Description of a file without frequency response, and the remedy.
