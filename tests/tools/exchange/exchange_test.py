@@ -91,6 +91,23 @@ class Case(unittest.TestCase):
         self.assertEqual(sorted(WORK.iterdir()), before, "a file was left")
         return result.stderr
 
+    def exports(self, what, *names, flags=()):
+        for name in names:
+            self.succeed("export", what, "-o", name, *flags)
+
+    def round_trip(self, what, name, flags=()):
+        """Exports, and imports again without a map; returns the content of back.h5."""
+        self.exports(what, name, flags=flags)
+        self.succeed("import", name, "-o", "back.h5")
+        return content()
+
+    def told(self, *arguments):
+        return json.loads(self.succeed(*arguments, "--json").stdout)
+
+    def listed(self, name):
+        """The arrays in a file, by name."""
+        return {a["name"]: a for a in self.told("import", name)["arrays"]}
+
     def imports(self, name, to="back.h5", map=None):
         """Imports through map.yaml, which is written if its text is given; returns what is printed."""
         if map is not None:
@@ -114,15 +131,13 @@ class RoundTrips(Case):
     def come_back(self, frf):
         for name, flags in (("a.mat", []), ("b.mat", ["--mat-version", "7.3"]), ("c.npz", [])):
             with self.subTest(name):
-                self.succeed("export", frf, "-o", name, *flags)
-                self.succeed("import", name, "-o", "back.h5")
+                self.round_trip(frf, name, flags)
                 self.assertEqual(everything("back.h5"), everything(frf))
 
     def test_mat_npz_and_binary_uff_come_back_to_the_bit(self):
         frf = self.frf()
         self.come_back(frf)
-        self.succeed("export", frf, "-o", "d.uff")
-        self.succeed("import", "d.uff", "-o", "back.h5")
+        self.round_trip(frf, "d.uff")
         back, given = everything("back.h5"), everything(frf)
         # Data without a place in a universal file, and the radii, which follow from the degrees of freedom.
         lost = ("@noise_dof", "@provenance", "confidence_radius")
@@ -167,16 +182,13 @@ class RoundTrips(Case):
             write_frf(WORK / "one.h5", f, np.full(shape, 1 + 2j))
             for name in ("a.mat", "a.npz", "a.uff"):
                 with self.subTest(shape=shape, name=name):
-                    self.succeed("export", "one.h5", "-o", name)
-                    self.succeed("import", name, "-o", "back.h5")
-                    self.assertEqual(content()["response"].shape, shape)
+                    self.assertEqual(self.round_trip("one.h5", name)["response"].shape, shape)
 
     def test_text_uff_keeps_thirteen_digits(self):
         frf = self.frf()
-        self.succeed("export", frf, "-o", "a.unv")
-        self.succeed("import", "a.unv", "-o", "back.h5")
+        given, back = content(frf), self.round_trip(frf, "a.unv")
         for name in ("frequency_hz", "response", "noise_variance"):
-            x, y = content(frf)[name], content()[name]
+            x, y = given[name], back[name]
             # 1PE20.12: half a unit of the thirteenth digit, of each part.
             self.assertLess(np.max(np.abs(x - y) / np.abs(x)), 1e-12)
             self.assertFalse(np.array_equal(x, y))
@@ -184,8 +196,7 @@ class RoundTrips(Case):
     def test_the_same_file_has_the_same_bytes(self):
         frf = self.frf()
         for ending in ("mat", "npz", "unv", "uff"):
-            self.succeed("export", frf, "-o", "a." + ending)
-            self.succeed("export", frf, "-o", "b." + ending)
+            self.exports(frf, f"a.{ending}", f"b.{ending}")
             self.assertEqual((WORK / f"a.{ending}").read_bytes(), (WORK / f"b.{ending}").read_bytes())
 
 
@@ -193,13 +204,12 @@ class ReadByOthers(Case):
     def test_scipy_and_numpy(self):
         given = random_frf()
         frf = self.frf(given)
-        self.succeed("export", frf, "-o", "a.mat")
+        self.exports(frf, "a.mat", "a.npz")
         mat = scipy.io.loadmat(WORK / "a.mat", squeeze_me=True, uint16_codec="utf-16-le")
         np.testing.assert_array_equal(mat["response"], np.moveaxis(given["response"], 0, -1))
         np.testing.assert_array_equal(mat["frequency_hz"], given["frequency_hz"])
         self.assertEqual(list(mat["outputs"]), ["z1", "x\u00b52"])
         self.assertEqual(mat["hold"], "zoh")
-        self.succeed("export", frf, "-o", "a.npz")
         with np.load(WORK / "a.npz") as npz:
             np.testing.assert_array_equal(npz["response"], given["response"])
             self.assertEqual(list(npz["outputs"]), ["z1", "x\u00b52"])
@@ -209,7 +219,7 @@ class ReadByOthers(Case):
         given = random_frf(0.5 * np.arange(1, 41))  # six digits hold this grid: even abscissas
         frf = self.frf(given)
         for name, tolerance in (("a.unv", 1e-12), ("a.uff", 0.0)):
-            self.succeed("export", frf, "-o", name)
+            self.exports(frf, name)
             datasets = uff_reader.read(WORK / name)
             self.assertEqual([d["dataset"] for d in datasets[:2]], [151, 164])
             self.assertEqual((datasets[1]["code"], datasets[1]["factors"][:2]), (1, [1.0, 1.0]))
@@ -225,7 +235,7 @@ class ReadByOthers(Case):
                 self.assertEqual((function["axes"][1][-1], function["axes"][2][-1]), (("m", "rad")[i], "N"))
 
     def test_uneven_binary_abscissas_are_exact(self):
-        self.succeed("export", self.frf(), "-o", "a.uff")
+        self.exports(self.frf(), "a.uff")
         for function in uff_reader.read(WORK / "a.uff"):
             if function.get("type") == 4:
                 np.testing.assert_array_equal(function["x"], FREQUENCY_HZ)
@@ -260,8 +270,7 @@ class Models(Case):
         (WORK / "model.json").write_text(json.dumps(MODEL))
 
     def test_mat_and_npz_hold_what_h5_holds(self):
-        for name in ("m.h5", "m.mat", "m.npz"):
-            self.succeed("export", "model.json", "-o", name, "--driving-point", "z1", "a1")
+        self.exports("model.json", "m.h5", "m.mat", "m.npz", flags=("--driving-point", "z1", "a1"))
         mat = scipy.io.loadmat(WORK / "m.mat", squeeze_me=True, struct_as_record=False)
         h5, npz = content("m.h5"), dict(np.load(WORK / "m.npz"))
         np.testing.assert_array_equal(mat["response"], np.moveaxis(h5["response"], 0, -1))
@@ -276,8 +285,7 @@ class Models(Case):
 
     def test_the_python_script_rebuilds_the_model(self):
         f = [5.0, 40.0, 50.3, 180.0, 470.0]
-        self.succeed("export", "model.json", "-o", "m.py")
-        self.succeed("export", "model.json", "-o", "m.h5")
+        self.exports("model.json", "m.py", "m.h5")
         space = {"__name__": "model"}
         exec((WORK / "m.py").read_text(), space)
         s = 2j * np.pi * np.array(f)
@@ -289,7 +297,7 @@ class Models(Case):
         self.assertEqual(space["OUTPUTS"], ["z1", "z'2"])
 
     def test_the_python_script_says_what_its_plot_needs(self):
-        self.succeed("export", "model.json", "-o", "m.py")
+        self.exports("model.json", "m.py")
         (WORK / "without").mkdir(exist_ok=True)
         (WORK / "without/matplotlib.py").write_text("raise ImportError\n")
         done = subprocess.run([sys.executable, "m.py"], cwd=WORK, capture_output=True, text=True,
@@ -298,27 +306,25 @@ class Models(Case):
         self.assertRegex(done.stderr, r"^\S*m\.py: the plot needs matplotlib; install python3-matplotlib, or ")
 
     def test_universal_files_hold_response_and_modes(self):
-        self.succeed("export", "model.json", "-o", "m.unv")
-        self.succeed("export", "model.json", "-o", "m.h5")
-        datasets = uff_reader.read(WORK / "m.unv")
-        mode = next(d for d in datasets if d["dataset"] == 55)
+        self.exports("model.json", "m.h5")
+        back = self.round_trip("model.json", "m.unv")
+        mode = next(d for d in uff_reader.read(WORK / "m.unv") if d["dataset"] == 55)
         h5 = content("m.h5")
         expected = [h5[f"modes/{name}"][0] for name in ("natural_frequency_hz", "modal_mass", "damping_ratio")]
         np.testing.assert_allclose(mode["reals"][:3], expected, rtol=1e-5)
         shape = h5["modes/output_shape"][0].real
         self.assertEqual((mode["analysis"], mode["data_type"], mode["nodes"]), (2, 2, [1, 2]))
         np.testing.assert_allclose(mode["values"], [[0, 0, shape[0]], [0, 0, shape[1]]], rtol=1e-5)
-        self.succeed("import", "m.unv", "-o", "back.h5")
-        np.testing.assert_allclose(content()["response"], h5["response"], rtol=1e-12)
+        np.testing.assert_allclose(back["response"], h5["response"], rtol=1e-12)
 
     def test_shapes_of_outputs_without_a_direction_stand_in_x(self):
         (WORK / "model.json").write_text(json.dumps(MODEL | {"outputs": ["s1", "z2"]}))
-        self.succeed("export", "model.json", "-o", "m.unv")
+        self.exports("model.json", "m.unv")
         mode = next(d for d in uff_reader.read(WORK / "m.unv") if d["dataset"] == 55)
         s1, z2 = mode["values"]
         self.assertEqual((s1[1:], z2[:2]), ([0, 0], [0, 0]))
         np.testing.assert_allclose(z2[2] / s1[0], 3.0, rtol=1e-5)  # rows of the numerator of MODEL
-        found = json.loads(self.succeed("validate", "model.json", "m.unv", "--json").stdout)["modes"]
+        found = self.told("validate", "model.json", "m.unv")["modes"]
         self.assertEqual(found["outputs"], ["s1", "z2"])
         self.assertAlmostEqual(found["pairs"][0]["mac"], 1.0, places=9)
 
@@ -329,7 +335,7 @@ class Models(Case):
                                      (7, [-1.0, 2 * np.pi * 80.0, 0.0, 1.0],
                                       {7: (1.0, 0, 0), 3: (0, 0, 0), 12: (0, 0, 1.0)})])
         (WORK / "model.json").write_text(json.dumps(MODEL | {"outputs": ["12+Z", "7-X"]}))
-        found = json.loads(self.succeed("validate", "model.json", "fe.unv", "--json").stdout)["modes"]
+        found = self.told("validate", "model.json", "fe.unv")["modes"]
         (pair,) = found["pairs"]
         own, other = np.array([1.0, 3.0]), np.array([1.0, 3.1])
         self.assertAlmostEqual(pair["mac"], (own @ other) ** 2 / (own @ own) / (other @ other), places=12)
@@ -351,7 +357,7 @@ class Models(Case):
         self.refuse("contain no output of the model (z1, z'2)", "validate", "model.json", "fe.unv")
         self.write_shapes("rigid.unv", [(2, [0.0, 1.0, 0.0], {5: (1.0, 0, 0)})])
         self.refuse("contains no mode with a frequency above zero", "import", "rigid.unv", "-o", "modes.json")
-        self.succeed("export", self.frf(), "-o", "response.unv")
+        self.exports(self.frf(), "response.unv")
         self.refuse("contains no mode shapes (dataset 55)", "validate", "model.json", "response.unv")
         self.refuse("contains no mode shapes (dataset 55)", "import", "response.unv", "-o", "modes.json")
 
@@ -375,6 +381,10 @@ class Models(Case):
         (WORK / name).write_text(text)
 
 
-if __name__ == "__main__":
+def run_tests():
     sys.argv = sys.argv[:1] + sys.argv[3:]
     unittest.main()
+
+
+if __name__ == "__main__":
+    run_tests()

@@ -4,15 +4,12 @@
     map_test.py PROGRAM WORK_DIR
 """
 
-import json
-import sys
-import unittest
 
 import h5py
 import numpy as np
 import scipy.io
 
-from exchange_test import WORK, Case, content
+from exchange_test import WORK, Case, content, run_tests
 from import_test import uff_function
 
 P, PERIODS = 50, 4
@@ -262,13 +259,13 @@ class Summaries(Case):
                      "sample rate 100 Hz, total duration 12 s", "experiment 1 excites r1", "experiment 2 excites r2",
                      f"a2 {np.sqrt(np.mean(u[..., 1] ** 2)):.4g} N", "wrote run.h5"):
             self.assertIn(text, shown)
-        told = json.loads(self.succeed("import", "x.npz", "-o", "run.h5", "--map", "map.yaml", "--json").stdout)
+        told = self.told("import", "x.npz", "-o", "run.h5", "--map", "map.yaml")
         self.assertEqual((told["runs"], told["realizations"], told["experiments"], told["periods"], told["sample_rate_hz"],
                           told["duration_s"], told["excited"][1]["excites"]), (6, 3, 2, 4, 100.0, 12.0, ["r2"]))
         np.testing.assert_allclose([c["rms"] for c in told["sensors"]], np.sqrt(np.mean(y**2, axis=(0, 1, 2))), rtol=1e-12)
 
     def test_of_a_frequency_response(self):
-        told = json.loads(self.succeed("import", self.frf(), "-o", "back.h5", "--json").stdout)
+        told = self.told("import", self.frf(), "-o", "back.h5")
         frequency_hz = content("frf.h5")["frequency_hz"]
         self.assertEqual((told["lines"], told["band_hz"]), (len(frequency_hz), [frequency_hz[0], frequency_hz[-1]]))
         rms = np.sqrt(np.mean(abs(content("frf.h5")["response"]) ** 2, axis=0))
@@ -296,5 +293,4 @@ class Frequencies(Case):
 
 
 if __name__ == "__main__":
-    sys.argv = sys.argv[:1] + sys.argv[3:]
-    unittest.main()
+    run_tests()

@@ -10,11 +10,10 @@ import json
 import shutil
 import subprocess
 import sys
-import unittest
 
 import numpy as np
 
-from exchange_test import MODEL, WORK, Case, content
+from exchange_test import MODEL, WORK, Case, content, run_tests
 
 OCTAVE = shutil.which("octave-cli")
 
@@ -42,7 +41,7 @@ class Octave(Case):
     def export_model(self, *names):
         (WORK / "model.json").write_text(json.dumps(MODEL))
         for name in names:
-            self.succeed("export", "model.json", "-o", name, *(["--mat-version", "7.3"] if "73" in name else []))
+            self.exports("model.json", name, flags=["--mat-version", "7.3"] if "73" in name else ())
 
     def test_runs_the_function_that_holds_the_model(self):
         self.export_model("m.m", "m.mat")
@@ -59,13 +58,13 @@ class Octave(Case):
 
     def test_loads_frequency_responses_to_the_bit(self):
         frf = self.frf()
-        self.succeed("export", frf, "-o", "f.mat")
-        self.succeed("export", frf, "-o", "f73.mat", "--mat-version", "7.3")
+        self.exports(frf, "f.mat")
+        self.exports(frf, "f73.mat", flags=["--mat-version", "7.3"])
         self.same(frf, ("f.mat", "f73.mat"), ("response", "noise_variance", "frequency_hz"))
 
     def test_what_it_saves_is_imported_to_the_bit(self):
         frf = self.frf()
-        self.succeed("export", frf, "-o", "f.mat")
+        self.exports(frf, "f.mat")
         self.octave("load f.mat; f = frequency_hz; G = response;"
                     "save -v6 v6.mat f G; save -v7 v7.mat f G; save own.mat f G; save -hdf5 h5.mat f G;")
         for file in ("v6.mat", "v7.mat"):
@@ -81,5 +80,4 @@ if __name__ == "__main__":
     if OCTAVE is None:
         print("no octave-cli; apt-get install octave")
         sys.exit(77)
-    sys.argv = sys.argv[:1] + sys.argv[3:]
-    unittest.main()
+    run_tests()

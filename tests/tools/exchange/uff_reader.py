@@ -16,29 +16,35 @@ def fields(line, widths):
     return out
 
 
+class File:
+    """The lines of a file, and the bytes between them."""
+
+    def __init__(self, path):
+        self.data, self.at = path.read_bytes(), 0
+
+    def bytes(self, size):
+        self.at += size
+        return self.data[self.at - size:self.at]
+
+    def line(self):
+        return self.bytes(self.data.index(b"\n", self.at) + 1 - self.at)[:-1].decode()
+
+
 def read(path):
     """A list of datasets: dictionaries with key "dataset" and what the dataset holds."""
-    data, at, found = path.read_bytes(), 0, []
-
-    def line():
-        nonlocal at
-        end = data.index(b"\n", at)
-        text = data[at:end].decode()
-        at = end + 1
-        return text
-
-    while at < len(data):
+    file, found = File(path), []
+    line = file.line
+    while file.at < len(file.data):
         assert line() == "    -1"
         head = line()
         number = int(head[:6])
         dataset = {"dataset": number}
-        if number == 58:
-            read_function(data, at, line, head, dataset)
-            at = dataset.pop("end")
-        elif number == 55:
+        found.append(dataset)
+        if number == 55:
             read_mode(line, dataset)
-            found.append(dataset)
             continue
+        if number == 58:
+            read_function(file, head, dataset)
         elif number == 164:
             dataset["code"] = int(line()[:10])
             dataset["factors"] = [float(x.replace("D", "E")) for x in fields(line(), [25, 25, 25])]
@@ -46,11 +52,11 @@ def read(path):
         else:
             dataset["lines"] = [line() for _ in range(7)]
         assert line() == "    -1", dataset
-        found.append(dataset)
     return found
 
 
-def read_function(data, at, line, head, out):
+def read_function(file, head, out):
+    line = file.line
     out["binary"] = head[6:7] == "b"
     out["id"] = [line().rstrip() for _ in range(5)]
     record = fields(line(), [5, 10, 5, 10, 1, 10, 10, 4, 1, 10, 10, 4])
@@ -58,7 +64,6 @@ def read_function(data, at, line, head, out):
     form = fields(line(), [10, 10, 10, 13, 13, 13])
     kind, count, even = int(form[0]), int(form[1]), int(form[2])
     out["axes"] = [fields(line(), [10, 5, 5, 5, 1, 20, 1, 20]) for _ in range(4)]
-    here = position(data, at, 11)
     widths = ([] if even else [13]) + TEXT_WIDTHS[kind]
     if out["binary"]:
         order, floating, lines, size = [int(x) for x in fields(head[7:], [6, 6, 12, 12])]
@@ -66,28 +71,19 @@ def read_function(data, at, line, head, out):
         # Abscissas of double precision, as most readers take them; the format has "f".
         code = "<" + ("" if even else "d") + BINARY_CODES[kind]
         assert struct.calcsize(code) * count == size
-        table = np.array(list(struct.iter_unpack(code, data[here:here + size])))
-        out["end"] = here + size
+        table = np.array(list(struct.iter_unpack(code, file.bytes(size))))
     else:
         values = []
         while len(values) < count * len(widths):
-            end = data.index(b"\n", here)
-            text, here = data[here:end].decode(), end + 1
+            text = line()
             while text:
                 width = widths[len(values) % len(widths)]
                 values.append(float(text[:width]))
                 text = text[width:]
         table = np.array(values).reshape(count, -1)
-        out["end"] = here
     out["x"] = float(form[3]) + float(form[4]) * np.arange(count) if even else table[:, 0]
     ordinate = table if even else table[:, 1:]
     out["y"] = ordinate[:, 0] if kind in (2, 4) else ordinate[:, 0] + 1j * ordinate[:, 1]
-
-
-def position(data, at, lines):
-    for _ in range(lines):
-        at = data.index(b"\n", at) + 1
-    return at
 
 
 def read_mode(line, out):
