@@ -4,11 +4,10 @@
 import subprocess
 import sys
 import types
-import unittest
 from html.parser import HTMLParser
 from unittest import mock
 
-from experiment import CONFIG, PACKAGES, WORK, run_tests, setUpModule
+from experiment import CONFIG, PACKAGES, WORK, Case, run_tests, setUpModule
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class Tags(HTMLParser):
         self.text.append(data)
 
 
-class Display(unittest.TestCase):
+class Display(Case):
     def shows(self, thing, text, *in_notebook):
         self.assertRegex(repr(thing), text)
         self.assertNotIn("\n", repr(thing))
@@ -45,14 +44,12 @@ class Display(unittest.TestCase):
                 self.assertIn(word, html)
 
     def test_logs(self):
-        self.shows(stageid.read_log(WORK / "run.slog"),
-                   "^<Log 9 runs, 3 complete realizations, 3 actuators, 2 sensors, 2000 Hz>$",
+        self.shows(self.log, "^<Log 9 runs, 3 complete realizations, 3 actuators, 2 sensors, 2000 Hz>$",
                    "a1 (N)", "1, 2, 3", "500 samples, 0.25 s")
         self.shows(stageid.simulate(CONFIG)[4], "^<Run of realization 2, experiment 2, 2500 samples>$")
 
     def test_responses(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        self.shows(frf, "^<Frf 2 x 3, [0-9]+ lines, 16 to 800 Hz, noise and total variance>$", "a3 (N)", "2000 Hz")
+        self.shows(self.frf, "^<Frf 2 x 3, [0-9]+ lines, 16 to 800 Hz, noise and total variance>$", "a3 (N)", "2000 Hz")
         one = stageid.Frf([50.0], [[[1j]]], inputs=["<in & out>"])
         self.shows(one, "^<Frf 1 x 1, 1 line, 50 to 50 Hz, no variance>$", "<in & out>")
 
@@ -64,14 +61,14 @@ class Display(unittest.TestCase):
         self.shows(fit, f"^<Fit trustworthy, {fit.status}, cost [0-9.]+, {modes} modes>$", last, fit.decisions[0])
 
     def test_results(self):
-        model, frf = stageid.read_model(WORK / "model.json"), stageid.read_frf(WORK / "frf.h5")
-        self.shows(model.modes()[0], "^<Mode [0-9.]+ Hz, damping ratio 0.0[0-9]+>$")
-        self.shows(model.submodels[0], "^<Submodel of order [0-9], ")
-        self.shows(stageid.validate(model, frf), "^<Validation: relative error .*, chi-square .* explained>$")
-        self.shows(model.sampled_state_space(), "^<SampledStateSpace 2 x 3, [0-9]+ states, 2000 Hz, delays up to [0-9]")
+        self.shows(self.model.modes()[0], "^<Mode [0-9.]+ Hz, damping ratio 0.0[0-9]+>$")
+        self.shows(self.model.submodels[0], "^<Submodel of order [0-9], ")
+        self.shows(stageid.validate(self.model, self.frf), "^<Validation: relative error .*, chi-square .* explained>$")
+        self.shows(self.model.sampled_state_space(),
+                   "^<SampledStateSpace 2 x 3, [0-9]+ states, 2000 Hz, delays up to [0-9]")
 
 
-class OtherPackages(unittest.TestCase):
+class OtherPackages(Case):
     def test_they_are_imported_only_when_asked_for(self):
         code = "import stageid, sys; print({'xarray', 'control', 'scipy'} & sys.modules.keys())"
         done = subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": str(PACKAGES)}, capture_output=True,
@@ -79,21 +76,19 @@ class OtherPackages(unittest.TestCase):
         self.assertEqual(done.stdout.strip(), "set()")
 
     def test_a_package_that_is_missing(self):
-        frf, model = stageid.read_frf(WORK / "frf.h5"), stageid.read_model(WORK / "model.json")
-        for name, method in (("xarray", frf.to_xarray), ("control", model.to_control)):
+        for name, method in (("xarray", self.frf.to_xarray), ("control", self.model.to_control)):
             with mock.patch.dict(sys.modules, {name: None}), \
                  self.assertRaisesRegex(ImportError, f"requires the package {name}: pip install {name}"):
                 method()
 
     def test_xarray(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        data = frf.to_xarray()
+        data = self.frf.to_xarray()
         self.assertEqual(data.response.dims, ("frequency", "output", "input"))
-        self.assertTrue(np.shares_memory(data.response.values, frf.response))
-        at = data.response.sel(output=frf.outputs[1], input="a3").sel(frequency=201.0, method="nearest")
-        self.assertEqual(at.item(), frf.response[np.argmin(np.abs(frf.frequency_hz - 201.0)), 1, 2])
-        np.testing.assert_array_equal(data.noise_variance, frf.noise_variance)
-        self.assertEqual(data.noise_variance.attrs, {"units": "(m/N)^2", "degrees_of_freedom": frf.noise_dof})
+        self.assertTrue(np.shares_memory(data.response.values, self.frf.response))
+        at = data.response.sel(output=self.frf.outputs[1], input="a3").sel(frequency=201.0, method="nearest")
+        self.assertEqual(at.item(), self.frf.response[np.argmin(np.abs(self.frf.frequency_hz - 201.0)), 1, 2])
+        np.testing.assert_array_equal(data.noise_variance, self.frf.noise_variance)
+        self.assertEqual(data.noise_variance.attrs, {"units": "(m/N)^2", "degrees_of_freedom": self.frf.noise_dof})
         self.assertEqual((data.response.units, data.frequency.units, data.attrs["sample_rate_hz"], data.attrs["hold"]),
                          ("m/N", "Hz", 2000.0, "zoh"))
         self.assertEqual(list(data.input_unit.values), ["N"] * 3)
@@ -105,19 +100,19 @@ class OtherPackages(unittest.TestCase):
         """control.ss() is called with what the package takes, here by a recorder in its place."""
         recorder = types.ModuleType("control")
         recorder.ss = lambda *words, **names: (words, names)
-        model = stageid.read_model(WORK / "model.json")
-        sampled = model.sampled_state_space()
+        sampled = self.model.sampled_state_space()
         with mock.patch.dict(sys.modules, {"control": recorder}):
             for options in ({}, {"sampled": True}):
-                (*system, step), names = model.to_control(**options)
-                self.assertEqual((step, names), (1 / 2000, {"inputs": model.inputs, "outputs": model.outputs}))
+                (*system, step), names = self.model.to_control(**options)
+                self.assertEqual((step, names),
+                                 (1 / 2000, {"inputs": self.model.inputs, "outputs": self.model.outputs}))
                 for given, expected in zip(system, sampled.with_delays(), strict=True):
                     np.testing.assert_array_equal(given, expected)
-            continuous, _ = model.to_control(sampled=False)
-            for given, expected in zip(continuous, model.state_space(), strict=True):
+            continuous, _ = self.model.to_control(sampled=False)
+            for given, expected in zip(continuous, self.model.state_space(), strict=True):
                 np.testing.assert_array_equal(given, expected)
-            frf = stageid.read_frf(WORK / "frf.h5")
-            no_rate = stageid.fit(stageid.Frf(frf.frequency_hz, frf.response), band_hz=(120, 800), modes=1).model
+            bare = stageid.Frf(self.frf.frequency_hz, self.frf.response)
+            no_rate = stageid.fit(bare, band_hz=(120, 800), modes=1).model
             self.assertEqual(len(no_rate.to_control()[0]), 4)
             self.assertRaisesRegex(stageid.RequestError, "rate", no_rate.to_control, sampled=True)
 

@@ -5,9 +5,8 @@ import os
 import shutil
 import signal
 import threading
-import unittest
 
-from experiment import CONFIG, WORK, run_tests, setUpModule
+from experiment import CONFIG, WORK, Case, run_tests, setUpModule
 
 import h5py
 import numpy as np
@@ -17,11 +16,7 @@ import stageid
 RATE_HZ = 2000.0
 
 
-def arrays():
-    return stageid.read_log(WORK / "run.slog").arrays()
-
-
-class Refused(unittest.TestCase):
+class Refused(Case):
     def refuses(self, error, text, function, *words, **options):
         with self.assertRaisesRegex(error, text) as caught:
             function(*words, **options)
@@ -42,15 +37,12 @@ class Refused(unittest.TestCase):
                      stageid.simulate):
             self.refuses(stageid.FileError, "none", read, WORK / "none.h5")
             self.refuses(stageid.FormatError, "wrong", read, WORK / "wrong")
-        self.refuses(stageid.FileError, "n.h5", stageid.write_frf, WORK / "no" / "n.h5",
-                     stageid.read_frf(WORK / "frf.h5"))
-        self.refuses(stageid.FileError, "n.json", stageid.read_model(WORK / "model.json").save,
-                     WORK / "no" / "n.json")
+        self.refuses(stageid.FileError, "n.h5", stageid.write_frf, WORK / "no" / "n.h5", self.frf)
+        self.refuses(stageid.FileError, "n.json", self.model.save, WORK / "no" / "n.json")
         self.assertFalse((WORK / "no").exists())
 
     def test_endings(self):
-        for name, written in (("x.h5", stageid.read_model(WORK / "model.json").save),
-                              ("w.csv", lambda file: stageid.write_frf(file, stageid.read_frf(WORK / "frf.h5")))):
+        for name, written in (("x.h5", self.model.save), ("w.csv", lambda file: stageid.write_frf(file, self.frf))):
             self.refuses_request(f"{name}: a .* is written as", written, WORK / name)
             self.assertFalse((WORK / name).exists())
 
@@ -60,27 +52,24 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.FormatError, "frf.h5", stageid.call, "validate", WORK / "frf.h5", WORK / "frf.h5")
 
     def test_words(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        log = stageid.read_log(WORK / "run.slog")
-        for function, given, option in (
-                (stageid.frf, log, "method"), (stageid.frf, log, "covariance"), (stageid.frf, log, "periods"), (stageid.fit, frf, "hold"),
-                (stageid.fit, frf, "weighting"), (stageid.fit, frf, "delay"),
-                (stageid.fit, frf, "method"), (stageid.fit, frf, "damping"), (stageid.fit, frf, "rigid_body"),
-                (stageid.modes, frf, "kind"), (stageid.cmif, frf, "kind")):
-            with self.subTest(function=function.__name__, option=option):
-                self.refuses_request("wurst", function, given, **{option: "wurst"})
-        self.refuses_request("modes", stageid.fit, frf, modes=[-5.0])
-        self.refuses_request("wurst", frf.compensate, "wurst", 0.0)
-        self.refuses_request("wurst", frf.confidence_radius, 0.95, "wurst")
-        self.refuses_request("level", frf.confidence_radius, 1.5)
+        for function, given, options in (
+                (stageid.frf, self.log, "method covariance periods"), (stageid.modes, self.frf, "kind"),
+                (stageid.cmif, self.frf, "kind"),
+                (stageid.fit, self.frf, "hold weighting delay method damping rigid_body")):
+            for option in options.split():
+                with self.subTest(function=function.__name__, option=option):
+                    self.refuses_request("wurst", function, given, **{option: "wurst"})
+        self.refuses_request("modes", stageid.fit, self.frf, modes=[-5.0])
+        self.refuses_request("wurst", self.frf.compensate, "wurst", 0.0)
+        self.refuses_request("wurst", self.frf.confidence_radius, 0.95, "wurst")
+        self.refuses_request("level", self.frf.confidence_radius, 1.5)
         self.refuses_request("wurst", stageid.multisine, 1000.0, 500, 10.0, 100.0, 1.0, 7, lines="wurst")
 
     def test_numbers(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
         self.refuses_request("level", stageid.multisine, 1000.0, 500, 10.0, 100.0, -1.0, 7)
-        self.refuses_request("", frf.select, band_hz=(900.0, 950.0))
-        self.refuses_request("inputs: unknown input 'A1'; did you mean 'a1'", frf.select, inputs=["A1"])
-        self.refuses_request("outputs: unknown output 'velocity'; available:", frf.select, outputs=["velocity"])
+        self.refuses_request("", self.frf.select, band_hz=(900.0, 950.0))
+        self.refuses_request("inputs: unknown input 'A1'; did you mean 'a1'", self.frf.select, inputs=["A1"])
+        self.refuses_request("outputs: unknown output 'velocity'; available:", self.frf.select, outputs=["velocity"])
         self.refuses(stageid.RequestError,
                      r"run.slog: realization 9 has no complete run; those with one are 1, 2, 3 \(counted from 1\)",
                      stageid.frf, WORK / "run.slog", realizations=[9])
@@ -89,18 +78,17 @@ class Refused(unittest.TestCase):
             self.refuses_request(f"{option}: empty list", stageid.frf, WORK / "run.slog", **{option: []})
         self.refuses_request("covariance_lines|odd", stageid.frf, WORK / "run.slog", covariance_lines=2)
         self.refuses(stageid.FileError, "no.yaml", stageid.frf, WORK / "run.slog", stage=WORK / "no.yaml")
-        self.refuses_request("max_iterations", stageid.fit, frf, max_iterations=0)
-        self.refuses_request("", stageid.stabilization, frf, most_order=1000)
-        self.refuses_request("", frf.compensate("delay", 0.0).compensate, "delay", 0.0)
-        model = stageid.read_model(WORK / "model.json")
-        self.refuses_request("", model.response, [1500.0])
-        self.refuses_request("frequency_hz: .*finite", model.response, [100.0, np.nan])
-        self.refuses_request("frequency_hz: .*axes", model.response, [[100.0, 200.0]])
-        self.refuses_request("", stageid.validate, model, frf.select(inputs=["a1"]))
-        no_rate = stageid.fit(stageid.Frf(frf.frequency_hz, frf.response), band_hz=(120, 800), modes=1).model
+        self.refuses_request("max_iterations", stageid.fit, self.frf, max_iterations=0)
+        self.refuses_request("", stageid.stabilization, self.frf, most_order=1000)
+        self.refuses_request("", self.frf.compensate("delay", 0.0).compensate, "delay", 0.0)
+        self.refuses_request("", self.model.response, [1500.0])
+        self.refuses_request("frequency_hz: .*finite", self.model.response, [100.0, np.nan])
+        self.refuses_request("frequency_hz: .*axes", self.model.response, [[100.0, 200.0]])
+        self.refuses_request("", stageid.validate, self.model, self.frf.select(inputs=["a1"]))
+        no_rate = stageid.fit(stageid.Frf(self.frf.frequency_hz, self.frf.response), band_hz=(120, 800), modes=1).model
         self.refuses_request("rate", no_rate.sampled_state_space)
-        self.refuses_request("", stageid.pair_modes, model, stageid.fit(
-            frf.select(inputs=["a1"]), band_hz=(120, 800), modes=1).model)
+        self.refuses_request("", stageid.pair_modes, self.model, stageid.fit(
+            self.frf.select(inputs=["a1"]), band_hz=(120, 800), modes=1).model)
 
     def test_responses_of_arrays(self):
         f, G = np.arange(1.0, 4.0), np.ones((3, 2, 2), complex)
@@ -120,16 +108,16 @@ class Refused(unittest.TestCase):
         for name in ("noise_variance", "total_variance"):
             self.refuses_request(f"{name}: .*complex", stageid.Frf, f, G, **{name: G})
         self.refuses_request("frequency_hz: .*complex", stageid.Frf, f + 1j, G)
-        self.refuses_request("frequency_hz: .*complex", stageid.read_model(WORK / "model.json").response, [100.0 + 1j])
+        self.refuses_request("frequency_hz: .*complex", self.model.response, [100.0 + 1j])
         self.refuses_request("shape: .*complex", stageid.multisine, 1000.0, 500, 10.0, 100.0, 1.0, 7, shape=np.ones(46, complex))
-        given = dict(zip("ruy", arrays()))
+        given = dict(zip("ruy", self.log.arrays()))
         for name in given:
             self.refuses_request(f"{name}: .*complex", stageid.Log,
                          **{**given, name: given[name] + 0j}, sample_rate_hz=RATE_HZ)
             self.assertRaises(TypeError, stageid.Log, **{**given, name: "text"}, sample_rate_hz=RATE_HZ)
 
     def test_logs_of_arrays(self):
-        r, u, y = arrays()
+        r, u, y = self.log.arrays()
         for given, text in (((r[0], u, y), "excitation.*axes|excitation.*x"), ((r, u[..., 0], y), "actuators"),
                             ((r[:1], u, y), "excitation"), ((r, u[:, :1], y), "actuators"),
                             ((r, u[:, :, 1:], y), "actuators"), ((np.full_like(r, np.inf), u, y), "realization 1, experiment 1 .*finite"),
@@ -145,17 +133,16 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.FormatError, "periods", stageid.Log, r, u[:, :, 1:], y[:, :, 1:], sample_rate_hz=RATE_HZ)
 
     def test_a_sample_that_is_no_number(self):
-        r, u, y = arrays()
+        r, u, y = self.log.arrays()
         y = y.copy()
         y[1, 2, 1234, 1] = np.nan
         log = stageid.Log(r, u, y, sample_rate_hz=RATE_HZ, sensors=["left", "right"])
         self.refuses(stageid.FormatError, "runs/0005.*row 1234 of sensor 'right'", stageid.frf, log)
 
     def test_runs(self):
-        log = stageid.read_log(WORK / "run.slog")
-        self.assertEqual(log[-1].experiment, 3)
-        self.assertRaises(IndexError, lambda: log[9])
-        self.assertRaises(IndexError, lambda: log[-10])
+        self.assertEqual(self.log[-1].experiment, 3)
+        self.assertRaises(IndexError, lambda: self.log[9])
+        self.assertRaises(IndexError, lambda: self.log[-10])
         self.assertRaises(TypeError, stageid.frf, 5)
         self.assertRaises(TypeError, stageid.fit, 5)
         shutil.copy(WORK / "run.h5", WORK / "gap.h5")
@@ -171,7 +158,7 @@ class Refused(unittest.TestCase):
         self.refuses(stageid.StageError, "stopped.yaml: .*limit", stageid.simulate, WORK / "stopped.yaml")
 
 
-class Interrupted(unittest.TestCase):
+class Interrupted(Case):
     def interrupts(self, function, *words):
         """The signal comes from another thread of Python: it runs while the call works."""
         timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))

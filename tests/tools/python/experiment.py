@@ -30,6 +30,16 @@ def setUpModule():
     program("fit", "frf.h5", "-o", "model.json", "--band", "120", "800")
 
 
+class Case(unittest.TestCase):
+    """A test of the package with the log, the response and the model of the program, each read again."""
+
+    def setUp(self):
+        import stageid
+        self.log = stageid.read_log(WORK / "run.slog")
+        self.frf = stageid.read_frf(WORK / "frf.h5")
+        self.model = stageid.read_model(WORK / "model.json")
+
+
 def file_bytes(result):
     """The content of the file that a response or a model is written as."""
     import stageid

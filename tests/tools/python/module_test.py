@@ -5,9 +5,8 @@ import dataclasses
 import json
 import shutil
 import subprocess
-import unittest
 
-from experiment import CONFIG, PROGRAM, WORK, file_bytes, program, run_tests, setUpModule
+from experiment import CONFIG, PROGRAM, WORK, Case, file_bytes, program, run_tests, setUpModule
 
 import h5py
 import numpy as np
@@ -28,7 +27,7 @@ def as_json(result, without=None):
     return {key: "" if value is None else value for key, value in vars(result).items() if key != without}
 
 
-class SameAsTheProgram(unittest.TestCase):
+class SameAsTheProgram(Case):
     def assert_same_frf(self, frf, file):
         with h5py.File(WORK / file) as h5:
             for name in ("frequency_hz", "response", "noise_variance", "total_variance"):
@@ -57,7 +56,7 @@ class SameAsTheProgram(unittest.TestCase):
         for log in ("run.slog", "run.h5"):
             program("frf", log, "-o", "program.h5")
             self.assert_same_file(stageid.frf(WORK / log), "program.h5")
-        self.assert_same_file(stageid.frf([stageid.read_log(WORK / "run.slog")], threads=1), "frf.h5")
+        self.assert_same_file(stageid.frf([self.log], threads=1), "frf.h5")
 
     def test_a_response_with_options(self):
         program("frf", "run.slog", "-o", "options.h5", "--realizations", "1,3", "--inputs", "a2,a1",
@@ -111,7 +110,7 @@ class SameAsTheProgram(unittest.TestCase):
         np.testing.assert_array_equal(without.response, expected.response)
 
     def test_any_number_but_zero_marks_a_sample(self):
-        r, u, y = stageid.read_log(WORK / "run.slog").arrays()
+        r, u, y = self.log.arrays()
         marked = np.zeros(u.shape[:3])
         marked[:, :, 7] = 1
         for flags in (marked != 0, 256 * marked.astype(int), 0.5 * marked, -marked, np.nan * marked == 0, marked.tolist()):
@@ -121,7 +120,7 @@ class SameAsTheProgram(unittest.TestCase):
 
     def test_a_fit_of_a_file(self):
         self.assert_same_file(stageid.fit(WORK / "frf.h5", band_hz=BAND).model, "model.json")
-        self.assert_same_file(stageid.fit(stageid.read_frf(WORK / "frf.h5"), band_hz=BAND, threads=1).model, "model.json")
+        self.assert_same_file(stageid.fit(self.frf, band_hz=BAND, threads=1).model, "model.json")
 
     def test_a_fit_with_options(self):
         code = program("fit", "frf.h5", "-o", "options.json", "--modes", "150.5,310", "--delay", "0.0003",
@@ -144,11 +143,10 @@ class SameAsTheProgram(unittest.TestCase):
                     self.assertEqual(cost(**{name: number}), cost(**{name: plain}))
 
     def test_a_fit_without_any_file(self):
-        program_model = stageid.read_model(WORK / "model.json")
         model = stageid.fit(stageid.frf(stageid.simulate(CONFIG)), band_hz=BAND).model
         f = np.linspace(*BAND, 50)
-        np.testing.assert_array_equal(model.response(f), program_model.response(f))
-        for ours, theirs in zip(model.submodels, program_model.submodels):
+        np.testing.assert_array_equal(model.response(f), self.model.response(f))
+        for ours, theirs in zip(model.submodels, self.model.submodels):
             np.testing.assert_array_equal(ours.denominator, theirs.denominator)
             np.testing.assert_array_equal(ours.numerator, theirs.numerator)
 
@@ -173,56 +171,51 @@ class SameAsTheProgram(unittest.TestCase):
 
     def test_candidate_modes(self):
         program("modes", "frf.h5", "-o", "modes.json", "--band", *BAND)
-        found = stageid.modes(stageid.read_frf(WORK / "frf.h5").select(band_hz=BAND))
+        found = stageid.modes(self.frf.select(band_hz=BAND))
         self.assertEqual([as_json(mode) for mode in found], json.loads((WORK / "modes.json").read_text())["modes"])
 
     def test_validation(self):
         done = json.loads(subprocess.run([PROGRAM, "--json", "validate", "model.json", "frf.h5"], cwd=WORK,
                                          capture_output=True, check=True).stdout)
-        ours = stageid.validate(stageid.read_model(WORK / "model.json"), stageid.read_frf(WORK / "frf.h5"))
+        ours = stageid.validate(self.model, self.frf)
         theirs = done["frequency_domain"]
         np.testing.assert_array_equal(ours.channel_error.ravel("F"), theirs.pop("channel_error"))
         self.assertEqual(as_json(ours, without="channel_error"), theirs)
 
     def test_a_model_that_leaves_more_than_noise(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        fit = stageid.fit(frf, band_hz=BAND, modes=1)
+        fit = stageid.fit(self.frf, band_hz=BAND, modes=1)
         self.assertEqual((fit.trustworthy, fit.status), (False, "unexplained"))
-        found = stageid.validate(fit.model, frf)
+        found = stageid.validate(fit.model, self.frf)
         self.assertIs(found.explained, False)
         self.assertRegex(found.reason, "^the residual is ")
 
     def test_a_validation_without_variances(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        bare = stageid.Frf(frf.frequency_hz, frf.response, inputs=frf.inputs, outputs=frf.outputs,
-                           sample_rate_hz=frf.sample_rate_hz, hold=frf.hold)
-        model = stageid.read_model(WORK / "model.json")
-        found = stageid.validate(model, bare)
+        bare = stageid.Frf(self.frf.frequency_hz, self.frf.response, inputs=self.frf.inputs, outputs=self.frf.outputs,
+                           sample_rate_hz=self.frf.sample_rate_hz, hold=self.frf.hold)
+        found = stageid.validate(self.model, bare)
         self.assertEqual(found.variance, "scatter")
         self.assertTrue(found.explained and 0.5 < found.chi_square_per_dof < 2)
-        found = stageid.validate(model, bare.select(band_hz=(100.0, 140.0)))  # too few lines for a scatter
+        found = stageid.validate(self.model, bare.select(band_hz=(100.0, 140.0)))  # too few lines for a scatter
         for name in ("variance", "chi_square_per_dof", "expected_chi_square", "reason", "whitened_above_95",
                      "whiteness", "whiteness_limit"):
             self.assertIsNone(getattr(found, name), name)
         self.assertTrue(found.explained and found.relative_rms_error < 1)
 
 
-class Values(unittest.TestCase):
+class Values(Case):
     def test_files_as_arrays(self):
         with h5py.File(WORK / "run.h5") as h5:
-            runs = stageid.read_log(WORK / "run.slog")
-            self.assertEqual(len(runs), len(h5["runs"]))
-            for run, name in zip(runs, h5["runs"]):
+            self.assertEqual(len(self.log), len(h5["runs"]))
+            for run, name in zip(self.log, h5["runs"]):
                 for group in ("excitation", "actuators", "sensors"):
                     np.testing.assert_array_equal(getattr(run, group), h5[f"runs/{name}/{group}"][()])
 
     def test_realizations_are_counted_from_1(self):
-        log = stageid.read_log(WORK / "run.slog")
-        self.assertEqual(log.realizations, [1, 2, 3])
-        self.assertEqual([(run.realization, run.experiment) for run in log],
+        self.assertEqual(self.log.realizations, [1, 2, 3])
+        self.assertEqual([(run.realization, run.experiment) for run in self.log],
                          [(m, e) for m in (1, 2, 3) for e in (1, 2, 3)])
-        r, u, y = log.arrays()
-        np.testing.assert_array_equal(log[4].sensors, y[1, 1])
+        r, u, y = self.log.arrays()
+        np.testing.assert_array_equal(self.log[4].sensors, y[1, 1])
 
     def test_what_is_absent_is_none(self):
         frf = stageid.Frf([100.0, 200.0], np.ones((2, 1, 2), complex), input_units=["N", None])
@@ -230,7 +223,7 @@ class Values(unittest.TestCase):
                      "delay_s"):
             self.assertIsNone(getattr(frf, name), name)
         self.assertEqual((frf.input_units, frf.output_units), (["N", None], [None]))
-        compensated = stageid.read_frf(WORK / "frf.h5").compensate("delay", 1e-4)
+        compensated = self.frf.compensate("delay", 1e-4)
         self.assertEqual((compensated.compensated, compensated.delay_s), ("delay", 1e-4))
         model = stageid.fit(stageid.Frf(compensated.frequency_hz, compensated.response), band_hz=BAND, modes=1).model
         self.assertEqual((model.sample_rate_hz, model.input_delay_std_s), (None, None))
@@ -238,8 +231,7 @@ class Values(unittest.TestCase):
 
     def test_delays_as_states(self):
         """The response of the state space with its delays is that of the model at the samples."""
-        model = stageid.read_model(WORK / "model.json")
-        sampled = model.sampled_state_space()
+        sampled = self.model.sampled_state_space()
         shifted = dataclasses.replace(sampled, input_delay_samples=np.array([3, 0, 1]),
                                       output_delay_samples=np.array([0, 2]))
         A, B, C, D = shifted.with_delays()
@@ -252,39 +244,36 @@ class Values(unittest.TestCase):
             expected = zk ** -np.array([[0.0], [2.0]]) * system * zk ** -np.array([3.0, 0.0, 1.0])
             np.testing.assert_allclose(C @ np.linalg.solve(zk * np.eye(len(A)) - A, B) + D, expected, rtol=1e-8)
             whole = zk ** -np.add.outer(sampled.output_delay_samples, sampled.input_delay_samples).astype(float) * system
-            np.testing.assert_allclose(whole, model.response(f)[k], rtol=1e-6)
+            np.testing.assert_allclose(whole, self.model.response(f)[k], rtol=1e-6)
         early = dataclasses.replace(sampled, input_delay_samples=np.array([-1, 0, 0]))
         self.assertRaisesRegex(stageid.RequestError, "negative delay", early.with_delays)
 
     def test_a_model(self):
-        model = stageid.read_model(WORK / "model.json")
         program("export", "model.json", "-o", "model.h5")
         with h5py.File(WORK / "model.h5") as h5:
-            np.testing.assert_array_equal(model.response(h5["frequency_hz"][()]), h5["response"][()])
-            sampled = model.sampled_state_space()
-            self.assertEqual(sampled.sample_rate_hz, model.sample_rate_hz)
-            for kind, system in (("continuous", model.state_space()), ("discrete", sampled.system)):
+            np.testing.assert_array_equal(self.model.response(h5["frequency_hz"][()]), h5["response"][()])
+            sampled = self.model.sampled_state_space()
+            self.assertEqual(sampled.sample_rate_hz, self.model.sample_rate_hz)
+            for kind, system in (("continuous", self.model.state_space()), ("discrete", sampled.system)):
                 for given, name in zip(system, "ABCD"):
                     np.testing.assert_array_equal(given, h5[f"state_space/{kind}/{name}"][()])
-            np.testing.assert_array_equal([m.modal_mass for m in model.modes()], h5["modes/modal_mass"][()])
-        model.save(WORK / "saved.json")
-        self.assertEqual(stageid.read_model(WORK / "saved.json").outputs, model.outputs)
+            np.testing.assert_array_equal([m.modal_mass for m in self.model.modes()], h5["modes/modal_mass"][()])
+        self.model.save(WORK / "saved.json")
+        self.assertEqual(stageid.read_model(WORK / "saved.json").outputs, self.model.outputs)
 
     def test_a_model_at_one_frequency_and_at_none(self):
-        model = stageid.read_model(WORK / "model.json")
-        n_y, n_u = len(model.outputs), len(model.inputs)
+        n_y, n_u = len(self.model.outputs), len(self.model.inputs)
         for none in ([], np.empty(0)):
-            response = model.response(none)
+            response = self.model.response(none)
             self.assertEqual((response.shape, response.dtype), ((0, n_y, n_u), np.complex128))
         for one in (200.0, 200, np.float32(200.0)):
-            np.testing.assert_array_equal(model.response(one), model.response([200.0]))
-        np.testing.assert_array_equal(model.response(np.arange(100.0, 200.0)[::2]),
-                                      model.response(np.arange(100.0, 200.0, 2.0)))
+            np.testing.assert_array_equal(self.model.response(one), self.model.response([200.0]))
+        np.testing.assert_array_equal(self.model.response(np.arange(100.0, 200.0)[::2]),
+                                      self.model.response(np.arange(100.0, 200.0, 2.0)))
 
     def test_a_model_is_paired_with_itself(self):
-        model = stageid.read_model(WORK / "model.json")
-        pairs = stageid.pair_modes(model, model)
-        self.assertEqual([p.first for p in pairs], list(range(len(model.modes()))))
+        pairs = stageid.pair_modes(self.model, self.model)
+        self.assertEqual([p.first for p in pairs], list(range(len(self.model.modes()))))
         for pair in pairs:
             self.assertEqual((pair.second, pair.frequency_difference), (pair.first, 0.0))
             self.assertAlmostEqual(pair.output_mac, 1.0, places=12)
@@ -301,40 +290,37 @@ class Values(unittest.TestCase):
         self.assertLess(np.max(np.abs(odd)), np.max(np.abs(flat)))
 
     def test_a_response_of_arrays(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        copy = stageid.Frf(frf.frequency_hz, frf.response, noise_variance=frf.noise_variance,
-                           noise_dof=frf.noise_dof, inputs=frf.inputs, outputs=frf.outputs,
-                           sample_rate_hz=frf.sample_rate_hz, hold=frf.hold)
-        np.testing.assert_array_equal(copy.response, frf.response)
-        np.testing.assert_array_equal(copy.noise_variance, frf.noise_variance)
+        copy = stageid.Frf(self.frf.frequency_hz, self.frf.response, noise_variance=self.frf.noise_variance,
+                           noise_dof=self.frf.noise_dof, inputs=self.frf.inputs, outputs=self.frf.outputs,
+                           sample_rate_hz=self.frf.sample_rate_hz, hold=self.frf.hold)
+        np.testing.assert_array_equal(copy.response, self.frf.response)
+        np.testing.assert_array_equal(copy.noise_variance, self.frf.noise_variance)
         self.assertIsNone(copy.total_variance)
         # F_{2, 2 nu} at 95 %, see confidence.hpp; scipy's F as the reference.
         from scipy.stats import f as f_distribution
-        quantile = f_distribution.ppf(0.95, 2, 2 * frf.noise_dof)
-        np.testing.assert_allclose(copy.confidence_radius(), np.sqrt(quantile * frf.noise_variance),
+        quantile = f_distribution.ppf(0.95, 2, 2 * self.frf.noise_dof)
+        np.testing.assert_allclose(copy.confidence_radius(), np.sqrt(quantile * self.frf.noise_variance),
                                    rtol=1e-10)
 
     def test_selection_and_compensation(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        some = frf.select(band_hz=(100, 200), inputs=["a3", "a1"], outputs=[frf.outputs[1]])
-        lines = (frf.frequency_hz >= 100) & (frf.frequency_hz <= 200)
-        np.testing.assert_array_equal(some.response, frf.response[lines][:, 1:2][:, :, [2, 0]])
-        T = 1 / frf.sample_rate_hz
-        w = 2 * np.pi * frf.frequency_hz[:, None, None]
-        expected = frf.response * np.exp(1j * w * (1e-4 + T / 2))
-        np.testing.assert_allclose(frf.compensate("delay", 1e-4).response, expected, rtol=1e-12)
+        some = self.frf.select(band_hz=(100, 200), inputs=["a3", "a1"], outputs=[self.frf.outputs[1]])
+        lines = (self.frf.frequency_hz >= 100) & (self.frf.frequency_hz <= 200)
+        np.testing.assert_array_equal(some.response, self.frf.response[lines][:, 1:2][:, :, [2, 0]])
+        T = 1 / self.frf.sample_rate_hz
+        w = 2 * np.pi * self.frf.frequency_hz[:, None, None]
+        expected = self.frf.response * np.exp(1j * w * (1e-4 + T / 2))
+        np.testing.assert_allclose(self.frf.compensate("delay", 1e-4).response, expected, rtol=1e-12)
 
     def test_mode_indicator(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        expected = np.linalg.svd(frf.response, compute_uv=False).T**2
+        expected = np.linalg.svd(self.frf.response, compute_uv=False).T**2
         # Squared singular values from G G^H: the small one loses the digits of its ratio to the large.
-        np.testing.assert_allclose(stageid.cmif(frf), expected, rtol=1e-9, atol=1e-13 * expected.max())
-        poles = stageid.stabilization(frf, most_order=20)
-        self.assertTrue(all(0 < p.frequency_hz <= frf.frequency_hz[-1] for p in poles))
+        np.testing.assert_allclose(stageid.cmif(self.frf), expected, rtol=1e-9, atol=1e-13 * expected.max())
+        poles = stageid.stabilization(self.frf, most_order=20)
+        self.assertTrue(all(0 < p.frequency_hz <= self.frf.frequency_hz[-1] for p in poles))
         self.assertEqual(max(p.order for p in poles), 20)
 
 
-class Memory(unittest.TestCase):
+class Memory(Case):
     """Arrays share memory with what they come from, where the docstrings say so."""
 
     def test_views(self):

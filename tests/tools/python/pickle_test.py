@@ -4,9 +4,8 @@
 import copy
 import multiprocessing
 import pickle
-import unittest
 
-from experiment import CONFIG, WORK, file_bytes, run_tests, setUpModule
+from experiment import CONFIG, WORK, Case, file_bytes, run_tests, setUpModule
 
 import numpy as np
 
@@ -21,7 +20,7 @@ def half(frf, band_hz):
     return frf.select(band_hz=band_hz)
 
 
-class Pickles(unittest.TestCase):
+class Pickles(Case):
     def same_bytes(self, thing):
         """A copy is written as the same file."""
         for number, other in enumerate(copies(thing)):
@@ -38,8 +37,7 @@ class Pickles(unittest.TestCase):
         self.assertIsNone(stageid.Frf([1.0], np.ones((1, 1, 1), complex)).noise_variance)
 
     def test_fits_and_models(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
-        fit = stageid.fit(frf, band_hz=(120, 800), covariance=True)
+        fit = stageid.fit(self.frf, band_hz=(120, 800), covariance=True)
         self.same_bytes(fit.model)
         for other in copies(fit):
             for key in ("status", "message", "trustworthy", "cost", "decisions", "removal_cost"):
@@ -51,7 +49,7 @@ class Pickles(unittest.TestCase):
             np.testing.assert_array_equal(other.model.response([200.0]), fit.model.response([200.0]))
 
     def test_logs(self):
-        for log in (stageid.simulate(CONFIG), stageid.read_log(WORK / "run.slog")):
+        for log in (stageid.simulate(CONFIG), self.log):
             expected = stageid.frf(log)
             for other in copies(log):
                 self.assertEqual((len(other), other.sample_rate_hz, other.sensor_units),
@@ -70,25 +68,23 @@ class Pickles(unittest.TestCase):
             np.testing.assert_array_equal(other[0].marked, log[0].marked)
 
     def test_results(self):
-        frf, model = stageid.read_frf(WORK / "frf.h5"), stageid.read_model(WORK / "model.json")
-        results = (stageid.read_log(WORK / "run.slog")[0], stageid.modes(frf)[0], model.modes()[0], model.submodels[0],
-                   model.fit, stageid.validate(model, frf), stageid.pair_modes(model, model)[0],
-                   model.sampled_state_space())
-        for result in results:
+        model = self.model
+        for result in (self.log[0], stageid.modes(self.frf)[0], model.modes()[0], model.submodels[0], model.fit,
+                       stageid.validate(model, self.frf), stageid.pair_modes(model, model)[0],
+                       model.sampled_state_space()):
             for other in copies(result):
                 self.assertIs(type(other), type(result))
                 for name, value in vars(result).items():
                     np.testing.assert_equal(getattr(other, name), value)
-        for named in (model.state_space(), stageid.read_log(WORK / "run.slog").arrays()):
+        for named in (model.state_space(), self.log.arrays()):
             for other in copies(named):
                 self.assertEqual(other._fields, named._fields)
 
     def test_worker_processes(self):
-        frf = stageid.read_frf(WORK / "frf.h5")
         with multiprocessing.Pool(2) as pool:
-            low, high = pool.starmap(half, [(frf, (120, 400)), (frf, (400, 800))])
-        np.testing.assert_array_equal(low.response, frf.select(band_hz=(120, 400)).response)
-        np.testing.assert_array_equal(high.frequency_hz, frf.select(band_hz=(400, 800)).frequency_hz)
+            low, high = pool.starmap(half, [(self.frf, (120, 400)), (self.frf, (400, 800))])
+        np.testing.assert_array_equal(low.response, self.frf.select(band_hz=(120, 400)).response)
+        np.testing.assert_array_equal(high.frequency_hz, self.frf.select(band_hz=(400, 800)).frequency_hz)
 
 
 if __name__ == "__main__":
