@@ -68,7 +68,6 @@ struct UffUnits {
 struct UffContent {
   std::string model_name;   ///< dataset 151, record 1
   std::string description;  ///< record 2
-  std::string program;      ///< records 3 and 6
   UffUnits units;           ///< of a read file; SI is written
   std::vector<UffFunction> functions;
   std::vector<UffMode> modes;

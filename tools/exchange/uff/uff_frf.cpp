@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
-#include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/terminal/text_lines.hpp"
 #include "tools/terminal/unicode.hpp"
@@ -285,7 +284,6 @@ UffContent uff_of_frf(const FrfEstimate& frf) {
   content.model_name = "stageid frequency response";
   content.description = fmt::format("{} {} {} {} {}", kSettings, to_string(frf.hold),
                                     to_string(frf.compensated), frf.sample_rate_hz, frf.delay_s);
-  content.program = fmt::format("stageid {}", version());
   add_functions(frf, frf.response, "", content);
   content.functions.push_back(frequency_function(frf));
   add_functions(frf, frf.noise_variance, kNoiseVariance, content);

@@ -238,11 +238,6 @@ UffUnits read_units(TextLines& lines) {
   return units;
 }
 
-void read_header(TextLines& lines, UffContent& content) {
-  for (std::string* text : {&content.model_name, &content.description, &content.program})
-    *text = utf8_of_text(trimmed(lines.next()));
-}
-
 /// That of the data if the dataset line contains "58b".
 std::optional<std::endian> byte_order(const TextLines& lines, std::string_view line) {
   if (line.size() < 7 || (line[6] != 'b' && line[6] != 'B')) return std::nullopt;
@@ -274,7 +269,8 @@ void read_dataset(TextLines& lines, UffContent& content) {
   } else if (number == "164") {
     content.units = read_units(lines);
   } else if (number == "151") {
-    read_header(lines, content);
+    for (std::string* text : {&content.model_name, &content.description})
+      *text = utf8_of_text(trimmed(lines.next()));
   } else if (!parse_number(number)) {
     lines.fail(fmt::format("got '{}'; expected the number of a dataset", trimmed(line)));
   }

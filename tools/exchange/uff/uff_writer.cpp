@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
+#include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
 #include "tools/terminal/text_lines.hpp"
@@ -29,10 +30,11 @@ std::string dataset_line(int number) { return fmt::format("{:>6}{:74}\n", number
 std::string short_field(double value) { return fmt::format("{:13.5E}", value); }
 
 std::string header_text(const UffContent& content) {
+  const std::string program = text_line(fmt::format("stageid {}", version()));
   return kEdgeLine + dataset_line(151) + text_line(content.model_name) +
-         text_line(content.description) + text_line(content.program) +
+         text_line(content.description) + program +
          fmt::format("{:20}{:>10}{:>10}{:>10}\n", "", 0, 0, 0) + fmt::format("{:20}\n", "") +
-         text_line(content.program) + fmt::format("{:20}\n", "") + kEdgeLine;
+         program + fmt::format("{:20}\n", "") + kEdgeLine;
 }
 
 /// SI: factors of length, force and temperature, and the offset of temperatures, as D25.17.
