@@ -13,6 +13,12 @@
 namespace stageid {
 namespace {
 
+/// Value in `unit` = factor x value in the original unit.
+struct SiUnit {
+  std::string unit;
+  double factor = 1.0;
+};
+
 struct KnownUnit {
   std::string_view text;
   std::string_view si;
@@ -90,9 +96,7 @@ std::optional<SiUnit> powered_unit(std::string_view text) {
   return SiUnit{fmt::format("{}^{}", unit->unit, exponent), std::pow(unit->factor, exponent)};
 }
 
-}  // namespace
-
-SiUnit si_unit(const std::string& text) {
+SiUnit si_unit(const std::string& place, const std::string& text) {
   SiUnit out;
   out.unit.clear();
   bool divides = false;
@@ -101,10 +105,10 @@ SiUnit si_unit(const std::string& text) {
     const std::size_t end = std::min(text.find_first_of("/*.", at), text.size());
     const std::string word = text.substr(at, end - at);
     if (word == "g")
-      throw std::invalid_argument(
-          fmt::format("unit '{}': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or "
-                      "m/s^2 with scale: 9.80665 per channel",
-                      text));
+      throw std::invalid_argument(fmt::format(
+          "{}: unit '{}': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or "
+          "m/s^2 with scale: 9.80665 per channel",
+          place, text));
     const std::optional<SiUnit> unit = powered_unit(word);
     if (!unit) return {text, 1.0};
     out.unit += unit->unit;
@@ -118,17 +122,14 @@ SiUnit si_unit(const std::string& text) {
   return out;
 }
 
+}  // namespace
+
 std::vector<double> take_si_units(const std::string& place, ChannelList& channels,
                                   std::vector<std::string>& notes) {
   std::vector<double> factors;
   std::vector<std::string> converted;
   for (std::string& unit : channels.units) {
-    SiUnit si;
-    try {
-      si = si_unit(unit);
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: {}", place, error.what()));
-    }
+    const SiUnit si = si_unit(place, unit);
     factors.push_back(si.factor);
     if (si.unit == unit) continue;
     std::string note =

@@ -8,23 +8,14 @@
 
 namespace stageid {
 
-/// A unit in SI base or derived units without prefixes: value in `unit` = factor x value in the original unit.
-struct SiUnit {
-  std::string unit;
-  double factor = 1.0;
-};
-
-/// Prefixes (um, kN, mV, mm/s^2), degrees, % and a few customary units (in, ft, lbf, bar, min) are converted; kg is
-/// unchanged. Products and quotients of known units are decomposed. An unknown unit ("count") is kept with factor 1.
+/// Replaces the units of channels by SI base or derived units without prefixes. Prefixes (um, kN, mV, mm/s^2),
+/// degrees, % and a few customary units (in, ft, lbf, bar, min) are converted; kg is unchanged. Products and quotients
+/// of known units are decomposed. An unknown unit ("count") is kept with factor 1.
 /// Source: The International System of Units, 9th ed. (BIPM, 2019), tables 2, 4 and 7.
-/// @throws std::invalid_argument for 'g', which is ambiguous: gram or acceleration of gravity.
-SiUnit si_unit(const std::string& unit);
-
-/// Replaces the units of channels by SI ones.
 /// @param place of the units, for errors: "sensors"
 /// @param notes receives one sentence per changed unit
-/// @returns the factor of every channel
-/// @throws std::invalid_argument
+/// @returns the factor of every channel: value in its new unit over value in the given one
+/// @throws std::invalid_argument for 'g', which is ambiguous: gram or acceleration of gravity.
 std::vector<double> take_si_units(const std::string& place, ChannelList& channels,
                                   std::vector<std::string>& notes);
 
