@@ -137,9 +137,7 @@ void describe_log(ConfigVisitor& v, ImportMap& map) {
 void require_keys(ConfigVisitor& v, const ImportMap& map) {
   if (map.kind == ImportMap::Kind::log) {
     v.require(map.period_samples > 0, "kind", "a log needs period_samples; add the key");
-    for (const auto& [key, group] :
-         {std::pair{"excitation", &map.excitation}, std::pair{"actuators", &map.actuators},
-          std::pair{"sensors", &map.sensors}})
+    for (const auto& [key, group] : map.groups())
       v.require(!group->arrays.empty(), "kind",
                 fmt::format("a log needs {}: {{arrays: [...]}}; add it", key));
     return;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "excitation/words/words.hpp"
@@ -69,7 +70,10 @@ struct ImportMap {
   ExcitationPeriod excitation_period = ExcitationPeriod::repeats;
   std::vector<Run> runs;
 
-  std::vector<const Signals*> groups() const { return {&excitation, &actuators, &sensors}; }
+  /// The groups of a log by their keys.
+  std::vector<std::pair<const char*, const Signals*>> groups() const {
+    return {{"excitation", &excitation}, {"actuators", &actuators}, {"sensors", &sensors}};
+  }
 };
 template <>
 inline constexpr std::array kWords<ImportMap::Kind> = {"frf", "log"};

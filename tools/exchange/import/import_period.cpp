@@ -1,4 +1,4 @@
-#include "tools/exchange/import/import_period.hpp"
+#include "tools/exchange/import/import_signals.hpp"
 
 #include <fmt/format.h>
 

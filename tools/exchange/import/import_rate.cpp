@@ -1,4 +1,4 @@
-#include "tools/exchange/import/import_rate.hpp"
+#include "tools/exchange/import/import_signals.hpp"
 
 #include <fmt/format.h>
 
@@ -62,7 +62,7 @@ std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
 std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
   static const std::set<std::string> kAxes = {"t", "ts", "time", "times", "timeaxis"};
   std::set<std::string> abscissas;
-  for (const ImportMap::Signals* group : map.groups())
+  for (const auto& [key, group] : map.groups())
     for (const std::string& name : group->arrays) abscissas.insert(name + "@abscissa");
   std::vector<FileRate> rates;
   for (const NamedArray& array : arrays.arrays) {

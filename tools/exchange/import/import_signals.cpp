@@ -131,7 +131,7 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
 
 RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
   RunAxes out;
-  for (const ImportMap::Signals* group : map.groups())
+  for (const auto& [key, group] : map.groups())
     for (const std::string& name : group->arrays) {
       if (group->axes.empty()) break;
       const RunNumbers first = name_numbers_of(arrays, map).front();

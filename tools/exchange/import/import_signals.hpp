@@ -24,6 +24,12 @@ struct RunPlace {
   RunAxes indices;  ///< of all three axes
 };
 
+/// The rows of a run.
+struct RunRows {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
 /// A group of channels with all its samples of one run, in SI units.
 struct SignalGroup {
   ChannelList channels;
@@ -44,5 +50,23 @@ std::vector<RunNumbers> name_numbers_of(const ArrayList& arrays, const ImportMap
 SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const char* key,
                          const ImportMap::Signals& group, const RunPlace& place,
                          std::vector<std::string>& notes);
+
+/// The rows of a run of whole periods: transient ones and at least one more.
+/// @throws FormatError naming the required key of the map
+RunRows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::Run& run,
+                Eigen::Index samples);
+
+/// One period of the excitation, period_samples x channels: given as such, repeated exactly, or, if it was measured,
+/// the mean of the periods after the transient.
+/// @throws FormatError if the excitation does not repeat; if it repeats in pieces, the message contains the rows of
+/// the runs
+Eigen::MatrixXd period_of(const ArrayList& arrays, const ImportMap& map,
+                          const SignalGroup& excitation, const RunRows& rows);
+
+/// The sample rate of a log: that of the map, else that of the file. Sources in a file: the abscissas of the arrays
+/// that the map names (universal files), a number or an attribute called sample_rate_hz, fs, dt or similar, or an
+/// evenly spaced time axis called t or time.
+/// @throws FormatError if the two differ, or neither is known
+double sample_rate_of(const ArrayList& arrays, const ImportMap& map);
 
 }  // namespace stageid

@@ -10,7 +10,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/line_datasets.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
-#include "tools/exchange/import/import_rate.hpp"
+#include "tools/exchange/import/import_signals.hpp"
 
 namespace stageid {
 namespace {

@@ -16,8 +16,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "tools/exchange/import/foreign_formats.hpp"
-#include "tools/exchange/import/import_period.hpp"
-#include "tools/exchange/import/import_rate.hpp"
+#include "tools/exchange/import/import_signals.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
