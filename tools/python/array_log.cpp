@@ -91,7 +91,7 @@ void ArrayLog::check_shapes() const {
   };
   same_samples("actuators", a.actuators);
   const auto channels = [](const char* name, const py::array& array, const ChannelList& list) {
-    require(array.shape(3) == static_cast<py::ssize_t>(list.size()), name, array,
+    require(array.shape(3) == std::ssize(list), name, array,
             fmt::format("expected {} for its last axis", counted(list.size(), "name")));
   };
   channels("excitation", a.excitation, info_.excitation);

@@ -80,8 +80,8 @@ std::vector<std::size_t> full_experiment(const LogReader& log, py::ssize_t& M, p
   }
   std::vector<std::size_t> order;
   for (const auto& [id, index] : at) order.push_back(index);
-  const bool full = static_cast<py::ssize_t>(at.size()) == M * E && M > 0;
-  const bool equal = full && std::all_of(order.begin(), order.end(), [&](std::size_t i) {
+  const bool full = std::ssize(at) == M * E && M > 0;
+  const bool equal = full && std::ranges::all_of(order, [&](std::size_t i) {
                        return log.runs()[i].samples == log.runs()[order.front()].samples;
                      });
   if (!equal)
@@ -97,7 +97,7 @@ py::object read_arrays(const LogReader& log) {
   const std::vector<std::size_t> order = full_experiment(log, M, E);
   const LogInfo& info = log.info();
   const auto S = static_cast<py::ssize_t>(log.runs()[order.front()].samples);
-  const auto width = [](const ChannelList& list) { return static_cast<py::ssize_t>(list.size()); };
+  const auto width = [](const ChannelList& list) { return std::ssize(list); };
   py::array_t<double> r({M, E, py::ssize_t{info.period_samples}, width(info.excitation)});
   py::array_t<double> u({M, E, S, width(info.actuators)});
   py::array_t<double> y({M, E, S, width(info.sensors)});

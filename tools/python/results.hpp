@@ -35,7 +35,7 @@ inline std::optional<std::string> unless_empty(const std::string& text) {
 }
 
 inline py::array_t<double> array_of(const std::vector<double>& values) {
-  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+  return py::array_t<double>(std::ssize(values), values.data());
 }
 /// None for an empty array.
 template <typename Values>

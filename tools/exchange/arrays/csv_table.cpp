@@ -56,13 +56,13 @@ std::vector<std::string> split(const TextLines& lines, std::string_view line, ch
 }
 
 std::optional<double> number_of(std::string field, char separator) {
-  if (separator == ';') std::replace(field.begin(), field.end(), ',', '.');
+  if (separator == ';') std::ranges::replace(field, ',', '.');
   return parse_number(field);
 }
 
 /// Whether all fields are numbers; if not, the line contains the names of the columns.
 bool all_numbers(const std::vector<std::string>& fields, char separator) {
-  return std::all_of(fields.begin(), fields.end(), [&](const std::string& field) {
+  return std::ranges::all_of(fields, [&](const std::string& field) {
     return trimmed(field).empty() || number_of(field, separator);
   });
 }

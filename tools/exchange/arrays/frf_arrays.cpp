@@ -39,7 +39,7 @@ constexpr const char* kAttributes =
 /// Name of the MATLAB variable: hold for "@hold", inputs_unit for "inputs@unit".
 std::string identifier(std::string name) {
   if (name.starts_with('@')) return name.substr(1);
-  std::replace(name.begin(), name.end(), '@', '_');
+  std::ranges::replace(name, '@', '_');
   return name;
 }
 
@@ -100,7 +100,7 @@ FrfEstimate frf_of_arrays(const ArrayList& list, const std::filesystem::path& be
 }
 
 Eigen::Index place_in(ChannelList& channels, const std::string& name, const std::string& unit) {
-  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
+  const auto found = std::ranges::find(channels.names, name);
   if (found != channels.names.end()) return found - channels.names.begin();
   channels.names.push_back(name);
   channels.units.push_back(unit);

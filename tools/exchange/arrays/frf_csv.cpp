@@ -163,16 +163,15 @@ FrfEstimate read_frf_csv(const std::filesystem::path& file) {
   describe(arrays, frf);
   const auto column = [&](const std::string& name) {
     const std::vector<double>& values = real_values(arrays, arrays.at(name));
-    if (frf.lines() > 0 && static_cast<Eigen::Index>(values.size()) != frf.lines())
+    if (frf.lines() > 0 && std::ssize(values) != frf.lines())
       throw FormatError(file, name,
                         fmt::format("got {}; expected {}", counted(values.size(), "value"),
                                     counted(frf.lines(), "frequency", "frequencies")));
-    return Eigen::VectorXd(
-        Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values)));
   };
   frf.frequency_hz = column("frequency_hz");
   const auto has = [&](const char* part) {
-    return std::any_of(arrays.arrays.begin(), arrays.arrays.end(), [part](const NamedArray& array) {
+    return std::ranges::any_of(arrays.arrays, [part](const NamedArray& array) {
       return array.name.starts_with(std::string(part) + " ");
     });
   };

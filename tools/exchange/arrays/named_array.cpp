@@ -43,18 +43,17 @@ std::size_t NamedArray::size() const {
 }
 
 bool NamedArray::is_vector() const noexcept {
-  return shape.size() <= 1 + static_cast<std::size_t>(std::count(shape.begin(), shape.end(), 1U));
+  return shape.size() <= 1 + static_cast<std::size_t>(std::ranges::count(shape, 1U));
 }
 
 const NamedArray* ArrayList::find(const std::string& name) const {
   std::string wanted = name.starts_with('/') ? name.substr(1) : name;
   const auto search = [&]() -> const NamedArray* {
-    const auto found = std::find_if(arrays.begin(), arrays.end(),
-                                    [&](const NamedArray& array) { return array.name == wanted; });
+    const auto found = std::ranges::find(arrays, wanted, &NamedArray::name);
     return found == arrays.end() ? nullptr : &*found;
   };
   if (const NamedArray* found = search()) return found;
-  std::replace(wanted.begin(), wanted.end(), '.', '/');
+  std::ranges::replace(wanted, '.', '/');
   return search();
 }
 
@@ -77,7 +76,7 @@ std::vector<std::string> ArrayList::names() const {
 
 NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axes) {
   std::vector<std::size_t> sorted = axes;
-  std::sort(sorted.begin(), sorted.end());  // a hostile file may have a million axes
+  std::ranges::sort(sorted);  // a hostile file may have a million axes
   std::vector<std::size_t> all(array.shape.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   if (sorted != all)

@@ -299,7 +299,7 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
   const Layout layout = layout_of(npy, npy.piece(start, header_bytes));
   const std::string_view data = content.substr(start + header_bytes);
   NamedArray array{std::move(name), layout.shape, {}};
-  if (layout.column_major) std::reverse(array.shape.begin(), array.shape.end());
+  if (layout.column_major) std::ranges::reverse(array.shape);
   if (layout.kind == 'U' || layout.kind == 'S') {
     array.values = texts_of(npy, layout, data);
   } else {

@@ -61,8 +61,7 @@ int ports_of(const std::filesystem::path& file) {
       std::tolower(ending.back()) != 'p')
     return 0;
   const std::string digits = ending.substr(2, ending.size() - 3);
-  if (!std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); }))
-    return 0;
+  if (!std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c); })) return 0;
   return std::stoi(digits);
 }
 

@@ -67,11 +67,11 @@ void describe_run(ConfigVisitor& v, ImportMap::Run& run) {
 /// Rejects a run that is a duplicate of an earlier one: one run would have two contents.
 void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& runs) {
   const ImportMap::Run& last = runs.back();
-  const auto same = std::find_if(runs.begin(), runs.end(), [&](const ImportMap::Run& run) {
+  const auto same = std::ranges::find_if(runs, [&](const ImportMap::Run& run) {
     return run.realization == last.realization && run.experiment == last.experiment;
   });
   const auto place = same - runs.begin();
-  const bool another = place + 1 == static_cast<std::ptrdiff_t>(runs.size());
+  const bool another = place + 1 == std::ssize(runs);
   v.require(another, "experiment",
             fmt::format("entries {} and {} of runs are both realization: {}, experiment: {}; make "
                         "each run unique",
@@ -155,10 +155,11 @@ void require_keys(ConfigVisitor& v, const ImportMap& map) {
   v.require(map.response.empty() != map.channels.empty(), "kind",
             "a frequency response needs either response or channels; add one of them");
   for (const auto name : {&ImportMap::Channel::noise_variance, &ImportMap::Channel::total_variance})
-    v.require(std::all_of(map.channels.begin(), map.channels.end(),
-                          [&](const ImportMap::Channel& channel) {
-                            return (channel.*name).empty() == (map.channels.front().*name).empty();
-                          }),
+    v.require(std::ranges::all_of(map.channels,
+                                  [&](const ImportMap::Channel& channel) {
+                                    return (channel.*name).empty() ==
+                                           (map.channels.front().*name).empty();
+                                  }),
               "channels",
               "a variance must be given for all channels or for none; add or remove it");
 }

@@ -50,9 +50,9 @@ std::string runs_text(const std::vector<RunRows>& pieces, Eigen::Index first) {
 
 /// Whether there are several runs, each of more than one period.
 bool are_runs(const std::vector<RunRows>& pieces, Eigen::Index period) {
-  return pieces.size() > 1 &&
-         std::all_of(pieces.begin(), pieces.end(),
-                     [period](const RunRows& piece) { return piece.count > period; });
+  return pieces.size() > 1 && std::ranges::all_of(pieces, [period](const RunRows& piece) {
+           return piece.count > period;
+         });
 }
 
 [[noreturn]] void fail_not_repeating(const ImportMap& map, const std::vector<RunRows>& pieces,

@@ -95,10 +95,9 @@ double sample_rate_of(const ArrayList& arrays, const ImportMap& map) {
     return map.sample_rate_hz;
   const std::vector<FileRate> rates = rates_of(arrays, map);
   if (map.sample_rate_hz > 0.0) {
-    const bool confirmed =
-        rates.empty() || std::any_of(rates.begin(), rates.end(), [&](const FileRate& rate) {
-          return agree(rate.hz, map.sample_rate_hz);
-        });
+    const bool confirmed = rates.empty() || std::ranges::any_of(rates, [&](const FileRate& rate) {
+                             return agree(rate.hz, map.sample_rate_hz);
+                           });
     if (confirmed) return map.sample_rate_hz;
     refuse_map(
         map, fmt::format("sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "

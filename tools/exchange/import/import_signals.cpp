@@ -74,8 +74,7 @@ SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const
   const bool vector = array.shape.size() < 2 || array.shape[0] == 1;
   const auto rows = static_cast<Eigen::Index>(vector ? values.size() : array.shape[0]);
   if (rows == 0) throw FormatError(arrays.file, array.name, "is empty; expected samples");
-  return Eigen::Map<const SampleRows>(values.data(), rows,
-                                      static_cast<Eigen::Index>(values.size()) / rows);
+  return Eigen::Map<const SampleRows>(values.data(), rows, std::ssize(values) / rows);
 }
 
 SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,

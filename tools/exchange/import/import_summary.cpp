@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 
 /// "400", "8 to 12".
 std::string range_text(const std::vector<std::uint64_t>& values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const auto [low, high] = std::ranges::minmax_element(values);
   return *low == *high ? fmt::format("{}", *low) : fmt::format("{} to {}", *low, *high);
 }
 
@@ -79,7 +79,7 @@ ImportSummary LogSummary::summary(const LogInfo& info,
               {"runs", runs_.size()},
               {"realizations", realizations.size()},
               {"experiments", excited_.size()},
-              {"periods", *std::min_element(periods.begin(), periods.end())},
+              {"periods", *std::ranges::min_element(periods)},
               {"transient_periods", info.transient_periods},
               {"period_samples", info.period_samples},
               {"sample_rate_hz", info.sample_rate_hz},

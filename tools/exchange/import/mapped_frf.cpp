@@ -21,7 +21,7 @@ using Complex = std::vector<std::complex<double>>;
 std::vector<std::size_t> axis_places(const ImportMap& map) {
   std::vector<std::size_t> places;
   for (const char* axis : {"line", "output", "input"}) {
-    const auto found = std::find(map.axes.begin(), map.axes.end(), axis);
+    const auto found = std::ranges::find(map.axes, axis);
     if (found == map.axes.end())
       refuse_map(map, fmt::format("axes: got {}; expected line, output and input in any order",
                                   fmt::join(map.axes, ", ")));
@@ -156,7 +156,7 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
   if (!map.channels.front().noise_variance.empty()) frf.noise_variance = frf.response.real();
   if (!map.channels.front().total_variance.empty()) frf.total_variance = frf.response.real();
   const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
-    const auto found = std::find(names.begin(), names.end(), name);
+    const auto found = std::ranges::find(names, name);
     if (found == names.end())
       refuse_map(map, fmt::format("channels: unknown name '{}'; use one of {}", name,
                                   fmt::join(names, ", ")));
@@ -169,12 +169,11 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
     const Eigen::Index row = place(frf.outputs.names, channel.output) +
                              frf.n_outputs() * place(frf.inputs.names, channel.input);
     const auto put = [&](const auto& column, auto& matrix) {
-      if (static_cast<Eigen::Index>(column.size()) != frf.lines())
+      if (std::ssize(column) != frf.lines())
         refuse_map(map,
                    fmt::format("channels: {} <- {} has {} values; expected {}, one per frequency",
                                channel.output, channel.input, column.size(), frf.lines()));
-      for (Eigen::Index k = 0; k < frf.lines(); ++k)
-        matrix(row, k) = column[static_cast<std::size_t>(k)];
+      std::copy(column.begin(), column.end(), matrix.row(row).begin());
     };
     put(values, frf.response);
     if (frf.noise_variance.size() > 0)
@@ -196,8 +195,7 @@ FrfEstimate mapped_frf(const ArrayList& arrays, const ImportMap& map) {
   const std::vector<double> frequency = map.frequency.empty()
                                             ? even_frequencies(arrays, map)
                                             : real_values(arrays, arrays.at(map.frequency));
-  frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(),
-                                                       static_cast<Eigen::Index>(frequency.size()));
+  frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(), std::ssize(frequency));
   if (map.frequency_unit == ImportMap::FrequencyUnit::rad_s)
     frf.frequency_hz /= 2.0 * std::numbers::pi;
   if (map.channels.empty())

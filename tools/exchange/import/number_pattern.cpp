@@ -28,7 +28,7 @@ Expression expression_of(const std::string& pattern) {
     const bool realization = rest.starts_with(kRealization);
     if (realization || rest.starts_with(kExperiment)) {
       const std::string_view key = realization ? kRealization : kExperiment;
-      if (std::count(out.is_realization.begin(), out.is_realization.end(), realization) > 0)
+      if (std::ranges::count(out.is_realization, realization) > 0)
         throw std::invalid_argument(fmt::format("'{}' contains {} twice; keep one", pattern, key));
       out.is_realization.push_back(realization);
       text += "([0-9]{1,18})";

@@ -134,8 +134,7 @@ std::vector<double> take_si_units(const std::string& place, ChannelList& channel
     if (si.unit == unit) continue;
     std::string note =
         fmt::format("{}: {} converted to {}, factor {:.10g}", place, unit, si.unit, si.factor);
-    if (std::find(notes.begin(), notes.end(), note) == notes.end())
-      notes.push_back(std::move(note));
+    if (std::ranges::find(notes, note) == notes.end()) notes.push_back(std::move(note));
     unit = si.unit;
   }
   return factors;

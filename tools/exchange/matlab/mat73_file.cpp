@@ -69,7 +69,7 @@ struct Mat73File::State {
   /// An empty array is stored as its shape.
   void put_dataset(hid_t parent, const std::string& name, std::string_view kind,
                    const std::vector<std::size_t>& shape, hid_t type, const void* data) const {
-    const bool empty = std::find(shape.begin(), shape.end(), 0U) != shape.end();
+    const bool empty = std::ranges::find(shape, 0U) != shape.end();
     const std::vector<std::uint64_t> extents(shape.begin(), shape.end());
     std::vector<hsize_t> stored(shape.rbegin(), shape.rend());
     if (empty) stored = {shape.size()};

@@ -110,8 +110,7 @@ bool is_read(const ArrayList& list, const std::string& name) {
     return item.name == name || (item.name.size() > name.size() && item.name.starts_with(name) &&
                                  item.name[name.size()] == '/');
   };
-  return std::any_of(list.arrays.begin(), list.arrays.end(), matches) ||
-         std::any_of(list.unread.begin(), list.unread.end(), matches);
+  return std::ranges::any_of(list.arrays, matches) || std::ranges::any_of(list.unread, matches);
 }
 
 /// Compares the arrays read from a version 7.3 file with its content; objects and function handles are added to

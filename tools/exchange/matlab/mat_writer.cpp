@@ -23,7 +23,7 @@ std::string identifier(std::string name) {
 /// Path of structs and the field: "/a/0001/b@unit" -> a, x0001, b_unit; "@format" -> format.
 std::vector<std::string> path_of(std::string name) {
   if (name.starts_with('@')) name.erase(0, 1);
-  std::replace(name.begin(), name.end(), '@', '_');
+  std::ranges::replace(name, '@', '_');
   if (const std::size_t at = name.find("/_"); at != std::string::npos) name.erase(at + 1, 1);
   std::vector<std::string> path;
   std::size_t first = 0;
@@ -37,8 +37,7 @@ std::vector<std::string> path_of(std::string name) {
 /// Inserts `array` into the struct at its path.
 void insert(std::vector<MatVariable>& siblings, const std::vector<std::string>& path,
             std::size_t level, const NamedArray& array) {
-  auto found = std::find_if(siblings.begin(), siblings.end(),
-                            [&](const MatVariable& v) { return v.name == path[level]; });
+  auto found = std::ranges::find(siblings, path[level], &MatVariable::name);
   if (found == siblings.end()) found = siblings.insert(siblings.end(), {path[level], nullptr, {}});
   if (level + 1 == path.size())
     found->array = &array;

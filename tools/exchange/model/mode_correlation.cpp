@@ -46,7 +46,7 @@ Place place_of(const std::string& output, std::size_t position) {
 }
 
 std::optional<std::complex<double>> value_at(const UffMode& mode, const Place& place) {
-  const auto node = std::find(mode.nodes.begin(), mode.nodes.end(), place.node);
+  const auto node = std::ranges::find(mode.nodes, place.node);
   if (node == mode.nodes.end()) return std::nullopt;
   const auto axis = static_cast<std::size_t>(std::max(place.direction, 1)) - 1;
   const bool scalar = mode.values_per_node == 1;
@@ -59,7 +59,7 @@ std::optional<std::complex<double>> value_at(const UffMode& mode, const Place& p
 Place with_direction(Place place, const std::vector<UffMode>& modes) {
   if (place.direction != 0) return place;
   for (int direction = 1; direction <= 6; ++direction) {
-    const bool moves = std::any_of(modes.begin(), modes.end(), [&](const UffMode& mode) {
+    const bool moves = std::ranges::any_of(modes, [&](const UffMode& mode) {
       return mode.values_per_node > 1 &&
              value_at(mode, {place.node, direction, 1.0}).value_or(0.0) != 0.0;
     });
@@ -86,8 +86,7 @@ std::vector<double> alone(const std::vector<ModeShape>& modes, const std::vector
                           std::size_t ModePair::*side) {
   std::vector<double> frequency_hz;
   for (std::size_t i = 0; i < modes.size(); ++i)
-    if (std::none_of(pairs.begin(), pairs.end(),
-                     [&](const ModePair& pair) { return pair.*side == i; }))
+    if (std::ranges::count(pairs, i, side) == 0)
       frequency_hz.push_back(modes[i].natural_frequency_hz);
   return frequency_hz;
 }
@@ -102,8 +101,8 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < model.outputs.size(); ++i) {
     const Place place = with_direction(place_of(model.outputs.names[i], i), content.modes);
-    if (!std::all_of(content.modes.begin(), content.modes.end(),
-                     [&](const UffMode& mode) { return value_at(mode, place).has_value(); }))
+    if (!std::ranges::all_of(
+            content.modes, [&](const UffMode& mode) { return value_at(mode, place).has_value(); }))
       continue;
     places.push_back(place);
     rows.push_back(static_cast<Eigen::Index>(i));
@@ -124,7 +123,7 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
   for (const UffMode& mode : content.modes) {
     out.other.push_back(mode_of(mode));
     Eigen::VectorXcd& shape = out.other.back().output_shape;
-    shape.resize(static_cast<Eigen::Index>(places.size()));
+    shape.resize(std::ssize(places));
     for (std::size_t i = 0; i < places.size(); ++i)
       shape[static_cast<Eigen::Index>(i)] = *value_at(mode, places[i]);
     out.other.back().input_shape = alike;
@@ -143,9 +142,7 @@ std::vector<ModeCandidate> candidates_of(const std::filesystem::path& file,
     out.push_back({mode.natural_frequency_hz, std::clamp(mode.damping_ratio, kLeastDamping, 1.0)});
   }
   if (out.empty()) throw FormatError(file, "", "contains no mode with a frequency above zero");
-  std::stable_sort(out.begin(), out.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
-    return a.frequency_hz < b.frequency_hz;
-  });
+  std::ranges::stable_sort(out, {}, &ModeCandidate::frequency_hz);
   return out;
 }
 

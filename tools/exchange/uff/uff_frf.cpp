@@ -79,17 +79,16 @@ std::string entity_of(const std::string& name) {
 }
 
 UffFunction channel_function(const FrfEstimate& frf, Eigen::Index i, Eigen::Index j) {
-  const auto output = static_cast<std::size_t>(i), input = static_cast<std::size_t>(j);
+  const std::string& output = frf.outputs.name(i);
+  const std::string& input = frf.inputs.name(j);
   UffFunction f;
-  f.id[3] = name_line(kOutput, frf.outputs.names[output]);
-  f.id[4] = name_line(kInput, frf.inputs.names[input]);
-  f.response = {entity_of(frf.outputs.names[output]), i + 1,
-                uff_direction(frf.outputs.names[output])};
-  f.reference = {entity_of(frf.inputs.names[input]), kFirstInputNode + j,
-                 uff_direction(frf.inputs.names[input])};
+  f.id[3] = name_line(kOutput, output);
+  f.id[4] = name_line(kInput, input);
+  f.response = {entity_of(output), i + 1, uff_direction(output)};
+  f.reference = {entity_of(input), kFirstInputNode + j, uff_direction(input)};
   f.abscissa_axis = {18, {0, 0, 0}, "Hz"};
-  f.ordinate_axis = axis_of(frf.outputs.units[output]);
-  f.denominator_axis = axis_of(frf.inputs.units[input]);
+  f.ordinate_axis = axis_of(frf.outputs.unit(i));
+  f.denominator_axis = axis_of(frf.inputs.unit(j));
   f.abscissa.assign(frf.frequency_hz.begin(), frf.frequency_hz.end());
   return f;
 }
@@ -301,7 +300,7 @@ FrfEstimate frf_of_uff(const std::filesystem::path& file, const UffContent& cont
         "contains no frequency response (dataset 58, function type 4)" + other_content(content));
   const UffFunction& first = *table.begin()->second;
   const std::vector<double> frequency = frequencies_of(content, first);
-  const auto lines = static_cast<Eigen::Index>(frequency.size());
+  const auto lines = std::ssize(frequency);
   frf.frequency_hz = Eigen::Map<const Eigen::VectorXd>(frequency.data(), lines);
   frf.response.resize(frf.n_outputs() * frf.n_inputs(), lines);
   for (const auto& [channel, f] : table) {
