@@ -18,6 +18,7 @@ import scipy.io
 import scipy.sparse
 
 from exchange_test import WORK, Case, content, everything, run, run_tests
+from import_test import write_s2p
 
 SPARSE = np.array([[0, 1.5, 0], [2, 0, -3.0]])
 
@@ -46,6 +47,14 @@ def npy(array):
     content = io.BytesIO()
     np.save(content, array)
     return content.getvalue()
+
+
+def write_damaged(name, whole, *changes):
+    """Changes: (place, format of struct, number); the number None turns some bits of a byte."""
+    damaged = bytearray(whole)
+    for place, format, number in changes:
+        struct.pack_into(format, damaged, place, whole[place] ^ 0x5A if number is None else number)
+    (WORK / name).write_bytes(damaged)
 
 
 def set_class(item, name):
@@ -144,9 +153,7 @@ class Matlab(Case):
         lost = 0
         for place in places:
             for offset in range(0, 96, 3):
-                damaged = bytearray(whole)
-                damaged[place + offset] ^= 0x5A
-                (WORK / "x.mat").write_bytes(damaged)
+                write_damaged("x.mat", whole, (place + offset, "B", None))
                 result = run("import", "x.mat", "--json")
                 self.assertIn(result.returncode, (0, 2), result.stderr)
                 if result.returncode == 2:
@@ -165,40 +172,30 @@ class Numpy(Case):
             whole = (WORK / "x.npz").read_bytes()
             self.succeed("import", "x.npz")
             place = whole.index(np.arange(64.0).tobytes()[256:264]) if save is np.savez else len(whole) // 4
-            damaged = bytearray(whole)
-            damaged[place] ^= 0x01
-            (WORK / "x.npz").write_bytes(damaged)
+            write_damaged("x.npz", whole, (place, "B", whole[place] ^ 0x01))
             error = self.refuse("the file is damaged", "import", "x.npz")
             if save is np.savez:
                 self.assertIn("x.npz:w.npy: its checksum (CRC-32) does not match", error)
 
     def test_hostile_archives(self):
         """Of the one member w.npy; offsets as in PKWARE's APPNOTE.TXT, 4.3.7 and 4.3.12."""
-        def change(local, central, format, value):
-            damaged = bytearray(whole)
-            struct.pack_into(format, damaged, local, value)
-            struct.pack_into(format, damaged, damaged.index(b"PK\x01\x02") + central, value)
-            (WORK / "x.npz").write_bytes(damaged)
-
         with zipfile.ZipFile(WORK / "x.npz", "w") as archive:
             archive.writestr("w.npy", npy(np.arange(8.0)))
         whole = (WORK / "x.npz").read_bytes()
         self.succeed("import", "x.npz")
-        change(6, 8, "<H", 1)
-        self.refuse("x.npz:w.npy: is encrypted; save it without a password", "import", "x.npz")
-        change(8, 10, "<H", 12)
-        self.refuse("x.npz:w.npy: unsupported compression method", "import", "x.npz")
-        change(22, 24, "<I", 0xFFFFFFF0)
-        self.refuse("x.npz:w.npy: its size is damaged", "import", "x.npz")
-        change(18, 20, "<I", 0xFFFFFFF0)
-        self.refuse("x.npz:w.npy: unexpected end of file", "import", "x.npz")
+        directory = whole.index(b"PK\x01\x02")
+        for local, central, format, number, text in (
+                (6, 8, "<H", 1, "is encrypted; save it without a password"),
+                (8, 10, "<H", 12, "unsupported compression method"),
+                (22, 24, "<I", 0xFFFFFFF0, "its size is damaged"),
+                (18, 20, "<I", 0xFFFFFFF0, "unexpected end of file")):
+            write_damaged("x.npz", whole, (local, format, number), (directory + central, format, number))
+            self.refuse(f"x.npz:w.npy: {text}", "import", "x.npz")
         for length in (0, 1, 30, len(whole) // 2, len(whole) - 1):
             (WORK / "x.npz").write_bytes(whole[:length])
             self.refuse("x.npz: is not an .npz file, or is truncated", "import", "x.npz")
         for place in range(0, len(whole), 3):
-            damaged = bytearray(whole)
-            damaged[place] ^= 0x5A
-            (WORK / "x.npz").write_bytes(damaged)
+            write_damaged("x.npz", whole, (place, "B", None))
             result = run("import", "x.npz", "--json")
             self.assertIn(result.returncode, (0, 2), (place, result.stderr))
 
@@ -206,10 +203,8 @@ class Numpy(Case):
         """A stream that inflates to more than its directory entry: no more than the entry is read."""
         with zipfile.ZipFile(WORK / "x.npz", "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("w.npy", npy(np.zeros(1 << 20)))
-        damaged = bytearray((WORK / "x.npz").read_bytes())
-        for start, offset in ((0, 22), (damaged.index(b"PK\x01\x02"), 24)):
-            struct.pack_into("<I", damaged, start + offset, 4096)
-        (WORK / "x.npz").write_bytes(damaged)
+        whole = (WORK / "x.npz").read_bytes()
+        write_damaged("x.npz", whole, (22, "<I", 4096), (whole.index(b"PK\x01\x02") + 24, "<I", 4096))
         self.refuse("x.npz:w.npy: cannot be decompressed; the file is damaged", "import", "x.npz")
 
     def test_sizes_of_64_bits(self):
@@ -234,17 +229,12 @@ class Touchstone(Case):
         """Version 1.1: Z over R, Y times R; H and G element by element."""
         g = np.random.default_rng(3)
         true = g.normal(size=(4, 2, 2)) + 1j * g.normal(size=(4, 2, 2))
-        order = [(0, 0), (1, 0), (0, 1), (1, 1)]
         R = 75.0
         scale = {"Z": [[1 / R, 1 / R], [1 / R, 1 / R]], "Y": [[R, R], [R, R]], "H": [[1 / R, 1], [1, R]],
                  "G": [[R, 1], [1, 1 / R]], "S": [[1, 1], [1, 1]]}
         units = {"Z": ("VV", "AA"), "Y": ("AA", "VV"), "H": ("VA", "AV"), "G": ("AV", "VA"), "S": ("11", "11")}
         for kind, factor in scale.items():
-            written = true * np.array(factor)
-            lines = [f"# HZ {kind} RI R {R:g}\n"] + [
-                f"{k + 1} " + " ".join(f"{v:.17g}" for i, j in order for v in (written[k, i, j].real, written[k, i, j].imag))
-                + "\n" for k in range(4)]
-            (WORK / "x.s2p").write_text("".join(lines) + "# HZ S RI R 1\n")
+            write_s2p(f"# HZ {kind} RI R {R:g}\n", true * np.array(factor), "# HZ S RI R 1\n")
             shown = self.succeed("import", "x.s2p", "-o", "back.h5").stdout
             back = content()
             np.testing.assert_allclose(back["response"], true, rtol=1e-14)

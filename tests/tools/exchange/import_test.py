@@ -40,6 +40,12 @@ def uff_function(y, reference, response, x=None, kind=4, double=True, binary=Non
     return edge + b"    58\n" + head + rows.encode() + edge
 
 
+def write_s2p(head, values, tail="", numbers=lambda v: (v.real, v.imag), comment=""):
+    """Touchstone of two ports, in the order 11, 21, 12, 22, at 1, 2, ..."""
+    rows = (" ".join(f"{x:.17g}" for i, j in ((0, 0), (1, 0), (0, 1), (1, 1)) for x in numbers(v[i, j])) for v in values)
+    (WORK / "x.s2p").write_text(head + "".join(f"{k} {row}{comment}\n" for k, row in enumerate(rows, 1)) + tail)
+
+
 class ByThemselves(Case):
     def test_a_file_without_output_is_listed(self):
         np.savez(WORK / "x.npz", w=np.arange(4.0), G=G)
@@ -94,15 +100,10 @@ class ByThemselves(Case):
 
     def test_touchstone(self):
         s = G[:4, :2, :2] * 1e7
-        order = [(0, 0), (1, 0), (0, 1), (1, 1)]
-        for form, pair in (("RI", lambda v: (v.real, v.imag)),
-                           ("MA", lambda v: (abs(v), np.degrees(np.angle(v)))),
-                           ("DB", lambda v: (20 * np.log10(abs(v)), np.degrees(np.angle(v))))):
-            lines = [f"! two ports\n# MHz S {form} R 50\n"]
-            for k in range(4):
-                numbers = [v for i, j in order for v in pair(s[k, i, j])]
-                lines.append(f"{k + 1} " + " ".join(f"{v:.17g}" for v in numbers) + " ! here\n")
-            (WORK / "x.s2p").write_text("".join(lines))
+        for form, numbers in (("RI", lambda v: (v.real, v.imag)),
+                              ("MA", lambda v: (abs(v), np.degrees(np.angle(v)))),
+                              ("DB", lambda v: (20 * np.log10(abs(v)), np.degrees(np.angle(v))))):
+            write_s2p(f"! two ports\n# MHz S {form} R 50\n", s, numbers=numbers, comment=" ! here")
             self.succeed("import", "x.s2p", "-o", "back.h5")
             np.testing.assert_array_equal(content()["frequency_hz"], [1e6, 2e6, 3e6, 4e6])
             np.testing.assert_allclose(content()["response"], s, rtol=1e-13)

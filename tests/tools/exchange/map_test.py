@@ -42,7 +42,9 @@ def runs_of(name="run.h5"):
 
 
 class SeveralRuns(Case):
-    def expect(self, r, u, y, experiments=E):
+    def expect(self, name, r, u, y, experiments=E):
+        """A file, imported through map.yaml, has these runs."""
+        self.imports(name, "run.h5")
         runs = runs_of()
         self.assertEqual(set(runs), {(m, e) for m in range(M) for e in range(experiments)})
         for (m, e), run in runs.items():
@@ -59,22 +61,19 @@ class SeveralRuns(Case):
                 np.savez(WORK / "x.npz", **dict(zip("ruy", arrays)))
                 log_map("ruy", [", ".join(order)] * 3)
                 for name in ("x.mat", "x.npz"):
-                    self.imports(name, "run.h5")
-                    self.expect(r, u, y, 1)
+                    self.expect(name, r, u, y, 1)
 
     def test_axes_of_realizations_and_experiments(self):
         r, u, y = signals()
         np.savez(WORK / "x.npz", r=np.transpose(r, (2, 3, 1, 0)), u=np.transpose(u, (2, 3, 1, 0)), y=y)
         log_map("ruy", ["sample, channel, experiment, realization"] * 2 + ["realization, experiment, sample, channel"])
-        self.imports("x.npz", "run.h5")
-        self.expect(r, u, y)
+        self.expect("x.npz", r, u, y)
 
     def test_one_excitation_for_all_runs_and_arrays_without_channels(self):
         r, u, y = signals(experiments=1)
         np.savez(WORK / "x.npz", r=r[0, 0, :, 0], u=u[:, 0, :, 0], y=y[:, 0, :, 0].T)
         log_map("ruy", ["", "run, sample", "sample, run"], ["unit: N", "unit: N", "unit: m"])
-        self.imports("x.npz", "run.h5")
-        self.expect(np.broadcast_to(r[:1], r.shape)[..., :1], u[..., :1], y[..., :1], 1)
+        self.expect("x.npz", np.broadcast_to(r[:1], r.shape)[..., :1], u[..., :1], y[..., :1], 1)
 
     def test_an_axis_of_runs_with_their_numbers(self):
         r, u, y = signals()
@@ -82,8 +81,7 @@ class SeveralRuns(Case):
         np.savez(WORK / "x.npz", **dict(zip("ruy", flat)))
         entries = ", ".join(f"{{realization: {m}, experiment: {e}}}" for m in range(M) for e in range(E))
         log_map("ruy", ["run, sample, channel"] * 3, more=f"runs: [{entries}]\n")
-        self.imports("x.npz", "run.h5")
-        self.expect(r, u, y)
+        self.expect("x.npz", r, u, y)
         log_map("ruy", ["run, sample, channel"] * 3, more="runs: [{realization: 0}]\n")
         self.refuses("runs: 1 entry; axis run has 6", "x.npz")
 
@@ -94,11 +92,9 @@ class SeveralRuns(Case):
                 scipy.io.savemat(WORK / f"run_{m + 1}_{e + 1:02}.mat", {"r": r[m, e], "u": u[m, e], "y": y[m, e]})
         scipy.io.savemat(WORK / "run_of_yesterday.mat", {"x": 1.0})
         log_map("ruy")
-        self.imports("run_{realization}_{experiment}.mat", "run.h5")
-        self.expect(r, u, y)
+        self.expect("run_{realization}_{experiment}.mat", r, u, y)
         log_map("ruy", more="files: run_{realization}_{experiment}.mat\n")
-        self.imports("", "run.h5")
-        self.expect(r, u, y)
+        self.expect("", r, u, y)
         self.refuses("omit FILE or the key files", "run_1_01.mat")
         (WORK / "run_3_02.mat").unlink()
         shown = self.imports("", "run.h5")
@@ -114,8 +110,7 @@ class SeveralRuns(Case):
             (WORK / f"day{m + 10}").mkdir()
             np.savez(WORK / f"day{m + 10}" / "all.npz", r=r[m], u=u[m], y=y[m])
         log_map("ruy", ["experiment, sample, channel"] * 3)
-        self.imports("day{realization}/all.npz", "run.h5")
-        self.expect(r, u, y)
+        self.expect("day{realization}/all.npz", r, u, y)
         log_map("ruy", ["realization, sample, channel"] * 3)
         self.refuses("given by the name of its file and by axis realization; keep one", "day{realization}/all.npz")
 
@@ -127,8 +122,7 @@ class SeveralRuns(Case):
             for name, value in zip(names, values):
                 f[name] = value
         log_map([f'"{key}/{{realization}}_{{experiment}}"' for key in "ruy"])
-        self.imports("x.h5", "run.h5")
-        self.expect(r, u, y)
+        self.expect("x.h5", r, u, y)
         with h5py.File(WORK / "x.h5", "a") as f:
             del f["u/2_1"]
         self.refuses("has no 'u/{realization}_{experiment}' of realization 2 experiment 1", "x.h5")
