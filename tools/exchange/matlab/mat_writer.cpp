@@ -34,21 +34,19 @@ std::vector<std::string> path_of(std::string name) {
   return path;
 }
 
-/// Inserts `array` into the struct at its path.
-void insert(std::vector<MatVariable>& siblings, const std::vector<std::string>& path,
-            std::size_t level, const NamedArray& array) {
-  auto found = std::ranges::find(siblings, path[level], &MatVariable::name);
-  if (found == siblings.end()) found = siblings.insert(siblings.end(), {path[level], nullptr, {}});
-  if (level + 1 == path.size())
-    found->array = &array;
-  else
-    insert(found->fields, path, level + 1, array);
-}
-
 /// The variables of the file in the order of their first appearance.
 std::vector<MatVariable> variables_of(const ArrayList& list) {
   std::vector<MatVariable> variables;
-  for (const NamedArray& array : list.arrays) insert(variables, path_of(array.name), 0, array);
+  for (const NamedArray& array : list.arrays) {
+    MatVariable* variable = nullptr;
+    for (const std::string& name : path_of(array.name)) {
+      std::vector<MatVariable>& siblings = variable == nullptr ? variables : variable->fields;
+      auto found = std::ranges::find(siblings, name, &MatVariable::name);
+      if (found == siblings.end()) found = siblings.insert(found, {name, nullptr, {}});
+      variable = &*found;
+    }
+    variable->array = &array;
+  }
   return variables;
 }
 
@@ -58,13 +56,14 @@ void require_room(const ArrayList& list) {
   std::map<std::string, std::size_t> bytes;
   for (const NamedArray& array : list.arrays) {
     if (array.is_text()) continue;
-    std::size_t& sum = bytes[path_of(array.name).front()];
+    const std::string variable = path_of(array.name).front();
+    std::size_t& sum = bytes[variable];
     sum += array.size() * (array.is_complex() ? 16 : 8);
     if (sum >= kMostBytes)
       throw std::invalid_argument(
           fmt::format("{}: '{}' has 2 GiB or more, too large for a variable of a MATLAB v5 file; "
                       "add --mat-version 7.3",
-                      list.file.string(), path_of(array.name).front()));
+                      list.file.string(), variable));
   }
 }
 
