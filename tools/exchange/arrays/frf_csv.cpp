@@ -111,19 +111,20 @@ void read_description(const nlohmann::json& json, FrfEstimate& frf) {
   });
 }
 
-/// The comment that describes the table; empty if there is none.
-std::string description_in(const std::filesystem::path& file) {
+/// The comment that describes the table, and the titles of its columns; empty if there is none.
+std::pair<std::string, std::string> head_in(const std::filesystem::path& file) {
   TextLines lines(file);
+  std::string description;
   while (!lines.at_end()) {
     const std::string_view line = lines.next();
-    if (line.starts_with(kDescription)) return std::string(line.substr(2));
-    if (!trimmed(line).empty() && !line.starts_with('#')) break;
+    if (!trimmed(line).empty() && !line.starts_with('#')) return {description, std::string(line)};
+    if (description.empty() && line.starts_with(kDescription)) description = line.substr(2);
   }
-  return {};
+  return {description, ""};
 }
 
 void describe(const ArrayList& arrays, FrfEstimate& frf) {
-  const std::string text = description_in(arrays.file);
+  const std::string text = head_in(arrays.file).first;
   if (text.empty()) {
     if (!channels_from_head(arrays, frf))
       throw FormatError(arrays.file, "",
@@ -147,14 +148,9 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
 
 bool is_frf_csv(const std::filesystem::path& file) {
   if (file.extension() != ".csv") return false;
-  TextLines lines(file);
-  while (!lines.at_end()) {
-    const std::string_view line = lines.next();
-    if (trimmed(line).empty() || line.starts_with('#')) continue;
-    return line.starts_with("frequency_hz,") && line.find("real ") != std::string_view::npos &&
-           line.find("imaginary ") != std::string_view::npos;
-  }
-  return false;
+  const std::string titles = head_in(file).second;
+  return titles.starts_with("frequency_hz,") && titles.find("real ") != std::string::npos &&
+         titles.find("imaginary ") != std::string::npos;
 }
 
 FrfEstimate read_frf_csv(const std::filesystem::path& file) {
