@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <fstream>
 #include <memory>
@@ -78,18 +77,14 @@ class Elements {
 
 /// The first bytes of a deflated variable, which contain names and classes.
 std::string inflated_begin(std::string_view deflated) {
-  std::array<char, 1024> begin{};
-  z_stream stream = {};
-  if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
-  // zlib does not write to its input; its interface merely lacks const.
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(deflated.data()));
-  stream.avail_in = static_cast<uInt>(deflated.size());
-  stream.next_out = reinterpret_cast<Bytef*>(begin.data());
-  stream.avail_out = static_cast<uInt>(begin.size());
-  inflate(&stream, Z_SYNC_FLUSH);
-  const std::size_t size = begin.size() - stream.avail_out;
-  inflateEnd(&stream);
-  return {begin.data(), size};
+  std::string begin(1024, '\0');
+  uLongf size = begin.size();
+  // If the output is full or the input damaged, it has inflated what it could.
+  if (uncompress(reinterpret_cast<Bytef*>(begin.data()), &size,
+                 reinterpret_cast<const Bytef*>(deflated.data()), deflated.size()) == Z_MEM_ERROR)
+    throw std::bad_alloc();
+  begin.resize(size);
+  return begin;
 }
 
 std::optional<UnreadVariable> object_of(std::string_view variable, bool big_endian) {
