@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <regex>
 #include <sstream>
 
 #include "tools/terminal/text_lines.hpp"
@@ -56,13 +57,10 @@ struct Options {
 };
 
 int ports_of(const std::filesystem::path& file) {
+  static const std::regex pattern(R"(\.[sS](\d{1,2})[pP])");
   const std::string ending = file.extension().string();
-  if (ending.size() < 4 || ending.size() > 5 || std::tolower(ending[1]) != 's' ||
-      std::tolower(ending.back()) != 'p')
-    return 0;
-  const std::string digits = ending.substr(2, ending.size() - 3);
-  if (!std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c); })) return 0;
-  return std::stoi(digits);
+  std::smatch found;
+  return std::regex_match(ending, found, pattern) ? std::stoi(found[1]) : 0;
 }
 
 double read_reference(const TextLines& lines, std::istringstream& words) {
