@@ -127,21 +127,21 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
   const std::string text = head_in(arrays.file).first;
   if (text.empty()) {
     if (!channels_from_head(arrays, frf))
-      throw FormatError(arrays.file, "",
-                        "names and units of its channels contain slashes and cannot be separated. "
-                        "Write a map with kind: frf and channels (docs/exchange.md)");
+      arrays.fail("",
+                  "names and units of its channels contain slashes and cannot be separated. "
+                  "Write a map with kind: frf and channels (docs/exchange.md)");
     return;
   }
   try {
     read_description(parse_json<nlohmann::json>(text), frf);
   } catch (const nlohmann::json::exception&) {
-    throw FormatError(arrays.file, "",
-                      "its line '# {\"format\":...}' is damaged. Remove that line, or export the "
-                      "response again");
+    arrays.fail("",
+                "its line '# {{\"format\":...}}' is damaged. Remove that line, or export the "
+                "response again");
   }
   if (frf.outputs.units.size() != frf.outputs.size() ||
       frf.inputs.units.size() != frf.inputs.size())
-    throw FormatError(arrays.file, "", "expected one unit per channel; export the response again");
+    arrays.fail("", "expected one unit per channel; export the response again");
 }
 
 }  // namespace

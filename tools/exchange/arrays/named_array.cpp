@@ -103,9 +103,8 @@ NamedArray reversed(const NamedArray& array) {
 }
 
 const std::vector<double>& real_values(const ArrayList& list, const NamedArray& array) {
-  if (array.is_text()) throw FormatError(list.file, array.name, "contains text; expected numbers");
-  if (array.is_complex())
-    throw FormatError(list.file, array.name, "contains complex numbers; expected real ones");
+  if (array.is_text()) list.fail(array.name, "contains text; expected numbers");
+  if (array.is_complex()) list.fail(array.name, "contains complex numbers; expected real ones");
   return std::get<0>(array.values);
 }
 

@@ -1,12 +1,17 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <complex>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
+
+#include "acquisition/files/file_error.hpp"
 
 namespace stageid {
 
@@ -45,6 +50,12 @@ struct ArrayList {
   /// @throws FormatError that lists the available names.
   const NamedArray& at(const std::string& name) const;
   std::vector<std::string> names() const;
+  /// @throws FormatError naming the file and `place`, always
+  template <typename... Parts>
+  [[noreturn]] void fail(const std::string& place, fmt::format_string<Parts...> what,
+                         Parts&&... parts) const {
+    throw FormatError(file, place, fmt::format(what, std::forward<Parts>(parts)...));
+  }
 };
 
 /// Axis q of the result is axis `axes[q]` of `array`, e.g. {1, 2, 0} of N x a x b gives a x b x N.

@@ -21,12 +21,11 @@ namespace stageid {
 namespace {
 
 [[noreturn]] void ask_for_map(const ArrayList& arrays) {
-  throw FormatError(
-      arrays.file, "",
-      fmt::format(
-          "the meaning of its {} arrays ({}) is unknown; write a map with kind: frf or kind: log "
-          "(docs/exchange.md) and pass it with --map; 'stageid import {}' lists the arrays",
-          arrays.arrays.size(), listed(arrays.names(), 6), arrays.file.string()));
+  arrays.fail(
+      "",
+      "the meaning of its {} arrays ({}) is unknown; write a map with kind: frf or kind: log "
+      "(docs/exchange.md) and pass it with --map; 'stageid import {}' lists the arrays",
+      arrays.arrays.size(), listed(arrays.names(), 6), arrays.file.string());
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "tools/config/config_reader.hpp"
 
 namespace stageid {
@@ -173,8 +172,8 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
   if (units.empty()) units = {"1"};
   if (units.size() == 1) units.resize(count, units.front());
   if (units.size() != count)
-    refuse_map(map, fmt::format("{}: got {} for {}; write one, or one per channel", key,
-                                counted(units.size(), "unit"), counted(count, "channel")));
+    refuse_map(map, "{}: got {} for {}; write one, or one per channel", key,
+               counted(units.size(), "unit"), counted(count, "channel"));
   return units;
 }
 
@@ -196,10 +195,6 @@ ImportMap read_import_map(const std::filesystem::path& file) {
     require_keys(v, map);
   });
   return map;
-}
-
-void refuse_map(const ImportMap& map, const std::string& what) {
-  throw FormatError(map.file, "", what);
 }
 
 }  // namespace stageid

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -8,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "acquisition/files/file_error.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -93,7 +96,11 @@ std::vector<std::string> units_of(const ImportMap& map, const char* key, const s
 /// @throws FileError, FormatError "FILE:LINE:COLUMN: ..."
 ImportMap read_import_map(const std::filesystem::path& file);
 
-/// @throws FormatError naming the map's file.
-[[noreturn]] void refuse_map(const ImportMap& map, const std::string& what);
+/// @throws FormatError naming the map's file, always
+template <typename... Parts>
+[[noreturn]] void refuse_map(const ImportMap& map, fmt::format_string<Parts...> what,
+                             Parts&&... parts) {
+  throw FormatError(map.file, "", fmt::format(what, std::forward<Parts>(parts)...));
+}
 
 }  // namespace stageid

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 
 namespace stageid {
 namespace {
@@ -60,21 +59,21 @@ bool are_runs(const std::vector<RunRows>& pieces, Eigen::Index period) {
   const auto period = static_cast<Eigen::Index>(map.period_samples);
   const Eigen::Index row = rows.first + pieces[1].first;
   if (are_runs(pieces, period))
-    refuse_map(map, fmt::format("excitation: changes at row {} and repeats from there on; the file "
-                                "contains {} in sequence. {} {}",
-                                row, counted(pieces.size(), "run"),
-                                map.runs.empty() ? "Add the key" : "Correct the key",
-                                runs_text(pieces, rows.first)));
+    refuse_map(map,
+               "excitation: changes at row {} and repeats from there on; the file "
+               "contains {} in sequence. {} {}",
+               row, counted(pieces.size(), "run"),
+               map.runs.empty() ? "Add the key" : "Correct the key", runs_text(pieces, rows.first));
   if (mean)
     refuse_map(map,
-               fmt::format("excitation: the period at row {} differs from that at row {}. Correct "
-                           "period_samples: {}, or list the rows of each run in the key runs",
-                           row, rows.first, period));
-  refuse_map(
-      map, fmt::format("excitation: does not repeat from row {} on. Correct period_samples: {}, or "
-                       "list the rows of each run in the key runs. If the excitation was measured, "
-                       "add excitation_period: mean",
-                       row, period));
+               "excitation: the period at row {} differs from that at row {}. Correct "
+               "period_samples: {}, or list the rows of each run in the key runs",
+               row, rows.first, period);
+  refuse_map(map,
+             "excitation: does not repeat from row {} on. Correct period_samples: {}, or "
+             "list the rows of each run in the key runs. If the excitation was measured, "
+             "add excitation_period: mean",
+             row, period);
 }
 
 }  // namespace
@@ -84,8 +83,8 @@ RunRows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::
   const auto period = static_cast<Eigen::Index>(map.period_samples);
   RunRows rows{static_cast<Eigen::Index>(run.first_row), static_cast<Eigen::Index>(run.rows)};
   if (rows.first > samples || rows.count > samples - rows.first)
-    refuse_map(map, fmt::format("runs: rows {} to {} are out of range; {} has {}", rows.first,
-                                rows.first + rows.count, arrays.file.string(), samples));
+    refuse_map(map, "runs: rows {} to {} are out of range; {} has {}", rows.first,
+               rows.first + rows.count, arrays.file.string(), samples);
   if (rows.count == 0) rows.count = samples - rows.first;
   const Eigen::Index periods = rows.count / period;
   const std::string where = map.runs.empty()
@@ -93,19 +92,17 @@ RunRows rows_of(const ArrayList& arrays, const ImportMap& map, const ImportMap::
                                 : fmt::format("runs: the run at row {} has", rows.first);
   if (periods <= static_cast<Eigen::Index>(map.transient_periods))
     refuse_map(
-        map,
-        fmt::format(
-            "{} {}, {} of period_samples: {}; expected {} and at least one more. Correct {}", where,
-            counted(rows.count, "row"), counted(periods, "whole period"), period,
-            counted(map.transient_periods, "transient period"),
-            map.transient_periods > 0 ? "transient_periods or period_samples" : "period_samples"));
+        map, "{} {}, {} of period_samples: {}; expected {} and at least one more. Correct {}",
+        where, counted(rows.count, "row"), counted(periods, "whole period"), period,
+        counted(map.transient_periods, "transient period"),
+        map.transient_periods > 0 ? "transient_periods or period_samples" : "period_samples");
   if (rows.count % period != 0)
     refuse_map(map,
-               fmt::format("{} {}, not a multiple of period_samples: {}. {} {{first_row: {}, rows: "
-                           "{}}} to use {}, or correct period_samples",
-                           where, counted(rows.count, "row"), period,
-                           map.runs.empty() ? "Add the key runs with" : "Write", rows.first,
-                           periods * period, counted(periods, "period")));
+               "{} {}, not a multiple of period_samples: {}. {} {{first_row: {}, rows: "
+               "{}}} to use {}, or correct period_samples",
+               where, counted(rows.count, "row"), period,
+               map.runs.empty() ? "Add the key runs with" : "Write", rows.first, periods * period,
+               counted(periods, "period"));
   return rows;
 }
 
@@ -114,11 +111,9 @@ Eigen::MatrixXd period_of(const ArrayList& arrays, const ImportMap& map,
   const auto period = static_cast<Eigen::Index>(map.period_samples);
   if (excitation.samples.rows() == period) return excitation.samples;
   if (rows.first + rows.count > excitation.samples.rows())
-    throw FormatError(
-        arrays.file, map.excitation.arrays.front(),
-        fmt::format(
-            "has {} samples; expected at least {}, the last row of a run, or one period of {}",
-            excitation.samples.rows(), rows.first + rows.count, period));
+    arrays.fail(map.excitation.arrays.front(),
+                "has {} samples; expected at least {}, the last row of a run, or one period of {}",
+                excitation.samples.rows(), rows.first + rows.count, period);
   const SampleRows all = excitation.samples.middleRows(rows.first, rows.count);
   const bool mean = map.excitation_period == ImportMap::ExcitationPeriod::mean;
   const Eigen::Index first = mean ? static_cast<Eigen::Index>(map.transient_periods) * period : 0;

@@ -11,8 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
-
 namespace stageid {
 namespace {
 
@@ -99,22 +97,22 @@ double sample_rate_of(const ArrayList& arrays, const ImportMap& map) {
                              return agree(rate.hz, map.sample_rate_hz);
                            });
     if (confirmed) return map.sample_rate_hz;
-    refuse_map(
-        map, fmt::format("sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "
-                         "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
-                         map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz),
-                         rates.front().told_by, arrays.file.string()));
+    refuse_map(map,
+               "sample_rate_hz: {} contradicts {} Hz, from '{}' of {}. Correct "
+               "sample_rate_hz, or write file_sample_rate: ignored if the file is wrong",
+               map.sample_rate_hz, fmt::format("{:.6g}", rates.front().hz), rates.front().told_by,
+               arrays.file.string());
   }
   if (rates.empty())
-    refuse_map(map,
-               fmt::format("a log needs sample_rate_hz, which {} does not contain; add the key",
-                           arrays.file.string()));
+    refuse_map(map, "a log needs sample_rate_hz, which {} does not contain; add the key",
+               arrays.file.string());
   for (const FileRate& rate : rates)
     if (!agree(rate.hz, rates.front().hz))
-      refuse_map(map, fmt::format("a log needs sample_rate_hz: '{}' of {} is {:.6g} Hz, but '{}' "
-                                  "is {:.6g} Hz; add the key",
-                                  rates.front().told_by, arrays.file.string(), rates.front().hz,
-                                  rate.told_by, rate.hz));
+      refuse_map(map,
+                 "a log needs sample_rate_hz: '{}' of {} is {:.6g} Hz, but '{}' "
+                 "is {:.6g} Hz; add the key",
+                 rates.front().told_by, arrays.file.string(), rates.front().hz, rate.told_by,
+                 rate.hz);
   return snapped(rates.front().hz);
 }
 

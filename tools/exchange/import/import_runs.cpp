@@ -29,8 +29,8 @@ std::vector<ImportMap::Run> entries_of(const ImportMap& map, const RunAxes& axes
   for (std::size_t r = 0; r < runs && map.runs.empty(); ++r)
     entries.push_back({.realization = static_cast<std::int64_t>(r)});
   if (entries.size() != runs)
-    refuse_map(map, fmt::format("runs: {}; axis run has {}. Give one entry per run",
-                                counted(entries.size(), "entry", "entries"), runs));
+    refuse_map(map, "runs: {}; axis run has {}. Give one entry per run",
+               counted(entries.size(), "entry", "entries"), runs);
   return entries;
 }
 
@@ -79,9 +79,8 @@ std::vector<ImportedRun> runs_of(const ArrayList& arrays, const ImportMap& map,
             if (axes.contains(what)) sources.emplace_back("axis " + what, along_axis);
             if (listed != 0) sources.emplace_back("runs", listed);
             if (sources.size() > 1)
-              refuse_map(map,
-                         fmt::format("the {} of a run is given by {} and by {}; keep one of them",
-                                     what, sources[0].first, sources[1].first));
+              refuse_map(map, "the {} of a run is given by {} and by {}; keep one of them", what,
+                         sources[0].first, sources[1].first);
             return sources.empty() ? 0 : sources[0].second;
           };
           run.run.realization =

@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "tools/exchange/import/si_unit.hpp"
 
 namespace stageid {
@@ -32,11 +31,9 @@ const NamedArray& array_of(const ArrayList& arrays, const ImportMap& map, const 
   const auto number = [](const char* key, const std::optional<long long>& value) {
     return value ? fmt::format(" {} {}", key, *value) : std::string();
   };
-  throw FormatError(
-      arrays.file, "",
-      fmt::format("has no '{}' of{}{}, which '{}' requires. Add it, or correct the pattern in {}",
-                  name, number("realization", wanted.realization),
-                  number("experiment", wanted.experiment), name, map.file.string()));
+  arrays.fail("", "has no '{}' of{}{}, which '{}' requires. Add it, or correct the pattern in {}",
+              name, number("realization", wanted.realization),
+              number("experiment", wanted.experiment), name, map.file.string());
 }
 
 /// Extent and step of every declared axis.
@@ -52,10 +49,9 @@ std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
   while (shape.size() < names.size()) shape.push_back(1);  // MATLAB drops trailing ones
   while (shape.size() > names.size() && shape.back() == 1) shape.pop_back();
   if (shape.size() != names.size())
-    throw FormatError(arrays.file, array.name,
-                      fmt::format("has the shape {}; axes: [{}] lists {}. List every axis",
-                                  fmt::join(array.shape, " x "), fmt::join(names, ", "),
-                                  counted(names.size(), "axis", "axes")));
+    arrays.fail(array.name, "has the shape {}; axes: [{}] lists {}. List every axis",
+                fmt::join(array.shape, " x "), fmt::join(names, ", "),
+                counted(names.size(), "axis", "axes"));
   std::vector<Axis> axes(shape.size());
   std::size_t step = 1;
   for (std::size_t q = shape.size(); q-- > 0; step *= shape[q]) axes[q] = {shape[q], step};
@@ -65,15 +61,15 @@ std::vector<Axis> axes_of(const ArrayList& arrays, const NamedArray& array,
 /// Without `axes`: samples x channels; both rows and columns of MATLAB are vectors.
 SampleRows plain_samples(const ArrayList& arrays, const NamedArray& array, const char* key) {
   if (array.shape.size() > 2)
-    throw FormatError(arrays.file, array.name,
-                      fmt::format("has the shape {}. List its axes in the map: {}: {{arrays: [{}], "
-                                  "axes: [sample, channel, run]}}, in their order; allowed are "
-                                  "sample, channel, realization, experiment and run",
-                                  fmt::join(array.shape, " x "), key, array.name));
+    arrays.fail(array.name,
+                "has the shape {}. List its axes in the map: {}: {{arrays: [{}], "
+                "axes: [sample, channel, run]}}, in their order; allowed are "
+                "sample, channel, realization, experiment and run",
+                fmt::join(array.shape, " x "), key, array.name);
   const std::vector<double>& values = real_values(arrays, array);
   const bool vector = array.shape.size() < 2 || array.shape[0] == 1;
   const auto rows = static_cast<Eigen::Index>(vector ? values.size() : array.shape[0]);
-  if (rows == 0) throw FormatError(arrays.file, array.name, "is empty; expected samples");
+  if (rows == 0) arrays.fail(array.name, "is empty; expected samples");
   return Eigen::Map<const SampleRows>(values.data(), rows, std::ssize(values) / rows);
 }
 
@@ -93,7 +89,7 @@ SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
     else
       first += axes[q].step * place.indices.at(names[q]);
   }
-  if (values.empty()) throw FormatError(arrays.file, array.name, "is empty; expected samples");
+  if (values.empty()) arrays.fail(array.name, "is empty; expected samples");
   SampleRows out(sample.extent, channel.extent);
   for (std::size_t n = 0; n < sample.extent; ++n)
     for (std::size_t c = 0; c < channel.extent; ++c)
@@ -107,18 +103,17 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
   const auto count = static_cast<std::size_t>(out.samples.cols());
   if (!group.names.empty()) out.channels.names = group.names;
   if (out.channels.names.size() != count)
-    refuse_map(map,
-               fmt::format("{}: got {} for {}; write names: [...]", key,
-                           counted(out.channels.names.size(), "name"), counted(count, "channel")));
+    refuse_map(map, "{}: got {} for {}; write names: [...]", key,
+               counted(out.channels.names.size(), "name"), counted(count, "channel"));
   out.channels.units = units_of(map, key, group.unit, count);
   if (!group.scale.empty() && group.scale.size() != count)
-    refuse_map(map, fmt::format("{}: got {} for {}; write one per channel", key,
-                                counted(group.scale.size(), "scale"), counted(count, "channel")));
+    refuse_map(map, "{}: got {} for {}; write one per channel", key,
+               counted(group.scale.size(), "scale"), counted(count, "channel"));
   std::vector<double> factors;
   try {
     factors = take_si_units(key, out.channels, notes);
   } catch (const std::invalid_argument& error) {
-    refuse_map(map, error.what());
+    refuse_map(map, "{}", error.what());
   }
   for (std::size_t c = 0; c < count; ++c) {
     const double factor = factors[c] * (group.scale.empty() ? 1.0 : group.scale[c]);
@@ -141,10 +136,9 @@ RunAxes run_axes_of(const ArrayList& arrays, const ImportMap& map) {
         if (axis == "sample" || axis == "channel") continue;
         const std::size_t known = out.emplace(axis, axes[q].extent).first->second;
         if (known != axes[q].extent)
-          throw FormatError(
-              arrays.file, array.name,
-              fmt::format("has {} along axis {}; another array has {}. The numbers must be equal",
-                          axes[q].extent, axis, known));
+          arrays.fail(array.name,
+                      "has {} along axis {}; another array has {}. The numbers must be equal",
+                      axes[q].extent, axis, known);
       }
     }
   return out;
@@ -174,9 +168,8 @@ SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const ch
     const NamedArray& array = array_of(arrays, map, name, place.names);
     const SampleRows columns = samples_of(arrays, array, group.axes, key, place);
     if (out.samples.cols() > 0 && columns.rows() != out.samples.rows())
-      throw FormatError(arrays.file, array.name,
-                        fmt::format("has {} samples; '{}' has {}", columns.rows(),
-                                    group.arrays.front(), out.samples.rows()));
+      arrays.fail(array.name, "has {} samples; '{}' has {}", columns.rows(), group.arrays.front(),
+                  out.samples.rows());
     const Eigen::Index first = out.samples.cols();
     out.samples.conservativeResize(columns.rows(), first + columns.cols());
     out.samples.rightCols(columns.cols()) = columns;
@@ -185,10 +178,10 @@ SignalGroup read_signals(const ArrayList& arrays, const ImportMap& map, const ch
   }
   for (Eigen::Index k = 0; k < out.samples.rows(); ++k)
     if (!out.samples.row(k).allFinite())
-      throw FormatError(arrays.file, "",
-                        fmt::format("{}: sample {} is not finite. Correct it, or import the other "
-                                    "rows with runs: [{{first_row: ..., rows: ...}}]",
-                                    key, k));
+      arrays.fail("",
+                  "{}: sample {} is not finite. Correct it, or import the other "
+                  "rows with runs: [{{first_row: ..., rows: ...}}]",
+                  key, k);
   name_channels(map, key, group, out, notes);
   return out;
 }

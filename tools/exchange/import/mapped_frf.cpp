@@ -7,7 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "acquisition/files/file_error.hpp"
 #include "frf/file/line_datasets.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/import/import_signals.hpp"
@@ -23,8 +22,8 @@ std::vector<std::size_t> axis_places(const ImportMap& map) {
   for (const char* axis : {"line", "output", "input"}) {
     const auto found = std::ranges::find(map.axes, axis);
     if (found == map.axes.end())
-      refuse_map(map, fmt::format("axes: got {}; expected line, output and input in any order",
-                                  fmt::join(map.axes, ", ")));
+      refuse_map(map, "axes: got {}; expected line, output and input in any order",
+                 fmt::join(map.axes, ", "));
     places.push_back(static_cast<std::size_t>(found - map.axes.begin()));
   }
   return places;
@@ -37,23 +36,21 @@ NamedArray arranged(const ArrayList& arrays, const NamedArray& array, const Impo
   if (map.axes.empty()) {
     if (!array.is_vector() || array.size() != lines)
       refuse_map(map,
-                 fmt::format("key 'axes' is missing; '{}' has the shape {} with {} frequencies, "
-                             "write for example axes: [output, input, line]",
-                             array.name, fmt::join(array.shape, " x "), lines));
+                 "key 'axes' is missing; '{}' has the shape {} with {} frequencies, "
+                 "write for example axes: [output, input, line]",
+                 array.name, fmt::join(array.shape, " x "), lines);
     result.shape = {array.size(), 1, 1};
     return result;
   }
   // MATLAB drops trailing axes of length one; a vector is a single channel.
   while (result.shape.size() < 3) result.shape.push_back(1);
   if (result.shape.size() > 3)
-    throw FormatError(arrays.file, array.name,
-                      fmt::format("has the shape {}; expected lines, outputs and inputs",
-                                  fmt::join(array.shape, " x ")));
+    arrays.fail(array.name, "has the shape {}; expected lines, outputs and inputs",
+                fmt::join(array.shape, " x "));
   result = permuted(result, axis_places(map));
   if (result.shape[0] != lines)
-    throw FormatError(arrays.file, array.name,
-                      fmt::format("has the shape {} with axes {}; expected {} frequencies",
-                                  fmt::join(array.shape, " x "), fmt::join(map.axes, ", "), lines));
+    arrays.fail(array.name, "has the shape {} with axes {}; expected {} frequencies",
+                fmt::join(array.shape, " x "), fmt::join(map.axes, ", "), lines);
   return result;
 }
 
@@ -64,7 +61,7 @@ std::vector<std::string> names_or(const ImportMap& map, const char* key,
   for (std::size_t k = 0; k < count && given.empty(); ++k)
     names.push_back(fmt::format("{}{}", prefix, k + 1));
   if (names.size() != count)
-    refuse_map(map, fmt::format("{}: got {} names; the response has {}", key, names.size(), count));
+    refuse_map(map, "{}: got {} names; the response has {}", key, names.size(), count);
   return names;
 }
 
@@ -81,8 +78,7 @@ Complex complex_of(const ArrayList& arrays, const std::string& real, const std::
   if (imaginary.empty()) return values;
   const std::vector<double>& parts = real_values(arrays, arrays.at(imaginary));
   if (parts.size() != values.size())
-    throw FormatError(arrays.file, imaginary,
-                      fmt::format("has {} values; '{}' has {}", parts.size(), real, values.size()));
+    arrays.fail(imaginary, "has {} values; '{}' has {}", parts.size(), real, values.size());
   for (std::size_t k = 0; k < values.size(); ++k) values[k] = {values[k].real(), parts[k]};
   return values;
 }
@@ -98,16 +94,14 @@ double scalar_of(const ArrayList& arrays, const ImportMap::Scalar& scalar) {
   if (scalar.number) return *scalar.number;
   const std::vector<double>& values = real_values(arrays, arrays.at(scalar.variable));
   if (values.size() != 1)
-    throw FormatError(arrays.file, scalar.variable,
-                      fmt::format("has {} values; expected one number", values.size()));
+    arrays.fail(scalar.variable, "has {} values; expected one number", values.size());
   return values.front();
 }
 
 /// As many frequencies as the response has lines.
 std::vector<double> even_frequencies(const ArrayList& arrays, const ImportMap& map) {
   const double first = scalar_of(arrays, map.first_hz), step = scalar_of(arrays, map.step_hz);
-  if (!(step > 0.0))
-    refuse_map(map, fmt::format("step_hz: {} is not positive; write a positive number", step));
+  if (!(step > 0.0)) refuse_map(map, "step_hz: {} is not positive; write a positive number", step);
   const ImportMap::Channel* channel = map.channels.empty() ? nullptr : &map.channels.front();
   const NamedArray& array = arrays.at(channel == nullptr            ? map.response
                                       : !channel->response.empty()  ? channel->response
@@ -136,8 +130,7 @@ void read_whole_response(const ArrayList& arrays, const ImportMap& map, FrfEstim
     if (name.empty()) return {};
     const NamedArray found = arranged(arrays, arrays.at(name), map, lines);
     if (found.shape != array.shape)
-      throw FormatError(arrays.file, name,
-                        fmt::format("does not have the shape of '{}'", map.response));
+      arrays.fail(name, "does not have the shape of '{}'", map.response);
     return vec_columns(real_values(arrays, found), found.shape);
   };
   frf.noise_variance = variance(map.noise_variance);
@@ -158,8 +151,7 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
   const auto place = [&](const std::vector<std::string>& names, const std::string& name) {
     const auto found = std::ranges::find(names, name);
     if (found == names.end())
-      refuse_map(map, fmt::format("channels: unknown name '{}'; use one of {}", name,
-                                  fmt::join(names, ", ")));
+      refuse_map(map, "channels: unknown name '{}'; use one of {}", name, fmt::join(names, ", "));
     return found - names.begin();
   };
   for (const ImportMap::Channel& channel : map.channels) {
@@ -170,9 +162,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
                              frf.n_outputs() * place(frf.inputs.names, channel.input);
     const auto put = [&](const auto& column, auto& matrix) {
       if (std::ssize(column) != frf.lines())
-        refuse_map(map,
-                   fmt::format("channels: {} <- {} has {} values; expected {}, one per frequency",
-                               channel.output, channel.input, column.size(), frf.lines()));
+        refuse_map(map, "channels: {} <- {} has {} values; expected {}, one per frequency",
+                   channel.output, channel.input, column.size(), frf.lines());
       std::copy(column.begin(), column.end(), matrix.row(row).begin());
     };
     put(values, frf.response);
@@ -182,9 +173,8 @@ void read_channels(const ArrayList& arrays, const ImportMap& map, FrfEstimate& f
       put(real_values(arrays, arrays.at(channel.total_variance)), frf.total_variance);
   }
   if (map.channels.size() != frf.outputs.size() * frf.inputs.size())
-    refuse_map(map,
-               fmt::format("channels: got {} for {} outputs and {} inputs; write every pair once",
-                           map.channels.size(), frf.outputs.size(), frf.inputs.size()));
+    refuse_map(map, "channels: got {} for {} outputs and {} inputs; write every pair once",
+               map.channels.size(), frf.outputs.size(), frf.inputs.size());
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/formats/convert_log.hpp"
 #include "acquisition/formats/open_log.hpp"
@@ -34,7 +33,7 @@ LogInfo info_of(const ArrayList& arrays, const ImportMap& map, const SignalGroup
   try {
     check_log_info(info);
   } catch (const std::invalid_argument& error) {
-    refuse_map(map, error.what());
+    refuse_map(map, "{}", error.what());
   }
   return info;
 }
@@ -55,9 +54,8 @@ class LogImport {
     const SignalGroup actuators = read("actuators", map_.actuators);
     const SignalGroup sensors = read("sensors", map_.sensors);
     if (actuators.samples.rows() != sensors.samples.rows())
-      refuse_map(map_,
-                 fmt::format("actuators have {} samples, sensors {}; the numbers must be equal",
-                             actuators.samples.rows(), sensors.samples.rows()));
+      refuse_map(map_, "actuators have {} samples, sensors {}; the numbers must be equal",
+                 actuators.samples.rows(), sensors.samples.rows());
     const LogInfo info = info_of(arrays, map_, excitation, actuators, sensors);
     const RunRows rows = rows_of(arrays, map_, run.run, actuators.samples.rows());
     const Eigen::MatrixXd period = period_of(arrays, map_, excitation, rows);
@@ -85,20 +83,19 @@ class LogImport {
       return;
     }
     if (!same_measurement(info, info_))
-      throw FormatError(arrays.file, "",
-                        fmt::format("has {} excitation, {} actuator and {} sensor channels at {} "
-                                    "Hz; the previous runs differ. Import this file separately",
-                                    info.excitation.size(), info.actuators.size(),
-                                    info.sensors.size(), info.sample_rate_hz));
+      arrays.fail("",
+                  "has {} excitation, {} actuator and {} sensor channels at {} "
+                  "Hz; the previous runs differ. Import this file separately",
+                  info.excitation.size(), info.actuators.size(), info.sensors.size(),
+                  info.sample_rate_hz);
   }
 
   void require_another(const ImportMap::Run& run) {
     if (!runs_.emplace(run.realization, run.experiment).second)
-      refuse_map(
-          map_,
-          fmt::format("duplicate run: realization {}, experiment {} (counted from 1); separate "
-                      "the runs with the key runs, an axis or the pattern of the names",
-                      run.realization + 1, run.experiment + 1));
+      refuse_map(map_,
+                 "duplicate run: realization {}, experiment {} (counted from 1); separate "
+                 "the runs with the key runs, an axis or the pattern of the names",
+                 run.realization + 1, run.experiment + 1);
   }
 
   /// A realization that lacks one of its experiments is unusable, so report a missing run here.

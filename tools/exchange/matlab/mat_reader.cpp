@@ -128,9 +128,9 @@ void require_all_of(const Hdf5File& file, const std::string& group, int depth, A
       require_all_of(file, object, depth + 1, list);
     } else if (!is_read(list, name) && !file.has_attribute(object, "MATLAB_empty") &&
                !(depth > 0 && is_read(list, group.substr(1) + "/0/" + child))) {
-      throw FormatError(list.file, name,
-                        "its data cannot be read; the file is damaged. Save it again in MATLAB, "
-                        "for example with -v7");
+      list.fail(name,
+                "its data cannot be read; the file is damaged. Save it again in MATLAB, "
+                "for example with -v7");
     }
   }
 }
@@ -236,7 +236,7 @@ class Reader {
   }
 
   [[noreturn]] void damaged(const std::string& name) const {
-    throw FormatError(list_.file, name, "its data cannot be read; the file is damaged");
+    list_.fail(name, "its data cannot be read; the file is damaged");
   }
 
   std::string text_of(const matvar_t& variable) const {
@@ -299,10 +299,10 @@ class Reader {
     const std::size_t columns = variable.dims[1];
     if (sparse == nullptr || sparse->jc == nullptr || sparse->njc != columns + 1) damaged(name);
     if (columns > 0 && rows > kMostFullNumbers / columns)
-      throw FormatError(list_.file, name,
-                        fmt::format("is a sparse matrix of {} x {}, too large for a full one. Save "
-                                    "the needed part with full()",
-                                    rows, columns));
+      list_.fail(name,
+                 "is a sparse matrix of {} x {}, too large for a full one. Save "
+                 "the needed part with full()",
+                 rows, columns);
     const std::size_t count = sparse->ndata;
     if (count > 0 && sparse->data == nullptr) damaged(name);
     const auto nonzero = numbers_of(variable, sparse->data, count);
