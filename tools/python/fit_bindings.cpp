@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "acquisition/files/fingerprint.hpp"
 #include "estimation/model/cmif.hpp"

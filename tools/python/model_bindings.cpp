@@ -3,7 +3,6 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
-#include <memory>
 #include <stdexcept>
 #include <utility>
 

@@ -13,7 +13,6 @@
 #include "tools/python/arguments.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/interruptible.hpp"
-#include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
 namespace {

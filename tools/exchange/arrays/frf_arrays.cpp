@@ -1,7 +1,5 @@
 #include "tools/exchange/arrays/frf_arrays.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <iterator>
 #include <sstream>

@@ -6,7 +6,6 @@
 #include "tools/exchange/import/import_map.hpp"
 #include "tools/exchange/import/import_runs.hpp"
 #include "tools/exchange/import/import_summary.hpp"
-#include "tools/terminal/console.hpp"
 
 namespace stageid {
 

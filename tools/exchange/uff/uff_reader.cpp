@@ -1,10 +1,8 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 
-#include "acquisition/files/file_error.hpp"
 #include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
 #include "tools/terminal/text_lines.hpp"

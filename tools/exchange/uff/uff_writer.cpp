@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
