@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
@@ -48,12 +47,9 @@ std::optional<RunNumbers> match(const Expression& expression, const std::string&
   std::smatch found;
   if (!std::regex_match(text, found, expression.regex)) return std::nullopt;
   RunNumbers numbers;
-  for (std::size_t k = 0; k < expression.is_realization.size(); ++k) {
-    const std::string digits = found[k + 1].str();
-    long long value = 0;
-    std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    (expression.is_realization[k] ? numbers.realization : numbers.experiment) = value;
-  }
+  for (std::size_t k = 0; k < expression.is_realization.size(); ++k)
+    (expression.is_realization[k] ? numbers.realization : numbers.experiment) =
+        std::stoll(found[k + 1]);
   return numbers;
 }
 
