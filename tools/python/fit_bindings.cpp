@@ -128,19 +128,14 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
 py::object covariance_of(const py::object& self) {
   const auto& r = self.cast<const FitResult&>();
   if (r.covariance.sandwich.size() == 0) return py::none();
-  py::list names, units;
-  std::vector<double> values;
-  for (const NamedParameter& parameter : named_parameters(r)) {
-    names.append(parameter.name);
-    units.append(parameter.unit);
-    values.push_back(parameter.value);
-  }
+  const NamedParameters parameters = named_parameters(r);
   const Eigen::Index n_y = r.model.n_outputs();
   const auto lines = [&](const Eigen::MatrixXd& columns) {
     return lines_view<double>(columns, n_y, self);
   };
-  return result("Covariance", "name"_a = names, "unit"_a = units, "value"_a = array_of(values),
-                "sandwich"_a = r.covariance.sandwich, "likelihood"_a = r.covariance.likelihood,
+  return result("Covariance", "name"_a = parameters.names, "unit"_a = parameters.units,
+                "value"_a = array_of(parameters.values), "sandwich"_a = r.covariance.sandwich,
+                "likelihood"_a = r.covariance.likelihood,
                 "response_variance"_a = lines(r.covariance.response_variance),
                 "confidence_radius"_a = lines(r.covariance.response_radius));
 }

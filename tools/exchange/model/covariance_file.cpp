@@ -22,42 +22,49 @@ std::string numerator_unit(const AdditiveModel& model, Eigen::Index y, Eigen::In
 }
 
 /// A common delay applies to all inputs; with one per channel, that of the last output is held.
-void add_delays(const AdditiveModel& model, Eigen::Index delays, std::vector<NamedParameter>& out) {
+void add_delays(const AdditiveModel& model, Eigen::Index delays, NamedParameters& out) {
   const Eigen::VectorXd inputs = model.input_delays_s();
-  if (delays == 1 && model.n_inputs() + model.n_outputs() > 2) {
-    out.push_back({"input_delay_s", "s", inputs[0]});
-    return;
-  }
+  if (delays == 1 && model.n_inputs() + model.n_outputs() > 2)
+    return out.add("input_delay_s", "s", inputs[0]);
   for (Eigen::Index p = 0; p < delays; ++p) {
     const Eigen::Index y = p - model.n_inputs();
     if (y < 0)
-      out.push_back({fmt::format("input_delay_s[{}]", p), "s", inputs[p]});
+      out.add(fmt::format("input_delay_s[{}]", p), "s", inputs[p]);
     else
-      out.push_back({fmt::format("output_delay_s[{}]", y), "s", model.output_delays_s()[y]});
+      out.add(fmt::format("output_delay_s[{}]", y), "s", model.output_delays_s()[y]);
   }
 }
 
 }  // namespace
 
-std::vector<NamedParameter> named_parameters(const FitResult& result) {
+void NamedParameters::add(const std::string& name, const std::string& unit, double value) {
+  names.push_back(name);
+  units.push_back(unit);
+  values.push_back(value);
+}
+
+NamedParameters named_parameters(const FitResult& result) {
   const AdditiveModel& model = result.model;
-  std::vector<NamedParameter> out, numerators;
+  NamedParameters out;
+  Eigen::Index numerators = 0;
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
     const Submodel& s = model.submodels[i];
     for (std::size_t q = 1; q < s.denominator.size(); ++q)
-      out.push_back({fmt::format("submodels[{}].denominator[{}]", i, q), fmt::format("s^{}", q),
-                     s.denominator[q]});
+      out.add(fmt::format("submodels[{}].denominator[{}]", i, q), fmt::format("s^{}", q),
+              s.denominator[q]);
+    numerators += std::ssize(s.numerator) * model.n_inputs() * model.n_outputs();
+  }
+  // The remaining rows are the free delays.
+  add_delays(model, result.covariance.sandwich.rows() - std::ssize(out.names) - numerators, out);
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    const Submodel& s = model.submodels[i];
     for (std::size_t m = 0; m < s.numerator.size(); ++m)
       for (Eigen::Index u = 0; u < model.n_inputs(); ++u)
         for (Eigen::Index y = 0; y < model.n_outputs(); ++y)
-          numerators.push_back({fmt::format("submodels[{}].numerator[{}][{}][{}]", i, m, y, u),
-                                numerator_unit(model, y, u, static_cast<int>(m) - s.integrators),
-                                s.numerator[m](y, u)});
+          out.add(fmt::format("submodels[{}].numerator[{}][{}][{}]", i, m, y, u),
+                  numerator_unit(model, y, u, static_cast<int>(m) - s.integrators),
+                  s.numerator[m](y, u));
   }
-  // The remaining rows are the free delays.
-  const auto known = static_cast<Eigen::Index>(out.size() + numerators.size());
-  add_delays(model, result.covariance.sandwich.rows() - known, out);
-  out.insert(out.end(), numerators.begin(), numerators.end());
   return out;
 }
 
@@ -65,13 +72,7 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
                       const Eigen::VectorXd& frequency_hz) {
   const AdditiveModel& model = result.model;
   const FitCovariance& covariance = result.covariance;
-  std::vector<std::string> names, units;
-  std::vector<double> values;
-  for (const NamedParameter& parameter : named_parameters(result)) {
-    names.push_back(parameter.name);
-    units.push_back(parameter.unit);
-    values.push_back(parameter.value);
-  }
+  const NamedParameters parameters = named_parameters(result);
   OutputFile output(target);
   Hdf5File file = Hdf5File::create(output.path(), target);
   file.write_attribute("/", "format", std::string("stageid-covariance"));
@@ -79,9 +80,9 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
   file.write_attribute("/", "weighting", model.fit.weighting);
   write_channels(file, model);
   file.create_group("/parameters");
-  file.write_texts("/parameters/name", names);
-  file.write_texts("/parameters/unit", units);
-  write_vector(file, "/parameters/value", values);
+  file.write_texts("/parameters/name", parameters.names);
+  file.write_texts("/parameters/unit", parameters.units);
+  write_vector(file, "/parameters/value", parameters.values);
   file.create_group("/covariance");
   write_matrix(file, "/covariance/sandwich", covariance.sandwich);
   write_matrix(file, "/covariance/likelihood", covariance.likelihood);

@@ -8,15 +8,16 @@
 
 namespace stageid {
 
-/// A parameter of FitCovariance.
-struct NamedParameter {
-  std::string name;  ///< key in model.json: submodels[1].numerator[0][y][u]
-  std::string unit;
-  double value = 0.0;
-};
 /// The parameters of the rows of FitCovariance.
+struct NamedParameters {
+  std::vector<std::string> names;  ///< key in model.json: submodels[1].numerator[0][y][u]
+  std::vector<std::string> units;
+  std::vector<double> values;
+
+  void add(const std::string& name, const std::string& unit, double value);
+};
 /// @pre result.covariance is not empty
-std::vector<NamedParameter> named_parameters(const FitResult& result);
+NamedParameters named_parameters(const FitResult& result);
 
 /// Writes the covariance of a fit as in docs/formats.md, atomically.
 /// @pre result.covariance is not empty   @throws FileError
