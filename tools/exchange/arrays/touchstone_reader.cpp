@@ -17,26 +17,19 @@ namespace {
 
 enum class Form : unsigned char { real_imaginary, magnitude_angle, decibel_angle };
 
-/// Parameters by the quantities of outputs and inputs whose ratio is their unit: one for all ports, or one per port.
+/// Parameters by the quantities of outputs and inputs whose ratio is their unit: of the first and of the other ports.
 struct Parameters {
   char letter;
   std::string_view outputs, inputs;
   const char* note;  ///< how the reference resistance is removed
 
-  std::string_view output(std::size_t port) const { return of(outputs, port); }
-  std::string_view input(std::size_t port) const { return of(inputs, port); }
-  bool two_ports() const { return outputs.size() == 2; }
-
- private:
-  static std::string_view of(std::string_view quantities, std::size_t port) {
-    return quantities.substr(quantities.size() == 1 ? 0 : port, 1);
-  }
+  bool two_ports() const { return outputs[0] != outputs[1]; }
 };
 
 constexpr Parameters kParameters[] = {
-    {'S', "1", "1", ""},
-    {'Z', "V", "A", "multiplied by the reference resistance {} ohm: V/A (ohm)"},
-    {'Y', "A", "V", "divided by the reference resistance {} ohm: A/V (S)"},
+    {'S', "11", "11", ""},
+    {'Z', "VV", "AA", "multiplied by the reference resistance {} ohm: V/A (ohm)"},
+    {'Y', "AA", "VV", "divided by the reference resistance {} ohm: A/V (S)"},
     {'H', "VA", "AV",
      "rescaled by the reference resistance {} ohm: h11 in V/A (ohm), h22 in A/V (S)"},
     {'G', "AV", "VA",
@@ -164,8 +157,8 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
   FrfEstimate frf;
   for (std::size_t port = 0; port < static_cast<std::size_t>(ports); ++port) {
     frf.inputs.names.push_back(fmt::format("port{}", port + 1));
-    frf.inputs.units.emplace_back(parameters.input(port));
-    frf.outputs.units.emplace_back(parameters.output(port));
+    frf.inputs.units.emplace_back(1, parameters.inputs[std::min<std::size_t>(port, 1)]);
+    frf.outputs.units.emplace_back(1, parameters.outputs[std::min<std::size_t>(port, 1)]);
   }
   frf.outputs.names = frf.inputs.names;
   frf.frequency_hz.resize(static_cast<Eigen::Index>(count));

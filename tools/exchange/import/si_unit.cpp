@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 namespace stageid {
 namespace {
@@ -51,34 +51,28 @@ std::optional<KnownUnit> known_unit(std::string_view text) {
   return std::nullopt;
 }
 
-struct Prefix {
-  std::string_view text;
-  double factor;
-};
-
-constexpr Prefix kPrefixes[] = {{"f", 1e-15},     {"p", 1e-12},     {"n", 1e-9}, {"u", 1e-6},
-                                {"\u00b5", 1e-6}, {"\u03bc", 1e-6}, {"m", 1e-3}, {"c", 1e-2},
-                                {"d", 1e-1},      {"h", 1e2},       {"k", 1e3},  {"M", 1e6},
-                                {"G", 1e9}};
+constexpr std::pair<std::string_view, double> kPrefixes[] = {
+    {"f", 1e-15},     {"p", 1e-12}, {"n", 1e-9}, {"u", 1e-6}, {"\u00b5", 1e-6},
+    {"\u03bc", 1e-6}, {"m", 1e-3},  {"c", 1e-2}, {"d", 1e-1}, {"h", 1e2},
+    {"k", 1e3},       {"M", 1e6},   {"G", 1e9}};
 
 std::optional<SiUnit> plain_unit(std::string_view text) {
   if (const auto unit = known_unit(text)) return SiUnit{std::string(unit->si), unit->factor};
-  for (const Prefix& prefix : kPrefixes) {
-    if (!text.starts_with(prefix.text)) continue;
-    const std::string_view rest = text.substr(prefix.text.size());
+  for (const auto& [prefix, factor] : kPrefixes) {
+    if (!text.starts_with(prefix)) continue;
+    const std::string_view rest = text.substr(prefix.size());
     const std::optional<KnownUnit> unit = known_unit(rest);
     // Kiloseconds are not used, and Gs is gauss.
-    if (unit && unit->takes_prefix && !(rest == "s" && prefix.factor > 1.0))
-      return SiUnit{std::string(unit->si), prefix.factor * unit->factor};
-    if (rest == "g") return SiUnit{"kg", 1e-3 * prefix.factor};
+    if (unit && unit->takes_prefix && !(rest == "s" && factor > 1.0))
+      return SiUnit{std::string(unit->si), factor * unit->factor};
+    if (rest == "g") return SiUnit{"kg", 1e-3 * factor};
   }
   return std::nullopt;
 }
 
 /// "s^2", "s2", "s\u00b2": unit and exponent.
 std::optional<SiUnit> powered_unit(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, int>, 2> kRaised = {
-      {{"\u00b2", 2}, {"\u00b3", 3}}};
+  constexpr std::pair<std::string_view, int> kRaised[] = {{"\u00b2", 2}, {"\u00b3", 3}};
   std::string_view base = text;
   int exponent = 1;
   for (const auto& [raised, value] : kRaised)
