@@ -89,12 +89,9 @@ SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
       first += axes[q].step * place.indices.at(names[q]);
   }
   if (values.empty()) arrays.fail(array.name, "is empty; expected samples");
-  SampleRows out(sample.extent, channel.extent);
-  for (std::size_t n = 0; n < sample.extent; ++n)
-    for (std::size_t c = 0; c < channel.extent; ++c)
-      out(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(c)) =
-          values[first + n * sample.step + c * channel.step];
-  return out;
+  using Steps = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>;
+  return Eigen::Map<const SampleRows, 0, Steps>(values.data() + first, sample.extent,
+                                                channel.extent, Steps(sample.step, channel.step));
 }
 
 void name_channels(const ImportMap& map, const char* key, const ImportMap::Signals& group,

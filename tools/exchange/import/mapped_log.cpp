@@ -71,18 +71,17 @@ class LogImport {
       scratch_.commit();
     else
       convert_log(*open_log(scratch_.path()), output);
-    return summary_.summary(info_, notes_);
+    return summary_.summary(writer_->info(), notes_);
   }
 
  private:
   void open(const ArrayList& arrays, const LogInfo& info) {
     if (!writer_) {
-      info_ = info;
       map_.sample_rate_hz = info.sample_rate_hz;  // those of the following files must agree
       writer_.emplace(SlogWriter::create(scratch_.path(), info));
       return;
     }
-    if (!same_measurement(info, info_))
+    if (!same_measurement(info, writer_->info()))
       arrays.fail("",
                   "has {} excitation, {} actuator and {} sensor channels at {} "
                   "Hz; the previous runs differ. Import this file separately",
@@ -142,7 +141,6 @@ class LogImport {
   ImportMap map_;
   OutputFile scratch_;
   std::optional<SlogWriter> writer_;
-  LogInfo info_;
   std::set<std::pair<std::int64_t, std::int64_t>> runs_;
   std::vector<std::string> notes_;
   LogSummary summary_;
