@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -160,9 +159,8 @@ FrfEstimate read_frf_csv(const std::filesystem::path& file) {
   const auto column = [&](const std::string& name) {
     const std::vector<double>& values = real_values(arrays, arrays.at(name));
     if (frf.lines() > 0 && std::ssize(values) != frf.lines())
-      throw FormatError(file, name,
-                        fmt::format("got {}; expected {}", counted(values.size(), "value"),
-                                    counted(frf.lines(), "frequency", "frequencies")));
+      arrays.fail(name, "got {}; expected {}", counted(values.size(), "value"),
+                  counted(frf.lines(), "frequency", "frequencies"));
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values)));
   };
   frf.frequency_hz = column("frequency_hz");

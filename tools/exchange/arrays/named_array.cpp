@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
 
 namespace stageid {
 namespace {
@@ -62,10 +61,8 @@ const NamedArray& ArrayList::at(const std::string& name) const {
   for (const UnreadVariable& variable : unread)
     if (name == variable.name || name.starts_with(variable.name + ".") ||
         name.starts_with(variable.name + "/"))
-      throw FormatError(file, variable.name,
-                        fmt::format("{} cannot be read. {}", variable.what, variable.remedy));
-  throw FormatError(file, "",
-                    fmt::format("has no '{}'; it contains {}", name, listed(names(), 40)));
+      fail(variable.name, "{} cannot be read. {}", variable.what, variable.remedy);
+  fail("", "has no '{}'; it contains {}", name, listed(names(), 40));
 }
 
 std::vector<std::string> ArrayList::names() const {
