@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// As summary() of tools/report/js/selftest.js: channel after channel, float32 where the page has
+/// As summaryOf() of tools/report/js/selftest.js: channel after channel, float32 where the page has
 /// it.
 class Summary {
  public:

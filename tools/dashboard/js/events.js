@@ -24,18 +24,17 @@ function showSupervisor(state) {
 }
 
 function buildEvents() {
-  side.events = element('tbody');
-  section('events', 'Events', 'Events', 'Newest first. The event log next to the log contains all of them.').append(
-    element('div', { class: 'table-scroll' }, element('table', { class: 'events' }, side.events)));
+  const list = table([], [], '', 'events');
+  side.events = list.querySelector('tbody');
+  section('events', 'Events', 'Events', 'Newest first. The event log next to the log contains all of them.').append(list);
 }
 
 function showEvents(state) {
   const key = JSON.stringify(state.events[state.events.length - 1] || null) + state.events.length;
   if (side.key === key) return;
   side.key = key;
-  side.events.replaceChildren(...state.events.filter(Boolean).reverse().map((event) => element('tr', null,
-    element('td', null, String(event.time_utc).slice(11, 23)), element('td', null, String(event.event).replace(/_/g, ' ')),
-    element('td', { class: 'quiet' }, eventText(event)))));
+  side.events.replaceChildren(...state.events.filter(Boolean).reverse().map((event) => tableRow(
+    [String(event.time_utc).slice(11, 23), String(event.event).replace(/_/g, ' '), element('td', { class: 'quiet' }, eventText(event))])));
 }
 
 const hiddenFields = new Set(['time_utc', 'event', 'measurement_id']);

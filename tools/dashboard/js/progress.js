@@ -37,7 +37,7 @@ function showProgress(state) {
   const share = state.seconds_total > 0 ? Math.min(1, state.seconds_done / state.seconds_total) : 0;
   head.bar.style.width = (100 * share).toFixed(2) + '%';
   head.track.setAttribute('aria-valuenow', Math.round(100 * share));
-  head.figures.replaceChildren(...figures(state).map(([label, value]) => element('div', null, element('dt', null, label), element('dd', null, value))));
+  head.figures.replaceChildren(...described(figures(state)));
   const now = 'Current run: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
   head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
 }
@@ -48,16 +48,11 @@ function figures(state) {
     ['time left', state.state === 'ended' ? '\u2013' : duration(state.seconds_left)],
     ['measured', duration(state.seconds_done)],
     ['stage', state.state === 'ended' ? '\u2013' : state.node_state],
-    ['late', flaggedCount(state.health.late)], ['missing', flaggedCount(state.health.missing)], ['marked', flaggedCount(state.health.marked)],
-    ['irregular', flaggedCount(state.health.irregular)],
+    ...['late', 'missing', 'marked', 'irregular'].map((name) => [name, flagged(state.health[name])]),
   ];
   if (state.timing) list.push(['execution, 99.9 %', percent(state.timing.execution.p99_9_s / shown.period_s) + ' of a period']);
   else list.push(['speed', number(state.speed) + ' \u00d7 real time']);
   return list;
-}
-
-function flaggedCount(value) {
-  return element('span', { class: value > 0 ? 'far' : null }, count(value));
 }
 
 // Requires two presses within a few seconds, so that an accidental click does not end a measurement of two hours.

@@ -66,10 +66,34 @@ function phaseTicks(min, max, pixels) {
 
 const phaseAxis = { axisLabelWidth: 58, ticker: phaseTicks };
 
+// A plot of dygraphs in the element with that id. It follows the size of the page.
+function makeGraph(id, rows, options) {
+  const graph = new Dygraph(document.getElementById(id), rows, { ...plotBasics, ...plotColours(), ...options });
+  plots.add(graph);
+  return graph;
+}
+
+function removeGraph(graph) {
+  if (!graph) return;
+  plots.delete(graph);
+  graph.destroy();
+}
+
+// To be called after a change of the colours, with the styles of the series in them.
+function recolourGraph(graph, series) {
+  if (graph) graph.updateOptions({ ...plotColours(), series });
+}
+
 // Options shared by all plots, in the current colours.
 function plotColours() {
   const colours = palette();
   return { gridLineColor: colours.grid, axisLineColor: colours.frame };
+}
+
+// Draws the line of a series, if it is banded above its band.
+function seriesPlotter(banded) {
+  const { linePlotter } = Dygraph.Plotters;
+  return banded ? (event) => { drawBand(event); linePlotter(event); } : linePlotter;
 }
 
 // Draws the band of one series as one polygon: dygraphs draws a quadrangle between any two lines, which takes most of

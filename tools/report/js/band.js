@@ -56,19 +56,26 @@ function linesBetween(low, high) {
   return Math.max(0, last - first + 1);
 }
 
-// First and last line within the band, by bisection of the rising frequencies.
-function bandLines(low, high) {
+// The first line whose frequency is wanted, as are all above it: by bisection.
+function firstLine(wanted) {
   const f = array('frequency');
-  const least = (wanted) => {
-    let from = 0, to = f.length;
-    while (from < to) {
-      const middle = (from + to) >> 1;
-      if (wanted(f[middle])) to = middle;
-      else from = middle + 1;
-    }
-    return from;
-  };
-  return [least((hz) => hz >= low), least((hz) => hz > high) - 1];
+  let from = 0, to = f.length;
+  while (from < to) {
+    const middle = (from + to) >> 1;
+    if (wanted(f[middle])) to = middle;
+    else from = middle + 1;
+  }
+  return from;
+}
+
+// First and last line within the band.
+function bandLines(low, high) {
+  return [firstLine((f) => f >= low), firstLine((f) => f > high) - 1];
+}
+
+// The line at that frequency, else the next one, else the last.
+function lineFrom(hz) {
+  return Math.min(array('frequency').length - 1, firstLine((f) => f >= hz));
 }
 
 // Scales the band about its centre (factor) and shifts it (shift, in widths); the axis is logarithmic.
@@ -103,13 +110,17 @@ function bandText() {
 }
 
 function bandBar() {
-  const button = (text, name, act) => element('button', { type: 'button', class: 'plain small', 'aria-label': name, title: name, onclick: act }, text);
   const text = element('output', { class: 'band-text', 'aria-live': 'polite' }, bandText());
   band.texts.push(text);
   return element('div', { class: 'band-bar', role: 'group', 'aria-label': 'Visible band of all plots' },
-    button('\u25c2', 'To lower frequencies', () => moveBand(1, -0.5)), button('\u25b8', 'To higher frequencies', () => moveBand(1, 0.5)),
-    button('+', 'Zoom in', () => moveBand(0.5, 0)), button('\u2212', 'Zoom out', () => moveBand(2, 0)),
+    smallButton('\u25c2', 'To lower frequencies', () => moveBand(1, -0.5)), smallButton('\u25b8', 'To higher frequencies', () => moveBand(1, 0.5)),
+    smallButton('+', 'Zoom in', () => moveBand(0.5, 0)), smallButton('\u2212', 'Zoom out', () => moveBand(2, 0)),
     element('button', { type: 'button', class: 'plain small', onclick: resetBand }, 'Whole band'), text);
+}
+
+// The element of a dygraph whose keys zoom and pan; `name` is its aria-label or aria-labelledby.
+function bandPlot(id, kind, name) {
+  return element('div', { class: 'plot ' + kind, id, role: 'img', tabindex: '0', onkeydown: bandKey, ...name });
 }
 
 // Options that connect a dygraph to the band: its zooms and pans apply to all figures.

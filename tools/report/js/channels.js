@@ -10,10 +10,31 @@ function channelIndex(output, input) {
   return output + content.frf.outputs.length * input;
 }
 
+function outputOf(channel) {
+  return channel % content.frf.outputs.length;
+}
+
+function inputOf(channel) {
+  return Math.floor(channel / content.frf.outputs.length);
+}
+
 function channelName(channel) {
-  const outputs = content.frf.outputs;
-  const input = Math.floor(channel / outputs.length);
-  return outputs[channel % outputs.length].name + ' \u2190 ' + content.frf.inputs[input].name;
+  return content.frf.outputs[outputOf(channel)].name + ' \u2190 ' + content.frf.inputs[inputOf(channel)].name;
+}
+
+// The numbers of one channel, `each` per line; null if the page does not contain the array.
+function partOf(id, channel, each) {
+  const all = array(id);
+  const size = each * content.frf.lines;
+  return all && all.subarray(channel * size, (channel + 1) * size);
+}
+
+// Complex numbers of one channel, as pairs; the model is the measurement less the residual.
+function channelPairs(channel) {
+  const part = (id) => partOf(id, channel, 2);
+  const measured = part('response');
+  const residual = part('residual');
+  return { measured, residual, model: residual && difference(measured, residual), other: part('other_response'), otherModel: part('other_model') };
 }
 
 // The curves of one channel: magnitudes, one per line; null if unknown.
@@ -24,30 +45,24 @@ function channelCurves(channel) {
 }
 
 function makeCurves(channel) {
-  const lines = content.frf.lines;
-  const measured = array('response').subarray(2 * channel * lines, 2 * (channel + 1) * lines);
-  const part = (id) => {
-    const all = array(id);
-    return all ? all.subarray(channel * lines, (channel + 1) * lines) : null;
-  };
+  const pairs = channelPairs(channel);
+  // The compared day or model is compared with its own kind.
+  const own = pairs.other ? pairs.measured : pairs.otherModel && pairs.model;
   const curves = {
-    measured: magnitudes(measured),
-    model: null,
-    residual: null,
-    deviation: part('deviation'),
-    modelDeviation: part('model_deviation'),
-    validationResidual: part('validation_residual'),
+    ...mapValues(pairs, magnitudes),
+    change: own && magnitudes(difference(pairs.other || pairs.otherModel, own)),
+    deviation: partOf('deviation', channel, 1),
+    modelDeviation: partOf('model_deviation', channel, 1),
+    validationResidual: partOf('validation_residual', channel, 1),
     relativeError: null,
-    ...otherCurves(channel, measured),
   };
-  const residuals = array('residual');
-  if (residuals) {
-    const residual = residuals.subarray(2 * channel * lines, 2 * (channel + 1) * lines);
-    curves.model = magnitudes(difference(measured, residual));
-    curves.residual = magnitudes(residual);
-    if (content.frf.responds[channel]) curves.relativeError = relativeRms(curves.residual, curves.measured);
-  }
+  if (curves.residual && content.frf.responds[channel]) curves.relativeError = relativeRms(curves.residual, curves.measured);
   return curves;
+}
+
+// Applies the function to all values that are not null.
+function mapValues(values, apply) {
+  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value && apply(value)]));
 }
 
 // Over the lines with a response.
@@ -61,31 +76,7 @@ function relativeRms(errors, values) {
   return used > 0 ? Math.sqrt(sum / used) : null;
 }
 
-// Curves of the compared day or model: its magnitudes, and the magnitude of the difference.
-function otherCurves(channel, measured) {
-  const lines = content.frf.lines;
-  const part = (id) => {
-    const all = array(id);
-    return all ? all.subarray(2 * channel * lines, 2 * (channel + 1) * lines) : null;
-  };
-  const other = part('other_response');
-  const otherModel = part('other_model');
-  const residual = part('residual');
-  const own = other ? measured : otherModel && residual ? difference(measured, residual) : null;
-  return {
-    other: other && magnitudes(other), otherModel: otherModel && magnitudes(otherModel),
-    change: own && magnitudes(difference(other || otherModel, own)),
-  };
-}
-
 // Phases of one channel in degrees, -180 to 180.
 function channelPhases(channel) {
-  const lines = content.frf.lines;
-  const part = (id) => array(id).subarray(2 * channel * lines, 2 * (channel + 1) * lines);
-  const measured = part('response');
-  const of = (id) => (array(id) ? phases(part(id)) : null);
-  return {
-    measured: phases(measured), model: array('residual') ? phases(difference(measured, part('residual'))) : null,
-    other: of('other_response'), otherModel: of('other_model'),
-  };
+  return mapValues(channelPairs(channel), phases);
 }

@@ -36,25 +36,20 @@ function signedPercent(value) {
 
 function pairColumns() {
   const { own, modes, title } = content.comparison;
-  const sigma = (key) => [(row) => Math.abs(row[key]), (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null },
-    deviations(row[key]))];
+  const sigma = (key) => [(row) => Math.abs(row[key]), (row) => deviationCell(row[key])];
   return [
     ['#', (row) => row.own, (row) => (row.own + 1) + ' \u2013 ' + (row.other + 1)],
     ['f\u2080 [Hz]', (row) => own[row.own].frequency_hz, (row) => fixed(own[row.own].frequency_hz)],
-    ['f\u2080 of ' + shortened(title), (row) => modes[row.other].frequency_hz, (row) => fixed(modes[row.other].frequency_hz)],
+    ['f\u2080 of ' + shortened(title, 14), (row) => modes[row.other].frequency_hz, (row) => fixed(modes[row.other].frequency_hz)],
     ['\u0394f\u2080', (row) => Math.abs(row.frequency_difference), (row) => signedPercent(row.frequency_difference)],
     ['\u0394f\u2080/\u03c3', ...sigma('frequency_deviation')],
     ['\u03b6 [%]', (row) => own[row.own].damping_ratio, (row) => hundred(own[row.own].damping_ratio)],
-    ['\u03b6 of ' + shortened(title), (row) => modes[row.other].damping_ratio, (row) => hundred(modes[row.other].damping_ratio)],
+    ['\u03b6 of ' + shortened(title, 14), (row) => modes[row.other].damping_ratio, (row) => hundred(modes[row.other].damping_ratio)],
     ['\u0394\u03b6', (row) => Math.abs(row.damping_difference), (row) => signedPercent(row.damping_difference)],
     ['\u0394\u03b6/\u03c3', ...sigma('damping_deviation')],
     ['MAC sensors', (row) => row.output_mac, (row) => row.output_mac.toFixed(3)],
     ['MAC actuators', (row) => row.input_mac, (row) => row.input_mac.toFixed(3)],
   ];
-}
-
-function shortened(text) {
-  return text.length > 14 ? text.slice(0, 13) + '\u2026' : text;
 }
 
 function unpaired(title, modes, paired) {
@@ -66,6 +61,6 @@ function crossMac(kind) {
   const { own, modes, output_mac: outputs, input_mac: inputs, title } = content.comparison;
   return {
     rows: own.map((mode) => fixed(mode.frequency_hz)), columns: modes.map((mode) => fixed(mode.frequency_hz)), rowTitle: 'here',
-    columnTitle: shortened(title), title: 'Cross-MAC with ' + title + ', ' + macKinds[kind], values: macValues(outputs, inputs, kind),
+    columnTitle: shortened(title, 14), title: 'Cross-MAC with ' + title + ', ' + macKinds[kind], values: macValues(outputs, inputs, kind),
   };
 }

@@ -10,17 +10,16 @@ function buildCost() {
     element('div', { class: 'plot', id: 'cost-plot', role: 'img', 'aria-labelledby': 'cost-title' }),
     element('p', { class: 'axis-title' }, 'Iteration'));
   afterFirstPaint(drawCost);
-  onColours(() => cost.graph && cost.graph.updateOptions({ ...plotColours(), series: costSeries() }));
+  onColours(() => recolourGraph(cost.graph, costSeries()));
 }
 
 function drawCost() {
   const values = content.cost.filter((v) => isNumber(v) && v > 0);
-  cost.graph = new Dygraph(document.getElementById('cost-plot'), values.map((v, i) => [i, v]), {
-    ...plotBasics, ...plotColours(), labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
+  cost.graph = makeGraph('cost-plot', values.map((v, i) => [i, v]), {
+    labels: ['iteration', 'cost'], logscale: true, drawPoints: values.length < 200, pointSize: 2.5,
     series: costSeries(), xRangePad: 8,
     axes: { x: { ticker: (min, max, pixels) => linearTicks(min, max, Math.max(2, pixels / 60), (v) => (Number.isInteger(v) ? String(v) : '')) }, y: magnitudeAxis },
   });
-  plots.add(cost.graph);
 }
 
 function costSeries() {

@@ -25,8 +25,8 @@ function buildEntry() {
     element('div', { class: 'legend', id: 'entry-legend' }),
     element('div', { class: 'entry-plots' },
       element('div', { class: 'bode' },
-        element('p', { class: 'plot-title', id: 'magnitude-title' }, 'Magnitude'), entryPlot('entry-magnitude', 'tall', 'magnitude-title'),
-        element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'), entryPlot('entry-phase', '', 'phase-title'),
+        element('p', { class: 'plot-title', id: 'magnitude-title' }, 'Magnitude'), entryPlot('magnitude', 'tall'),
+        element('p', { class: 'plot-title', id: 'phase-title' }, 'Phase'), entryPlot('phase', ''),
         element('p', { class: 'axis-title' }, 'Frequency [Hz]')),
       buildNyquist()),
     buildEntryTable(),
@@ -40,10 +40,8 @@ function buildEntry() {
   });
 }
 
-function entryPlot(id, kind, title) {
-  const node = element('div', { class: 'plot ' + kind, id, role: 'img', 'aria-labelledby': 'entry-title ' + title, tabindex: '0' });
-  node.addEventListener('keydown', bandKey);
-  return node;
+function entryPlot(name, kind) {
+  return bandPlot('entry-' + name, kind, { 'aria-labelledby': 'entry-title ' + name + '-title' });
 }
 
 function entryHelp() {
@@ -55,9 +53,7 @@ function entryHelp() {
 }
 
 function recolourEntry() {
-  for (const plot of [entry.magnitude, entry.phase]) {
-    if (plot) plot.updateOptions({ ...plotColours(), series: traceStyles(plot.getLabels().slice(1)) });
-  }
+  for (const plot of [entry.magnitude, entry.phase]) if (plot) recolourGraph(plot, traceStyles(plot.getLabels().slice(1)));
 }
 
 function pickEntry() {
@@ -73,10 +69,16 @@ function zoomEntry(low, high) {
 }
 
 // [low, value, high]; a logarithmic axis cannot show values <= 0.
-function bar(value, deviation, floor) {
+function bar(value, half, floor) {
   const v = Math.max(value, floor);
-  if (!deviation) return [v, v, v];
-  return [Math.max(value - content.frf.band_factor * deviation, floor), v, value + content.frf.band_factor * deviation];
+  return half ? [Math.max(value - half, floor), v, value + half] : [v, v, v];
+}
+
+// Where such an axis ends.
+function smallestPositive(lists) {
+  let least = Infinity;
+  for (const values of lists) for (const v of values) if (v > 0 && v < least) least = v;
+  return Number.isFinite(least) ? least : 1e-300;
 }
 
 // Rows in the format of dygraphs, with the names of the columns.
@@ -90,11 +92,9 @@ function magnitudeTable(channel) {
   if (curves.validationResidual) columns.push(['validation', get(curves.validationResidual), null]);
   for (const name of ['other', 'otherModel', 'change']) if (curves[name]) columns.push([name, get(curves[name]), null]);
   if (curves.deviation) columns.push(['deviation', get(curves.deviation), null]);
-  let floor = Infinity;
-  for (const [, values] of columns) for (const v of values) if (v > 0 && v < floor) floor = v;
-  if (!Number.isFinite(floor)) floor = 1e-300;
-  const f = array('frequency');
-  const rows = Array.from(f, (hz, k) => [hz, ...columns.map(([, values, deviation]) => bar(values[k], deviation && deviation[k], floor))]);
+  const floor = smallestPositive(columns.map(([, values]) => values));
+  const half = (deviation, k) => deviation && content.frf.band_factor * deviation[k];
+  const rows = Array.from(array('frequency'), (hz, k) => [hz, ...columns.map(([, values, deviation]) => bar(values[k], half(deviation, k), floor))]);
   return { rows, names: columns.map(([name]) => name) };
 }
 
@@ -147,9 +147,8 @@ function traceStyle(name) {
     validation: { strokeWidth: 0.9 }, deviation: { strokeWidth: 1.1, strokePattern: [5, 4] },
     other: { strokeWidth: 2 }, otherModel: { strokeWidth: 1.3, strokePattern: [7, 3] }, change: { strokeWidth: 0.9 },
   };
-  const { linePlotter } = Dygraph.Plotters;
   const banded = (name === 'measured' && content.arrays.deviation) || (name === 'model' && content.arrays.model_deviation);
-  return { color: colours[name], plotter: banded ? (event) => { drawBand(event); linePlotter(event); } : linePlotter, ...styles[name] };
+  return { color: colours[name], plotter: seriesPlotter(banded), ...styles[name] };
 }
 
 function traceStyles(names) {
@@ -157,36 +156,26 @@ function traceStyles(names) {
 }
 
 function plotTable(id, table, axisY, more) {
-  const options = {
-    ...plotBasics, ...plotColours(), customBars: true, labels: ['f', ...table.names],
-    series: traceStyles(table.names),
+  return makeGraph(id, table.rows, {
+    customBars: true, labels: ['f', ...table.names], series: traceStyles(table.names),
     visibility: table.names.map((name) => !entry.hidden.has(name)),
     axes: { x: frequencyAxis, y: axisY }, highlightCallback: tellValues, unhighlightCallback: () => tellValues(),
     ...tiedToBand(), ...more,
-  };
-  const plot = new Dygraph(document.getElementById(id), table.rows, options);
-  plots.add(plot);
-  return plot;
+  });
 }
 
 function entryUnit(channel) {
   const { inputs, outputs } = content.frf;
-  return unitOf(outputs[channel % outputs.length], inputs[Math.floor(channel / outputs.length)]) + (matrix.timesOmega ? '\u00a0\u00d7\u00a0(rad/s)\u00b2' : '');
+  return unitOf(outputs[outputOf(channel)], inputs[inputOf(channel)]) + (matrix.timesOmega ? '\u00a0\u00d7\u00a0(rad/s)\u00b2' : '');
 }
 
 function showEntry(channel) {
   entry.channel = channel;
-  const outputs = content.frf.outputs;
   document.getElementById('entry-title').textContent = channelName(channel);
-  document.getElementById('entry-output').value = channel % outputs.length;
-  document.getElementById('entry-input').value = Math.floor(channel / outputs.length);
+  document.getElementById('entry-output').value = outputOf(channel);
+  document.getElementById('entry-input').value = inputOf(channel);
   document.getElementById('magnitude-title').textContent = 'Magnitude [' + entryUnit(channel) + ']';
-  if (entry.magnitude) {
-    for (const plot of [entry.magnitude, entry.phase]) {
-      plots.delete(plot);
-      plot.destroy();
-    }
-  }
+  for (const plot of [entry.magnitude, entry.phase]) removeGraph(plot);
   const table = magnitudeTable(channel);
   entry.order = table.names;
   entry.magnitude = plotTable('entry-magnitude', table, magnitudeAxis, { logscale: true });
@@ -197,11 +186,14 @@ function showEntry(channel) {
   fillEntryTable();
 }
 
+// Names and colours for the legend of a saved figure, without those that are empty.
+function traceLegend(names) {
+  return names.filter(Boolean).map((name) => [traceName(name), palette()[name]]);
+}
+
 function savedEntry() {
-  const colours = palette();
-  const shown = entry.order.filter((name) => !entry.hidden.has(name));
   return {
-    title: channelName(entry.channel), legend: shown.map((name) => [traceName(name), colours[name]]),
+    title: channelName(entry.channel), legend: traceLegend(entry.order.filter((name) => !entry.hidden.has(name))),
     panels: [graphPanel(entry.magnitude, 'Magnitude [' + entryUnit(entry.channel) + ']'), graphPanel(entry.phase, 'Phase over frequency in Hz')],
   };
 }
@@ -231,12 +223,10 @@ function tellValues(event, hz) {
     output.textContent = '';
     return;
   }
-  const f = array('frequency');
-  let k = 0;
-  while (k < f.length - 1 && f[k] < hz) ++k;
+  const k = lineFrom(hz);
   const curves = channelCurves(entry.channel);
   const phases = channelPhases(entry.channel);
-  const parts = [number(f[k], 6) + '\u00a0Hz', '|G| ' + number(curves.measured[k]) + ', ' + number(phases.measured[k]) + '\u00b0'];
+  const parts = [number(array('frequency')[k], 6) + '\u00a0Hz', '|G| ' + number(curves.measured[k]) + ', ' + number(phases.measured[k]) + '\u00b0'];
   if (curves.model) parts.push('|P| ' + number(curves.model[k]) + ', ' + number(phases.model[k]) + '\u00b0');
   if (curves.residual) parts.push('|G\u2212P| ' + number(curves.residual[k]));
   if (curves.deviation) parts.push('\u03c3 ' + number(curves.deviation[k]));

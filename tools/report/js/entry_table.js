@@ -14,11 +14,10 @@ function fillEntryTable() {
   if (!entryTable.details || !entryTable.details.open) return;
   const [first, last] = bandLines(...shownBand());
   const { columns, row } = entryColumns(entry.channel);
-  const rows = Array.from({ length: Math.min(mostRows, last - first + 1) }, (_, i) => element('tr', null, ...row(first + i).map((text) => element('td', null, text))));
+  const rows = Array.from({ length: Math.min(mostRows, last - first + 1) }, (_, i) => row(first + i));
   const left = last - first + 1 - rows.length;
-  entryTable.body.replaceChildren(element('div', { class: 'table-scroll' }, element('table', null,
-    element('caption', null, channelName(entry.channel) + ', ' + bandText() + (left > 0 ? '; zoom in to see the other ' + plural(left, 'line') : '')),
-    element('thead', null, element('tr', null, ...columns.map((title) => element('th', { scope: 'col' }, title)))), element('tbody', null, ...rows))));
+  entryTable.body.replaceChildren(table(columns, rows,
+    channelName(entry.channel) + ', ' + bandText() + (left > 0 ? '; zoom in to see the other ' + plural(left, 'line') : '')));
 }
 
 function entryColumns(channel) {

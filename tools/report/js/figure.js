@@ -1,11 +1,5 @@
 // Figures on a canvas, and export of all figures as SVG, and as PNG made from it.
 
-const figureFont = 'system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
-
-function font(pixels, weight) {
-  return (weight ? weight + ' ' : '') + pixels + 'px ' + figureFont;
-}
-
 // Calls draw(context, width, height) on a canvas whenever its element, the colours or the medium change.
 function canvasFigure(id, label, draw, kind) {
   const canvas = element('canvas', { 'aria-hidden': 'true' });
@@ -22,13 +16,24 @@ function paintFigure(figure) {
   const width = node.clientWidth;
   const height = node.clientHeight;
   if (width === 0 || height === 0) return;
+  figure.draw(sharpContext(canvas, width, height), width, height);
+}
+
+// An empty canvas of that size on the page, with all pixels of the screen.
+function sharpContext(canvas, width, height) {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   const pixels = [Math.round(width * ratio), Math.round(height * ratio)];
   if (canvas.width !== pixels[0] || canvas.height !== pixels[1]) [canvas.width, canvas.height] = pixels;
   const context = canvas.getContext('2d');
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
-  figure.draw(context, width, height);
+  return context;
+}
+
+// While the pointer is on the figure, the element contains what tell(event) says of that place.
+function tellUnderPointer(figure, text, tell) {
+  figure.node.addEventListener('pointermove', (event) => { text.textContent = tell(event); });
+  figure.node.addEventListener('pointerleave', () => { text.textContent = ''; });
 }
 
 // Figures that can be saved: name -> {title, legend, panels}; a panel is {width, height, draw}.
@@ -37,9 +42,7 @@ const savable = new Map();
 // Buttons that save a figure. describe() returns its current {title, legend: [[name, colour]], panels}.
 function saveButtons(name, describe) {
   savable.set(name, describe);
-  const button = (kind) => element('button', {
-    type: 'button', class: 'plain small', 'aria-label': 'Save as ' + kind + ': ' + name, title: 'Save as ' + kind, onclick: () => saveFigure(name, kind),
-  }, kind);
+  const button = (kind) => smallButton(kind, 'Save as ' + kind + ': ' + name, () => saveFigure(name, kind), 'Save as ' + kind);
   return element('span', { class: 'save', role: 'group', 'aria-label': 'Save figure' }, button('SVG'), button('PNG'));
 }
 
@@ -64,14 +67,11 @@ function drawGraph(graph, context) {
   }
   graph.renderGraph_(false);
   const frame = graph.graphDiv.getBoundingClientRect();
-  context.font = font(12);
-  context.fillStyle = palette().text;
-  context.textBaseline = 'middle';
   for (const label of graph.graphDiv.querySelectorAll('.dygraph-axis-label')) {
     const box = label.getBoundingClientRect();
     const across = label.classList.contains('dygraph-axis-label-y');
-    context.textAlign = across ? 'right' : 'center';
-    context.fillText(label.textContent, (across ? box.right : (box.left + box.right) / 2) - frame.left, (box.top + box.bottom) / 2 - frame.top);
+    drawText(context, label.textContent, (across ? box.right : (box.left + box.right) / 2) - frame.left, (box.top + box.bottom) / 2 - frame.top,
+      { align: across ? 'right' : 'center', base: 'middle' });
   }
 }
 
@@ -87,18 +87,12 @@ function svgOf(name) {
   const height = 2 * savedMargin + 22 + (hasLegend ? 24 : 0) + panels.reduce((sum, panel) => sum + panel.height + (panel.title ? 20 : 0), 0);
   context.fillStyle = colours.background;
   context.fillRect(0, 0, width, height);
-  context.font = font(15, '600');
-  context.fillStyle = colours.ink;
-  context.fillText(title, savedMargin, savedMargin + 12);
+  drawText(context, title, savedMargin, savedMargin + 12, { pixels: 15, weight: '600', colour: colours.ink });
   let y = savedMargin + 22;
   if (hasLegend) y = drawLegend(context, legend, y);
   for (const panel of panels) {
     if (panel.title) {
-      context.font = font(12.5);
-      context.fillStyle = colours.text;
-      context.textAlign = 'start';
-      context.textBaseline = 'alphabetic';
-      context.fillText(panel.title, savedMargin, y + 13);
+      drawText(context, panel.title, savedMargin, y + 13, { pixels: 12.5 });
       y += 20;
     }
     context.save();
@@ -112,16 +106,11 @@ function svgOf(name) {
 
 function drawLegend(context, legend, y) {
   let x = savedMargin;
-  context.font = font(12.5);
   context.lineWidth = 3;
   for (const [text, colour] of legend) {
     context.strokeStyle = colour;
-    context.beginPath();
-    context.moveTo(x, y + 9);
-    context.lineTo(x + 20, y + 9);
-    context.stroke();
-    context.fillStyle = palette().text;
-    context.fillText(text, x + 26, y + 13);
+    drawLine(context, x, y + 9, x + 20, y + 9);
+    drawText(context, text, x + 26, y + 13, { pixels: 12.5 });
     x += 26 + 7.2 * text.length + 18;
   }
   return y + 24;

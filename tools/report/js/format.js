@@ -54,6 +54,10 @@ function hertz(value) {
                        : String(Number(value.toPrecision(4))) + '\u00a0Hz';
 }
 
+function bandName(band) {
+  return band.map(hertz).join(' \u2013 ');
+}
+
 function duration(seconds) {
   if (!isNumber(seconds)) return '\u2013';
   if (seconds === 0) return '0\u00a0s';
@@ -73,6 +77,20 @@ function plural(n, one, many) {
   return count(n) + ' ' + (n === 1 ? one : many || one + 's');
 }
 
+// At most that many characters.
+function shortened(text, most) {
+  return text.length > most ? text.slice(0, most - 1) + '\u2026' : text;
+}
+
+// A count that is emphasized unless it is zero.
+function flagged(value) {
+  return element('span', { class: value > 0 ? 'far' : null }, count(value));
+}
+
+function smallButton(text, name, onclick, title = name) {
+  return element('button', { type: 'button', class: 'plain small', 'aria-label': name, title, onclick }, text);
+}
+
 // A section of the page with its entry in the contents; returns the body to fill.
 function section(id, short, title, lead) {
   const node = element('section', { id, 'aria-labelledby': id + '-title' },
@@ -83,12 +101,28 @@ function section(id, short, title, lead) {
   return node;
 }
 
-// A list of [label, value], with a text or an element as value.
+// Pairs [label, value], with a text or an element as value.
+function described(pairs) {
+  return pairs.map(([label, value]) => element('div', null, element('dt', null, label), element('dd', null, value)));
+}
+
+// A list of those pairs that have a value.
 function facts(pairs) {
-  const list = element('dl', { class: 'facts' });
-  for (const [label, value] of pairs) {
-    if (value === null || value === undefined || value === '') continue;
-    list.append(element('div', null, element('dt', null, label), element('dd', null, value)));
-  }
-  return list;
+  return element('dl', { class: 'facts' }, ...described(pairs.filter(([, value]) => value !== null && value !== undefined && value !== '')));
+}
+
+// A table that scrolls by itself. Heads are titles or elements, rows are lists of texts or elements.
+function table(heads, rows, caption, kind) {
+  const head = heads.map((title) => (typeof title === 'string' ? element('th', { scope: 'col' }, title) : title));
+  return element('div', { class: 'table-scroll' }, element('table', { class: kind }, caption ? element('caption', null, caption) : null,
+    heads.length ? element('thead', null, element('tr', null, ...head)) : null, element('tbody', null, ...rows.map((cells) => tableRow(cells)))));
+}
+
+function tableRow(cells, kind) {
+  return element('tr', { class: kind }, ...cells.map((cell) => (['TD', 'TH'].includes(cell.tagName) ? cell : element('td', null, cell))));
+}
+
+// The head of a row.
+function rowHead(text, kind) {
+  return element('th', { scope: 'row', class: kind }, text);
 }

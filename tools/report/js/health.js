@@ -20,21 +20,15 @@ function buildHealth() {
   }
   if (content.timing) body.append(timingBars(content.timing, content.period_s));
   if (content.steps.length) body.append(stepBars());
-  if (content.runs.length) body.append(element('details', null, element('summary', null, 'Every run'), runTable()));
+  if (content.runs.length) body.append(folded('Every run', runTable()));
 }
 
 // Findings of the checks of the data; words in addition to colours.
 function findingTable() {
   const grave = { fault: 2, doubt: 1, 'not checked': 0 };
-  const heads = ['severity', 'channel', 'finding', 'figure', 'remedy'].map((title) => element('th', { scope: 'col' }, title));
-  const rows = content.findings.map((finding) => element('tr', null, element('td', null, element('span', { class: 'severity level-' + grave[finding.severity] }, finding.severity)),
-    element('td', { class: 'name' }, finding.channel || 'all'), element('td', null, finding.what), element('td', null, finding.figure || '\u2013'), element('td', null, finding.remedy || '\u2013')));
-  return element('div', { class: 'table-scroll' }, element('table', { class: 'findings' }, element('caption', null, 'Findings of the data checks, the most important first'),
-    element('thead', null, element('tr', null, ...heads)), element('tbody', null, ...rows)));
-}
-
-function flagged(value) {
-  return element('span', { class: value > 0 ? 'far' : null }, count(value));
+  const rows = content.findings.map(({ severity, channel, what, figure, remedy }) => [element('span', { class: 'severity level-' + grave[severity] }, severity),
+    element('td', { class: 'name' }, channel || 'all'), what, figure || '\u2013', remedy || '\u2013']);
+  return table(['severity', 'channel', 'finding', 'figure', 'remedy'], rows, 'Findings of the data checks, the most important first', 'findings');
 }
 
 function stepBars() {
@@ -42,9 +36,7 @@ function stepBars() {
   const longest = Math.max(...content.steps.map((step) => step.seconds), 1e-12);
   const list = element('div', { class: 'steps', role: 'list' });
   for (const step of content.steps) {
-    list.append(element('div', { role: 'listitem' }, element('span', { class: 'step-name' }, step.name),
-      element('span', { class: 'step-bar' }, element('span', { style: 'width:' + (100 * step.seconds / longest).toFixed(1) + '%' })),
-      element('span', { class: 'step-time' }, duration(step.seconds)), element('span', { class: 'quiet' }, step.note)));
+    list.append(lengthBar(step.name, 100 * step.seconds / longest, duration(step.seconds), { note: step.note }));
   }
   return element('div', null, element('h3', null, 'Time per step, ' + duration(total) + ' in total'), list);
 }

@@ -23,10 +23,10 @@ function buildInterpolation() {
   }
   body.append(element('div', { class: 'plot-head' }, element('p', null, misfitText()), saveButtons('interpolation', () => ({
     title: 'Residual of the local models relative to noise', panels: [graphPanel(interpolation.graph, 'Misfit over frequency in Hz')],
-  }))), element('div', { class: 'plot', id: 'interpolation-plot', role: 'img', 'aria-label': misfitText(), tabindex: '0', onkeydown: bandKey }),
+  }))), bandPlot('interpolation-plot', '', { 'aria-label': misfitText() }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
   afterFirstPaint(drawInterpolation);
-  onColours(() => interpolation.graph && interpolation.graph.updateOptions({ ...plotColours(), series: misfitSeries() }));
+  onColours(() => recolourGraph(interpolation.graph, misfitSeries()));
   followBand(() => showBandIn(interpolation.graph));
 }
 
@@ -42,11 +42,10 @@ function misfitText() {
 
 function drawInterpolation() {
   const misfit = array('interpolation_misfit');
-  interpolation.graph = new Dygraph(document.getElementById('interpolation-plot'), Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
-    ...plotBasics, ...plotColours(), labels: ['f', 'misfit'], logscale: true, series: misfitSeries(),
+  interpolation.graph = makeGraph('interpolation-plot', Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
+    labels: ['f', 'misfit'], logscale: true, series: misfitSeries(),
     axes: { x: frequencyAxis, y: magnitudeAxis }, ...tiedToBand(),
   });
-  plots.add(interpolation.graph);
 }
 
 function misfitSeries() {

@@ -1,7 +1,5 @@
 // Modal assurance criteria as a picture with an equivalent table.
 
-const macs = [];
-
 const macKinds = { both: 'sensors and actuators', outputs: 'sensors', inputs: 'actuators' };
 
 // ownMac(kind) -> {rows, columns, values, rowTitle, columnTitle, title}
@@ -12,21 +10,19 @@ function buildMac(id, name, get) {
     tell();
     mac.figure.redraw();
   } }, ...Object.entries(macKinds).map(([kind, title]) => element('option', { value: kind }, title)));
-  const table = element('div');
+  const list = element('div');
   const text = element('output', { class: 'values', 'aria-live': 'off' });
   mac.figure = canvasFigure(id, 'Modal assurance criterion', (context, width, height) => drawMac(context, width, height, get(mac.kind)), 'square');
   const tell = () => {
     const data = get(mac.kind);
     mac.figure.node.setAttribute('aria-label', macSummary(data));
-    table.replaceChildren(macTable(data));
+    list.replaceChildren(macTable(data));
   };
-  mac.figure.node.addEventListener('pointermove', (event) => { text.textContent = macAt(mac, event); });
-  mac.figure.node.addEventListener('pointerleave', () => { text.textContent = ''; });
+  tellUnderPointer(mac.figure, text, (event) => macAt(mac, event));
   tell();
-  macs.push(mac);
   return element('div', { class: 'mac' }, element('div', { class: 'plot-head' }, element('label', { for: id + '-kind', class: 'plot-title' }, name + ' of ', pick),
     saveButtons(name, () => ({ title: get(mac.kind).title, panels: [canvasPanel(mac.figure)] }))), mac.figure.node,
-    element('p', { class: 'plot-title' }, text), folded(name + ' as a table', '', table));
+    element('p', { class: 'plot-title' }, text), folded(name + ' as a table', list));
 }
 
 // MACs of sensors, of actuators, or their product, which is that of the residues.
@@ -61,30 +57,20 @@ function macFrame(data, width, height) {
 function drawMac(context, width, height, data) {
   const frame = macFrame(data, width, height);
   const { cell, left, top } = frame;
-  const colours = palette();
+  const text = (words, x, y, more) => drawText(context, words, x, y, { align: 'center', base: 'middle', pixels: 11, ...more });
   data.values.forEach((row, i) => row.forEach((value, j) => {
     context.fillStyle = heightColour(value);
     context.fillRect(left + j * cell, top + i * cell, Math.max(1, cell - 1), Math.max(1, cell - 1));
-    if (cell < 34) return;
-    context.font = font(11);
-    context.fillStyle = colours.ink;
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    context.fillText(value.toFixed(2), left + (j + 0.5) * cell, top + (i + 0.5) * cell);
+    if (cell >= 34) text(value.toFixed(2), left + (j + 0.5) * cell, top + (i + 0.5) * cell, { colour: palette().ink });
   }));
-  context.font = font(11);
-  context.fillStyle = colours.text;
-  context.textBaseline = 'middle';
   const every = Math.max(1, Math.ceil(15 / cell));
   data.rows.forEach((_, i) => {
-    context.textAlign = 'right';
-    if (i % every === 0) context.fillText(String(i + 1), left - 6, top + (i + 0.5) * cell);
+    if (i % every === 0) text(String(i + 1), left - 6, top + (i + 0.5) * cell, { align: 'right' });
   });
   data.columns.forEach((_, j) => {
-    context.textAlign = 'center';
-    if (j % every === 0) context.fillText(String(j + 1), left + (j + 0.5) * cell, top + frame.height + 10);
+    if (j % every === 0) text(String(j + 1), left + (j + 0.5) * cell, top + frame.height + 10);
   });
-  context.fillText(data.columnTitle, left + frame.width / 2, top + frame.height + 27);
+  text(data.columnTitle, left + frame.width / 2, top + frame.height + 27);
 }
 
 function macAt(mac, event) {
@@ -98,7 +84,6 @@ function macAt(mac, event) {
 }
 
 function macTable(data) {
-  const head = element('tr', null, element('th', { scope: 'col' }, data.rowTitle + ' [Hz]'), ...data.columns.map((name) => element('th', { scope: 'col' }, name)));
-  return element('div', { class: 'table-scroll' }, element('table', null, element('thead', null, head), element('tbody', null, ...data.values.map((row, i) =>
-    element('tr', null, element('th', { scope: 'row' }, data.rows[i]), ...row.map((value) => element('td', null, isNumber(value) ? value.toFixed(2) : '\u2013')))))));
+  return table([data.rowTitle + ' [Hz]', ...data.columns],
+    data.values.map((row, i) => [rowHead(data.rows[i]), ...row.map((value) => (isNumber(value) ? value.toFixed(2) : '\u2013'))]));
 }

@@ -35,14 +35,12 @@ function matrixRange(scale) {
 
 function buildMatrix() {
   const { inputs, outputs } = content.frf;
-  const hasModel = Boolean(content.arrays.residual);
   const body = section('response', 'Response', 'Frequency response, element by element',
     'Each panel is one sensor over one actuator, named at the edges: magnitude over frequency, both logarithmic, ' +
     'with a common scale. Select a panel to enlarge it, drag across one to zoom all; the arrow keys move between panels, ' +
     '+ and \u2212 zoom, Page Up and Page Down pan, Home shows the whole band.');
-  const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'),
-    hasModel ? swatch('model', 'model') : null, hasModel ? swatch('residual', 'residual') : null,
-    hasModel ? element('span', { class: 'quiet' }, 'number: relative rms error of the channel') : null);
+  const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'));
+  if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel'));
   if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
   const times = element('input', { type: 'checkbox', id: 'times-omega' });
   times.addEventListener('change', () => {
@@ -96,12 +94,10 @@ function makePanel(output, input) {
 }
 
 function selectPanel(channel) {
-  for (const panel of matrix.panels) {
-    panel.button.setAttribute('aria-pressed', 'false');
-    panel.button.tabIndex = -1;
-  }
-  matrix.panels[channel].button.setAttribute('aria-pressed', 'true');
-  matrix.panels[channel].button.tabIndex = 0;
+  matrix.panels.forEach(({ button }, i) => {
+    button.setAttribute('aria-pressed', String(i === channel));
+    button.tabIndex = i === channel ? 0 : -1;
+  });
   matrix.selected = channel;
   if (matrix.onselect) matrix.onselect(channel);
 }
@@ -111,15 +107,13 @@ function moveFocus(event) {
   const outputs = content.frf.outputs.length;
   const inputs = content.frf.inputs.length;
   const turned = getComputedStyle(event.currentTarget).getPropertyValue('--turned').trim() === '1';
-  const steps = turned
-    ? { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }
-    : { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
-  const step = steps[event.key];
+  const step = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key];
+  if (step && turned) step.reverse();
   const from = Number(event.target.dataset ? event.target.dataset.channel : NaN);
   if (!step || !Number.isInteger(from)) return;
   event.preventDefault();
-  const output = Math.min(outputs - 1, Math.max(0, (from % outputs) + step[0]));
-  const input = Math.min(inputs - 1, Math.max(0, Math.floor(from / outputs) + step[1]));
+  const output = Math.min(outputs - 1, Math.max(0, outputOf(from) + step[0]));
+  const input = Math.min(inputs - 1, Math.max(0, inputOf(from) + step[1]));
   matrix.panels[from].button.tabIndex = -1;
   const target = matrix.panels[channelIndex(output, input)].button;
   target.tabIndex = 0;
@@ -162,19 +156,11 @@ function drawPanel(channel) {
   const height = panel.canvas.clientHeight;
   if (width === 0) return;
   panel.drawn = true;
-  const ratio = Math.min(3, window.devicePixelRatio || 1);
-  panel.canvas.width = Math.round(width * ratio);
-  panel.canvas.height = Math.round(height * ratio);
-  const context = panel.canvas.getContext('2d');
-  context.scale(ratio, ratio);
-  paintPanel(channel, context, width, height);
+  paintPanel(channel, sharpContext(panel.canvas, width, height), width, height);
+  if (!array('residual')) return;
   const { relativeError } = channelCurves(channel);
-  if (relativeError === null) {
-    if (array('residual')) panel.button.setAttribute('aria-label', channelName(channel) + ', no response above the noise');
-    return;
-  }
-  panel.error.textContent = percent(relativeError);
-  panel.button.setAttribute('aria-label', channelName(channel) + ', relative rms error ' + percent(relativeError));
+  if (relativeError !== null) panel.error.textContent = percent(relativeError);
+  panel.button.setAttribute('aria-label', channelName(channel) + (relativeError === null ? ', no response above the noise' : ', relative rms error ' + percent(relativeError)));
 }
 
 function paintPanel(channel, context, width, height) {
@@ -191,8 +177,7 @@ function paintPanel(channel, context, width, height) {
   drawCurve(context, frame, scaled(curves.residual, scale), colours.residual, 0.6);
   context.globalAlpha = 1;
   drawCurve(context, frame, scaled(curves.measured, scale), colours.measured, curves.model ? 2.8 : 1.2);
-  if (curves.other) drawCurve(context, frame, scaled(curves.other, scale), colours.other, 1.2);
-  else drawCurve(context, frame, scaled(curves.otherModel, scale), colours.otherModel, 1.2);
+  drawCurve(context, frame, scaled(curves[otherTrace()], scale), colours[otherTrace()], 1.2);
   drawCurve(context, frame, scaled(curves.model, scale), colours.model, 0.8);
 }
 
@@ -240,7 +225,8 @@ function drawDecades(context, frame) {
 
 // The half-pixel column of every line; the same for all curves of that width and band.
 function columnsOf(frame) {
-  const { width, x0, x1, columns } = { ...frame, columns: matrix.columns };
+  const { width, x0, x1 } = frame;
+  const { columns } = matrix;
   if (!columns || columns.width !== width || columns.x0 !== x0 || columns.x1 !== x1) {
     const x = Float64Array.from(array('frequency'), (f) => frame.x(Math.log10(f)));
     matrix.columns = { width, x0, x1, x, column: Int32Array.from(x, (v) => Math.floor(2 * v)) };

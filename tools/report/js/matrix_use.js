@@ -12,26 +12,31 @@ function dragAcross(event) {
   const within = (x) => Math.min(box.width, Math.max(0, x - box.left));
   const from = within(event.clientX);
   const mark = element('span', { class: 'drag-mark' });
-  const move = (at) => {
+  followPointer((at) => {
     const to = within(at.clientX);
     if (Math.abs(to - from) < leastDrag) return mark.remove();
     mark.style.left = Math.min(from, to) + 'px';
     mark.style.width = Math.abs(to - from) + 'px';
-    button.append(mark);
-    return undefined;
-  };
-  const stop = (at) => {
-    for (const kind of ['pointermove', 'pointerup', 'pointercancel']) window.removeEventListener(kind, kind === 'pointermove' ? move : stop);
+    return button.append(mark);
+  }, (at) => {
     const dragged = mark.isConnected;
     mark.remove();
     if (!dragged || at.type !== 'pointerup') return;
     swallowClick(button);
     const [low, high] = [from, within(at.clientX)].sort((a, b) => a - b).map((x) => 10 ** (frame.x0 + (frame.x1 - frame.x0) * x / box.width));
     setBand(low, high);
+  });
+}
+
+// Calls move(event) until the pointer is released, then stop(event).
+function followPointer(move, stop = () => {}) {
+  const end = (event) => {
+    window.removeEventListener('pointermove', move);
+    for (const kind of ['pointerup', 'pointercancel']) window.removeEventListener(kind, end);
+    stop(event);
   };
   window.addEventListener('pointermove', move);
-  window.addEventListener('pointerup', stop);
-  window.addEventListener('pointercancel', stop);
+  for (const kind of ['pointerup', 'pointercancel']) window.addEventListener(kind, end);
 }
 
 function swallowClick(button) {
@@ -51,30 +56,23 @@ function savedMatrix() {
     for (const [o, output] of outputs.entries()) drawName(context, output.name, 'right', left - 8, top + (o + 0.5) * height);
     for (const [i, input] of inputs.entries()) drawName(context, input.name, 'center', left + (i + 0.5) * width, top / 2);
     for (let c = 0; c < channelCount(); ++c) {
+      const x = left + inputOf(c) * width;
+      const y = top + outputOf(c) * height;
       context.save();
-      context.translate(left + Math.floor(c / outputs.length) * width, top + (c % outputs.length) * height);
-      context.beginPath();
-      context.rect(1, 1, width - 3, height - 3);
-      context.clip();
+      context.translate(x, y);
+      clipTo(context, 1, 1, width - 3, height - 3);
       paintPanel(c, context, width - 2, height - 2);
       context.restore();
       context.strokeStyle = colours.frame;
       context.lineWidth = 1;
-      context.strokeRect(left + Math.floor(c / outputs.length) * width + 0.5, top + (c % outputs.length) * height + 0.5, width - 3, height - 3);
+      context.strokeRect(x + 0.5, y + 0.5, width - 3, height - 3);
     }
   };
-  const colours = palette();
-  const legend = [['measured', colours.measured]];
-  if (content.arrays.residual) legend.push(['model', colours.model], ['residual', colours.residual]);
-  if (otherTrace()) legend.push([traceName(otherTrace()), colours[otherTrace()]]);
+  const legend = traceLegend(['measured', ...(content.arrays.residual ? ['model', 'residual'] : []), otherTrace()]);
   const panel = { width: left + inputs.length * width, height: top + outputs.length * height, draw };
   return { title: 'Frequency response, ' + bandText() + (matrix.timesOmega ? ', times \u03c9\u00b2' : ''), legend, panels: [panel] };
 }
 
 function drawName(context, name, align, x, y) {
-  context.font = font(12);
-  context.fillStyle = palette().text;
-  context.textAlign = align;
-  context.textBaseline = 'middle';
-  context.fillText(name.length > 12 ? name.slice(0, 11) + '\u2026' : name, x, y);
+  drawText(context, shortened(name, 12), x, y, { align, base: 'middle' });
 }

@@ -10,11 +10,10 @@ function buildNonlinearity() {
     (settled.every(Boolean) ? '.' : '; outlined: undetermined, the records contain a transient or a drift there.'));
   distortion.text = element('output', { class: 'values' });
   distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
-  distortion.figure.node.addEventListener('pointermove', tellDistortion);
-  distortion.figure.node.addEventListener('pointerleave', () => { distortion.text.textContent = ''; });
+  tellUnderPointer(distortion.figure, distortion.text, distortionAt);
   body.append(element('div', { class: 'plot-head' }, element('p', null, distortionSummary() + '.'), saveButtons('nonlinear distortions', savedNonlinearity)),
     distortion.figure.node, element('p', { class: 'plot-title' }, distortion.text),
-    folded('Table of the bands and pairs above noise', '', distortionTable(bands)));
+    folded('Table of the bands and pairs above noise', distortionTable(bands)));
 }
 
 // [{channel, band, p, level, settled}] per pair and band.
@@ -45,10 +44,6 @@ function unsettledSummary() {
   return open ? '; in ' + count(open) + ' of ' + count(bands.length) + ' bands the records are not settled' : '';
 }
 
-function bandName([low, high]) {
-  return hertz(low) + ' \u2013 ' + hertz(high);
-}
-
 function distortionTable(bands) {
   const rows = distortionTests().filter(isDistorted).sort((a, b) => b.level - a.level).slice(0, 200);
   if (!rows.length) return element('p', null, 'None.');
@@ -73,12 +68,11 @@ function distortionHeight(level) {
 }
 
 function drawNonlinearity(context, width, height) {
-  const { outputs } = content.frf;
   const { area, turned, columns, rows, cell: [w, h] } = distortionFrame(width, height);
   const bands = content.nonlinearity.bands.length;
   const place = (channel) => {
-    const [input, output] = [Math.floor(channel / outputs.length), channel % outputs.length];
-    return turned ? [output, input] : [input, output];
+    const at = [inputOf(channel), outputOf(channel)];
+    return turned ? at.reverse() : at;
   };
   const colours = palette();
   rows.forEach((row, r) => drawName(context, row.name.slice(0, 8), 'right', area.x - 8, area.y + (r + 0.5) * h));
@@ -105,22 +99,21 @@ function drawNonlinearity(context, width, height) {
   }
 }
 
-function tellDistortion(event) {
+function distortionAt(event) {
   const { node } = distortion.figure;
   const { area, turned, cell: [w, h] } = distortionFrame(node.clientWidth, node.clientHeight);
   const column = Math.floor((event.offsetX - area.x) / w);
   const row = Math.floor((event.offsetY - area.y) / h);
   const [input, output] = turned ? [row, column] : [column, row];
   const { bands, p_value: p, distortion: level, settled } = content.nonlinearity;
-  if (!content.frf.inputs[input] || !content.frf.outputs[output]) {
-    distortion.text.textContent = '';
-    return;
-  }
+  if (!content.frf.inputs[input] || !content.frf.outputs[output]) return '';
   const place = Math.min(bands.length - 1, Math.max(0, Math.floor((event.offsetX - area.x - column * w - 2) / ((w - 5) / bands.length))));
   const channel = channelIndex(output, input);
-  distortion.text.textContent = channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + (settled[place] ? ', p = ' + number(p[channel][place], 2) : ', not settled');
+  return channelName(channel) + ', ' + bandName(bands[place]) + ': ' + percent(level[channel][place]) + (settled[place] ? ', p = ' + number(p[channel][place], 2) : ', not settled');
 }
 
 function savedNonlinearity() {
-  return { title: 'Nonlinear distortions, 0.01 % to 100 % of |G|', legend: [['more than noise', palette().marker], ['within the noise', palette().frame], ...(content.nonlinearity.settled.every(Boolean) ? [] : [['not settled', palette().text]])], panels: [canvasPanel(distortion.figure)] };
+  const legend = [['more than noise', palette().marker], ['within the noise', palette().frame]];
+  if (!content.nonlinearity.settled.every(Boolean)) legend.push(['not settled', palette().text]);
+  return { title: 'Nonlinear distortions, 0.01 % to 100 % of |G|', legend, panels: [canvasPanel(distortion.figure)] };
 }

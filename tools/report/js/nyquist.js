@@ -7,8 +7,7 @@ function buildNyquist() {
   const title = element('p', { class: 'plot-title', id: 'nyquist-title' }, 'Nyquist');
   const text = element('output', { class: 'values', id: 'nyquist-values' });
   Object.assign(nyquist, { figure, title, text });
-  figure.node.addEventListener('pointermove', tellNearest);
-  figure.node.addEventListener('pointerleave', () => { text.textContent = ''; });
+  tellUnderPointer(figure, text, nearestText);
   figure.node.addEventListener('keydown', bandKey);
   return element('div', { class: 'nyquist' }, element('div', { class: 'plot-head' }, title, saveButtons('Nyquist', savedNyquist)), figure.node,
     element('p', { class: 'plot-title' }, text));
@@ -33,31 +32,24 @@ function nyquistBand(channel) {
   return [Math.max(f[0], low), Math.min(f[f.length - 1], high)];
 }
 
-// {points: [{k, re, im, radius}], model: [{re, im}], other: [{re, im}]} on the lines of that band, with the current
-// factor.
+// {points: [{k, re, im, radius}], model: [{k, re, im}], other: [{k, re, im}]} on the lines of that band, with the
+// current factor.
 function nyquistData(channel, low, high) {
-  const [first, last] = bandLines(low, high);
-  const lines = content.frf.lines;
+  const [first] = bandLines(low, high);
+  const lines = Array.from({ length: linesBetween(low, high) }, (_, i) => first + i);
   const scale = lineScale();
-  const response = array('response');
-  const residual = array('residual');
+  const factor = (k) => (scale ? scale[k] : 1);
+  const pairs = channelPairs(channel);
   const { deviation } = channelCurves(channel);
-  const otherOne = otherTrace() && array(otherTrace() === 'other' ? 'other_response' : 'other_model');
-  const points = [], model = [], other = [];
-  for (let k = first; k <= last; ++k) {
-    const place = 2 * (channel * lines + k);
-    const s = scale ? scale[k] : 1;
-    points.push({ k, re: s * response[place], im: s * response[place + 1], radius: deviation ? s * content.frf.band_factor * deviation[k] : 0 });
-    if (residual) model.push({ re: s * (response[place] - residual[place]), im: s * (response[place + 1] - residual[place + 1]) });
-    if (otherOne) other.push({ re: s * otherOne[place], im: s * otherOne[place + 1] });
-  }
-  return { points, model, other };
+  const path = (values) => (values ? lines.map((k) => ({ k, re: factor(k) * values[2 * k], im: factor(k) * values[2 * k + 1] })) : []);
+  const points = path(pairs.measured).map((p) => ({ ...p, radius: deviation ? factor(p.k) * content.frf.band_factor * deviation[p.k] : 0 }));
+  return { points, model: path(pairs.model), other: path(pairs[otherTrace()]) };
 }
 
 function showNyquist(channel) {
   const [low, high] = nyquistBand(channel);
   nyquist.shown = { channel, low, high, ...nyquistData(channel, low, high) };
-  nyquist.title.textContent = 'Nyquist, ' + hertz(low) + ' \u2013 ' + hertz(high) + (isWholeBand() ? ' (the strongest resonance)' : '');
+  nyquist.title.textContent = 'Nyquist, ' + bandName([low, high]) + (isWholeBand() ? ' (the strongest resonance)' : '');
   nyquist.figure.node.setAttribute('aria-label', channelName(channel) + ' in the complex plane, ' + hertz(low) + ' to ' + hertz(high) + ', ' +
     plural(nyquist.shown.points.length, 'line'));
   nyquist.figure.redraw();
@@ -85,23 +77,20 @@ function drawNyquist(context, width, height) {
   const colours = palette();
   drawPlane(context, frame, height);
   context.save();
-  context.beginPath();
-  context.rect(frame.area.x, frame.area.y, frame.area.w, frame.area.h);
-  context.clip();
+  clipTo(context, frame.area.x, frame.area.y, frame.area.w, frame.area.h);
   drawCircles(context, frame, data.points, colours.measured);
   const path = (points, colour, thickness) => {
     context.strokeStyle = colour;
     context.lineWidth = thickness;
     context.beginPath();
-    points.forEach((p, i) => (i ? context.lineTo(frame.x(p.re), frame.y(p.im)) : context.moveTo(frame.x(p.re), frame.y(p.im))));
+    for (const p of points) context.lineTo(frame.x(p.re), frame.y(p.im));
     context.stroke();
   };
   path(data.points, colours.measured, data.model.length ? 3 : 1.4);
   context.fillStyle = colours.measured;
   if (data.points.length < 400) {
     for (const p of data.points) {
-      context.beginPath();
-      context.arc(frame.x(p.re), frame.y(p.im), 2.6, 0, 2 * Math.PI);
+      circle(context, frame.x(p.re), frame.y(p.im), 2.6);
       context.fill();
     }
   }
@@ -118,8 +107,7 @@ function drawCircles(context, frame, points, colour) {
     const radius = p.radius / frame.unit;
     if (radius < 1 || (last && Math.hypot(at[0] - last[0], at[1] - last[1]) < 10)) continue;
     last = at;
-    context.beginPath();
-    context.arc(at[0], at[1], radius, 0, 2 * Math.PI);
+    circle(context, ...at, radius);
     context.fillStyle = colour;
     context.globalAlpha = 0.12;
     context.fill();
@@ -140,52 +128,40 @@ function drawPlane(context, frame, height) {
     const scaledStep = step / 10 ** power;
     return (v / 10 ** power).toFixed(Math.max(0, -Math.floor(Math.log10(scaledStep) + 1e-9))).replace('-', '\u2212');
   };
-  context.font = font(12);
   context.lineWidth = 1;
   const line = (x0, y0, x1, y1, axis) => {
     context.strokeStyle = axis ? colours.frame : colours.grid;
-    context.beginPath();
-    context.moveTo(x0, y0);
-    context.lineTo(x1, y1);
-    context.stroke();
+    drawLine(context, x0, y0, x1, y1);
   };
-  context.fillStyle = colours.text;
   for (const { v, label: text } of linearTicks(...frame.re, Math.max(2, area.w / 70), label)) {
     const x = Math.round(frame.x(v)) + 0.5;
     line(x, area.y, x, area.y + area.h, Math.abs(v) < frame.unit);
-    context.textAlign = 'center';
-    context.textBaseline = 'top';
-    context.fillText(text, x, area.y + area.h + 5);
+    drawText(context, text, x, area.y + area.h + 5, { align: 'center', base: 'top' });
   }
   for (const { v, label: text } of linearTicks(...frame.im, Math.max(2, area.h / 50), label)) {
     const y = Math.round(frame.y(v)) + 0.5;
     line(area.x, y, area.x + area.w, y, Math.abs(v) < frame.unit);
-    context.textAlign = 'right';
-    context.textBaseline = 'middle';
-    context.fillText(text, area.x - 5, y);
+    drawText(context, text, area.x - 5, y, { align: 'right', base: 'middle' });
   }
-  context.textAlign = 'center';
-  context.textBaseline = 'alphabetic';
-  context.fillText('Re, Im [' + (power ? powerOfTen(power) + '\u00a0' : '') + entryUnit(nyquist.shown.channel) + ']', area.x + area.w / 2, height - 6);
+  const unit = (power ? powerOfTen(power) + '\u00a0' : '') + entryUnit(nyquist.shown.channel);
+  drawText(context, 'Re, Im [' + unit + ']', area.x + area.w / 2, height - 6, { align: 'center' });
 }
 
-function tellNearest(event) {
+function nearestText(event) {
   const data = nyquist.shown;
-  if (!data || data.points.length === 0) return;
+  if (!data || data.points.length === 0) return '';
   const { node } = nyquist.figure;
   const frame = planeFrame(data, node.clientWidth, node.clientHeight);
   const distance = (p) => Math.hypot(frame.x(p.re) - event.offsetX, frame.y(p.im) - event.offsetY);
   const nearest = data.points.reduce((a, b) => (distance(b) < distance(a) ? b : a));
-  nyquist.text.textContent = number(array('frequency')[nearest.k], 6) + '\u00a0Hz   ' + number(nearest.re) + (nearest.im < 0 ? ' \u2212 ' : ' + ') +
+  return number(array('frequency')[nearest.k], 6) + '\u00a0Hz   ' + number(nearest.re) + (nearest.im < 0 ? ' \u2212 ' : ' + ') +
     number(Math.abs(nearest.im)) + 'j' + (nearest.radius > 0 ? '   95\u00a0%: \u00b1' + number(nearest.radius) : '');
 }
 
 function savedNyquist() {
-  const colours = palette();
+  const { channel, low, high, model, other } = nyquist.shown;
   return {
-    title: channelName(nyquist.shown.channel) + ', ' + hertz(nyquist.shown.low) + ' \u2013 ' + hertz(nyquist.shown.high),
-    legend: [['measured', colours.measured]].concat(nyquist.shown.model.length ? [['model', colours.model]] : [])
-      .concat(nyquist.shown.other.length ? [[traceName(otherTrace()), colours[otherTrace()]]] : []),
-    panels: [canvasPanel(nyquist.figure)],
+    title: channelName(channel) + ', ' + bandName([low, high]),
+    legend: traceLegend(['measured', model.length && 'model', other.length && otherTrace()]), panels: [canvasPanel(nyquist.figure)],
   };
 }

@@ -16,7 +16,7 @@ async function selfTest(startedMs) {
     Object.assign(findings, {
       panels: matrix.panels.length, panels_with_ink: seen.filter(hasInk).length,
       panels_with_peak: seen.filter((pixels, channel) => showsPeak(channel, pixels)).length,
-      panel_sizes: smallestPanel(), arrays: Object.fromEntries(Object.keys(content.arrays).map((id) => [id, summary(id)])),
+      panel_sizes: smallestPanel(), arrays: Object.fromEntries(Object.keys(content.arrays).map((id) => [id, summaryOf(array(id))])),
       entries: matrix.panels.map((_, channel) => entrySummary(channel)),
     });
   }
@@ -75,10 +75,6 @@ function smallestPanel() {
 }
 
 // Detects wrong order, sign, scale or type: count, extremes, and a sum weighted by index.
-function summary(id) {
-  return summaryOf(array(id));
-}
-
 function summaryOf(values) {
   let low = Infinity, high = -Infinity, weighted = 0;
   values.forEach((v, i) => {

@@ -37,26 +37,19 @@ function drawStage(context, width, height) {
     context.strokeStyle = colours.text;
     context.lineWidth = 1;
     context.globalAlpha = 0.5;
-    context.beginPath();
-    context.moveTo(rest.x, rest.y);
-    context.lineTo(now.x, now.y);
-    context.stroke();
+    drawLine(context, rest.x, rest.y, now.x, now.y);
     context.globalAlpha = 1;
     drawChannel(context, point.kind, now.x, now.y);
-    context.font = font(11);
     // For a sensor and an actuator at the same position, names on either side.
-    const sensor = point.kind === 'outputs';
-    context.textAlign = sensor ? 'right' : 'left';
-    context.textBaseline = 'middle';
-    context.fillStyle = colours.ink;
-    context.fillText(point.name.slice(0, 12), now.x + (sensor ? -7 : 7), now.y - 7);
+    const [shift, align] = point.kind === 'outputs' ? [-7, 'right'] : [7, 'left'];
+    drawText(context, point.name.slice(0, 12), now.x + shift, now.y - 7, { align, base: 'middle', pixels: 11, colour: colours.ink });
   }
 }
 
 function drawChannel(context, kind, x, y) {
   const colours = palette();
   context.beginPath();
-  if (kind === 'outputs') context.arc(x, y, 4.5, 0, 2 * Math.PI);
+  if (kind === 'outputs') circle(context, x, y, 4.5);
   else context.rect(x - 3.5, y - 3.5, 7, 7);
   context.fillStyle = kind === 'outputs' ? colours.ink : colours.background;
   context.fill();
@@ -84,7 +77,7 @@ function drawSurface(context, scene, view) {
   context.lineWidth = 0.5;
   for (const { four, z } of cells) {
     context.beginPath();
-    four.forEach((corner, i) => (i ? context.lineTo(corner.x, corner.y) : context.moveTo(corner.x, corner.y)));
+    for (const corner of four) context.lineTo(corner.x, corner.y);
     context.closePath();
     context.fillStyle = heightColour(z);
     context.fill();
@@ -110,21 +103,13 @@ function drawBars(context, width, height) {
   const tall = height / 2 - 34;
   context.strokeStyle = colours.frame;
   context.lineWidth = 1;
-  context.beginPath();
-  context.moveTo(10, middle);
-  context.lineTo(width - 10, middle);
-  context.stroke();
+  drawLine(context, 10, middle, width - 10, middle);
   points.forEach((point, i) => {
     const x = 10 + (i + (point.kind === 'inputs' ? 1 : 0)) * step;
     const z = displacement(point) / most;
     context.fillStyle = heightColour(z);
     context.fillRect(x + 0.15 * step, Math.min(middle, middle - z * tall), 0.7 * step, Math.abs(z) * tall);
     drawChannel(context, point.kind, x + 0.5 * step, middle - z * tall);
-    if (step < 18) return;
-    context.font = font(11);
-    context.fillStyle = colours.text;
-    context.textAlign = 'center';
-    context.textBaseline = 'alphabetic';
-    context.fillText(point.name.slice(0, Math.max(2, Math.floor(step / 7))), x + 0.5 * step, height - 10);
+    if (step >= 18) drawText(context, point.name.slice(0, Math.max(2, Math.floor(step / 7))), x + 0.5 * step, height - 10, { align: 'center', pixels: 11 });
   });
 }

@@ -13,7 +13,6 @@ function buildShapes() {
     : 'Real part over one cycle, slowed down. Positions are unknown: add the stage file, or the log that contains it, to the report to show the shapes on the stage.');
   const pick = element('select', { id: 'shape-mode', onchange: (event) => showShape(Number(event.target.value)) },
     ...modes.map((mode, i) => element('option', { value: i }, (i + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz')));
-  const button = (text, name, act) => element('button', { type: 'button', class: 'plain small', 'aria-label': name, title: name, onclick: act }, text);
   shapes.play = element('button', { type: 'button', class: 'plain', id: 'shape-play', onclick: () => playShapes(!shapes.playing) }, 'Play');
   shapes.text = element('p', { class: 'plot-title', 'aria-live': 'polite' });
   shapes.table = element('div');
@@ -21,9 +20,9 @@ function buildShapes() {
   shapes.figure.node.addEventListener('keydown', shapeKey);
   shapes.figure.node.addEventListener('pointerdown', turnShape);
   body.append(
-    element('div', { class: 'entry-pick' }, element('label', { for: 'shape-mode' }, 'Mode ', pick), button('\u25c2', 'Previous mode', () => stepShape(-1)),
-      button('\u25b8', 'Next mode', () => stepShape(1)), shapes.play, saveButtons('mode shape', savedShape)),
-    element('div', { class: 'entry-plots' }, element('div', null, shapes.text, shapes.figure.node, legendOfShapes(), folded('Shape as a table', '', shapes.table)),
+    element('div', { class: 'entry-pick' }, element('label', { for: 'shape-mode' }, 'Mode ', pick), smallButton('\u25c2', 'Previous mode', () => stepShape(-1)),
+      smallButton('\u25b8', 'Next mode', () => stepShape(1)), shapes.play, saveButtons('mode shape', savedShape)),
+    element('div', { class: 'entry-plots' }, element('div', null, shapes.text, shapes.figure.node, legendOfShapes(), folded('Shape as a table', shapes.table)),
       buildMac('shape-mac', 'MAC', ownMac)));
   new IntersectionObserver(([seen]) => {
     shapes.visible = seen.isIntersecting;
@@ -144,26 +143,18 @@ function shapeKey(event) {
 
 function turnShape(event) {
   let last = event.clientX;
-  const move = (at) => {
+  followPointer((at) => {
     shapes.turn += (at.clientX - last) * 0.008;
     last = at.clientX;
     shapes.figure.redraw();
-  };
-  const stop = () => {
-    for (const kind of ['pointerup', 'pointercancel']) window.removeEventListener(kind, stop);
-    window.removeEventListener('pointermove', move);
-  };
-  window.addEventListener('pointermove', move);
-  for (const kind of ['pointerup', 'pointercancel']) window.addEventListener(kind, stop);
+  });
 }
 
 function shapeTable(mode) {
-  const part = (kind, channels, title) => channels.map((channel, i) => [channel.name, title, mode[kind][2 * i], mode[kind][2 * i + 1]]);
-  const rows = [...part('outputs', content.shape_channels.outputs, 'sensor'), ...part('inputs', content.shape_channels.inputs, 'actuator')];
-  const head = ['channel', 'kind', 'real', 'imaginary'].map((title) => element('th', { scope: 'col' }, title));
-  return element('div', { class: 'table-scroll' }, element('table', null, element('thead', null, element('tr', null, ...head)),
-    element('tbody', null, ...rows.map(([name, kind, re, im]) => element('tr', null, element('th', { scope: 'row', class: 'name' }, name),
-      element('td', null, kind), element('td', null, number(re)), element('td', null, number(im)))))));
+  const part = (kind, channels, title) => channels.map((channel, i) =>
+    [rowHead(channel.name, 'name'), title, number(mode[kind][2 * i]), number(mode[kind][2 * i + 1])]);
+  return table(['channel', 'kind', 'real', 'imaginary'],
+    [...part('outputs', content.shape_channels.outputs, 'sensor'), ...part('inputs', content.shape_channels.inputs, 'actuator')]);
 }
 
 function savedShape() {

@@ -14,7 +14,7 @@ function buildStabilization() {
   stability.figure = canvasFigure('stabilization-plot', stabilizationSummary(), drawStabilization, 'tall');
   stability.figure.node.addEventListener('keydown', bandKey);
   followBand(stability.figure.redraw);
-  body.append(legend, bandBar(), element('p', { class: 'plot-title' }, 'Order of the fit'), stability.figure.node, element('p', { class: 'axis-title' }, 'Frequency [Hz]'), folded('Stable poles of the largest order', '', stableTable()));
+  body.append(legend, bandBar(), element('p', { class: 'plot-title' }, 'Order of the fit'), stability.figure.node, element('p', { class: 'axis-title' }, 'Frequency [Hz]'), folded('Stable poles of the largest order', stableTable()));
 }
 
 function lastOrder() {
@@ -47,22 +47,14 @@ function drawStabilization(context, width, height) {
   const x = (hz) => area.x + area.w * Math.log(hz / low) / Math.log(high / low);
   const y = (order) => area.y + area.h * (1 - order / (most + 2));
   const colours = palette();
-  context.font = font(12);
-  context.lineWidth = 1;
   for (const { v, label } of logTicks(low, high, area.w, frequencyLabel, 46)) {
-    if (!label) continue;
-    context.fillStyle = colours.text;
-    context.textAlign = 'center';
-    context.textBaseline = 'top';
-    context.fillText(label, x(v), area.y + area.h + 6);
+    if (label) drawText(context, label, x(v), area.y + area.h + 6, { align: 'center', base: 'top' });
   }
-  context.textAlign = 'right';
-  context.textBaseline = 'middle';
-  for (const { v, label } of linearTicks(0, most, Math.max(2, area.h / 40), (order) => String(Math.round(order)))) context.fillText(label, area.x - 6, y(v));
+  for (const { v, label } of linearTicks(0, most, Math.max(2, area.h / 40), (order) => String(Math.round(order)))) {
+    drawText(context, label, area.x - 6, y(v), { align: 'right', base: 'middle' });
+  }
   context.save();
-  context.beginPath();
-  context.rect(area.x, area.y, area.w, area.h);
-  context.clip();
+  clipTo(context, area.x, area.y, area.w, area.h);
   drawModeLines(context, x, area);
   if (content.arrays.cmif) drawFirstCurve(context, x, area, low, high);
   for (const [order, hz, , kind] of content.stabilization) if (hz >= low && hz <= high) drawPole(context, kind, x(hz), y(order));
@@ -102,8 +94,8 @@ function drawFirstCurve(context, x, area, low, high) {
 function drawPole(context, kind, x, y) {
   const colours = palette();
   context.lineWidth = 1.2;
-  context.beginPath();
   if (kind === 0) {
+    context.beginPath();
     context.strokeStyle = colours.deviation;
     context.moveTo(x - 2.5, y);
     context.lineTo(x + 2.5, y);
@@ -112,7 +104,7 @@ function drawPole(context, kind, x, y) {
     context.stroke();
     return;
   }
-  context.arc(x, y, 2.8, 0, 2 * Math.PI);
+  circle(context, x, y, 2.8);
   context.strokeStyle = colours.curves[0];
   context.fillStyle = kind === 2 ? colours.curves[0] : colours.background;
   context.fill();

@@ -17,8 +17,8 @@ class SvgContext {
   }
 
   save() {
-    const { x, y, dash, open, strokeStyle, fillStyle, lineWidth, globalAlpha, font, textAlign, textBaseline, lineJoin, lineCap } = this;
-    this.stack.push({ x, y, dash, open, strokeStyle, fillStyle, lineWidth, globalAlpha, font, textAlign, textBaseline, lineJoin, lineCap });
+    const { parts, stack, path, clips, ...state } = this;
+    stack.push(state);
   }
   restore() {
     const before = this.stack.pop();

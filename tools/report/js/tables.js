@@ -18,7 +18,7 @@ function buildHead() {
   }
   if (frf) {
     figures.push(['lines', count(frf.lines)], ['sensors \u00d7 actuators', frf.outputs.length + ' \u00d7 ' + frf.inputs.length]);
-    figures.push(['band', frf.band_hz.map(hertz).join(' \u2013 ')]);
+    figures.push(['band', bandName(frf.band_hz)]);
   }
   for (const figure of content.figures) figures.push([figure.label, figure.value]);
   head.append(figureList(figures));
@@ -26,20 +26,18 @@ function buildHead() {
 }
 
 function figureList(figures) {
-  const list = element('dl', { class: 'figures' });
-  for (const [label, value] of figures) list.append(element('div', null, element('dt', null, label), element('dd', null, value)));
-  return list;
+  return element('dl', { class: 'figures' }, ...described(figures));
 }
 
-// Columns: [title, sort key of a row, cell of a row, class]. A click on a title sorts by it.
-function sortableTable(columns, rows, caption) {
-  const body = element('tbody');
+// Columns: [title, sort key of a row, cell of a row]. A click on a title sorts by it.
+function sortableTable(columns, rows) {
   const heads = columns.map(([title], i) => element('th', { scope: 'col', 'aria-sort': 'none' },
     element('button', { type: 'button', onclick: () => sort(i) }, title)));
+  const node = table(heads, []);
   let sorted = -1;
   let up = true;
-  const fill = (list) => body.replaceChildren(...list.map((row) => element('tr', { class: row.rowClass || null },
-    ...columns.map(([, , cell, kind]) => element('td', { class: kind || null }, cell(row))))));
+  const fill = (list) => node.querySelector('tbody').replaceChildren(
+    ...list.map((row) => tableRow(columns.map(([, , cell]) => cell(row)), row.rowClass)));
   const sort = (i) => {
     up = sorted === i ? !up : true;
     sorted = i;
@@ -53,8 +51,7 @@ function sortableTable(columns, rows, caption) {
     fill(list);
   };
   fill(rows);
-  return element('div', { class: 'table-scroll' },
-    element('table', null, caption ? element('caption', null, caption) : null, element('thead', null, element('tr', null, ...heads)), body));
+  return node;
 }
 
 function buildModes() {
@@ -64,7 +61,6 @@ function buildModes() {
     ? 'Identified modes and true modes of the simulated plant. Deviations are in standard deviations.' : null);
   if (uncertain && isZippered()) body.append(element('p', { class: 'lead correlated' }, correlationText() + ' The standard deviations include this.'));
   const rows = content.modes.map((mode, i) => ({ ...mode, place: i + 1, rowClass: isNumber(mode.frequency_hz) ? null : 'absent' }));
-  const deviation = (key) => (row) => element('span', { class: Math.abs(row[key]) > 3 ? 'far' : null }, deviations(row[key]));
   const columns = [
     ['#', (row) => row.place, shapeCell],
     ['f\u2080 [Hz]', (row) => row.frequency_hz, frequencyCell],
@@ -75,8 +71,8 @@ function buildModes() {
   if (known) {
     columns.push(['true f\u2080 [Hz]', (row) => row.truth && row.truth.frequency_hz, (row) => fixed(row.truth && row.truth.frequency_hz)],
       ['true \u03b6 [%]', (row) => row.truth && row.truth.damping_ratio, (row) => hundred(row.truth && row.truth.damping_ratio)]);
-    if (uncertain) columns.push(['\u0394f\u2080/\u03c3', (row) => row.frequency_deviation, deviation('frequency_deviation')],
-      ['\u0394\u03b6/\u03c3', (row) => row.damping_deviation, deviation('damping_deviation')]);
+    if (uncertain) columns.push(['\u0394f\u2080/\u03c3', (row) => row.frequency_deviation, (row) => deviationCell(row.frequency_deviation)],
+      ['\u0394\u03b6/\u03c3', (row) => row.damping_deviation, (row) => deviationCell(row.damping_deviation)]);
   }
   body.append(sortableTable(columns, rows));
   const others = content.model.others.map((other) => other.integrators
@@ -84,6 +80,10 @@ function buildModes() {
     : other.order === 0 ? 'direct term' : 'submodel of order ' + other.order);
   if (others.length) body.append(element('p', { class: 'quiet' }, 'Other terms: ' + others.join(', ') + '.'));
   body.append(fitFacts());
+}
+
+function deviationCell(value) {
+  return element('span', { class: Math.abs(value) > 3 ? 'far' : null }, deviations(value));
 }
 
 function fixed(value) {
@@ -129,7 +129,7 @@ function fitFacts() {
     ['status', model.status && model.status.replace(/_/g, ' ')], ['weighting', model.weighting && model.weighting.replace(/_/g, ' ')],
     ['cost', number(model.cost, 5)], ['iterations', count(model.iterations)], ['hold in the model', model.hold],
     ['delay at the inputs', delayText(model.delay_s.inputs)], ['delay at the outputs', delayText(model.delay_s.outputs)],
-    ['band fitted', model.band_hz[1] > 0 ? hertz(model.band_hz[0]) + ' \u2013 ' + hertz(model.band_hz[1]) : null],
+    ['band fitted', model.band_hz[1] > 0 ? bandName(model.band_hz) : null],
     ['time', model.seconds > 0 ? duration(model.seconds) : null],
   ]);
 }
@@ -152,21 +152,18 @@ function channelErrors(errors) {
   const logs = errors.filter((e) => e > 0).map(Math.log);
   const low = Math.min(...logs), high = Math.max(...logs);
   const shade = (e) => (e > 0 && high > low ? (Math.log(e) - low) / (high - low) : 0);
-  const head = element('tr', null, element('th', { scope: 'col' }, ''), ...inputs.map((input) => element('th', { scope: 'col', class: 'name' }, input.name)));
-  const rows = outputs.map((output, o) => element('tr', null, element('th', { scope: 'row', class: 'name' }, output.name),
-    ...inputs.map((_, i) => {
-      const e = errors[channelIndex(o, i)];
-      return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, e === null ? '–' : percent(e));
-    })));
-  return element('div', { class: 'table-scroll' }, element('table', { class: 'heatmap' },
-    element('caption', null, 'Relative rms error of each channel'), element('thead', null, head), element('tbody', null, ...rows)));
+  const heads = inputs.map((input) => element('th', { scope: 'col', class: 'name' }, input.name));
+  const rows = outputs.map((output, o) => [rowHead(output.name, 'name'), ...inputs.map((_, i) => {
+    const e = errors[channelIndex(o, i)];
+    return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, percent(e));
+  })]);
+  return table(['', ...heads], rows, 'Relative rms error of each channel', 'heatmap');
 }
 
 function buildDecisions() {
   const body = section('decisions', 'Decisions', 'Decisions of the automatic fit');
   const list = element('ol', { class: 'decisions' }, ...content.decisions.map((decision) => element('li', null, decision)));
-  body.append(content.decisions.length > 12
-    ? element('details', null, element('summary', null, plural(content.decisions.length, 'decision')), list) : list);
+  body.append(content.decisions.length > 12 ? folded(plural(content.decisions.length, 'decision'), list) : list);
 }
 
 function buildProvenance() {
@@ -191,7 +188,7 @@ function buildProvenance() {
   for (const { name, text } of content.documents) body.append(folded(name, text));
 }
 
-// A text, or an element, folded under its title.
-function folded(title, text, node) {
-  return element('details', null, element('summary', null, title), node || element('pre', null, text));
+// An element, or a text as it is, folded under its title.
+function folded(title, what) {
+  return element('details', null, element('summary', null, title), typeof what === 'string' ? element('pre', null, what) : what);
 }

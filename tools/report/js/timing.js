@@ -12,6 +12,13 @@ function octaves(bins) {
   return Array.from(rows, ([place, n]) => ({ to: 2 ** (place + 1) * 1e-9, n })).sort((a, b) => a.to - b.to);
 }
 
+// One bar of a list, its length in percent.
+function lengthBar(name, length, value, { kind = null, note = null }) {
+  return element('div', { role: 'listitem' }, element('span', { class: 'step-name' }, name),
+    element('span', { class: 'step-bar' }, element('span', { class: kind, style: 'width:' + length.toFixed(1) + '%' })),
+    element('span', { class: 'step-time' }, value), element('span', { class: 'quiet' }, note));
+}
+
 // Lengths are logarithmic in the count, so that one late cycle among a million is visible.
 function histogramBars(title, histogram, period) {
   const rows = octaves(histogram.bins);
@@ -19,9 +26,7 @@ function histogramBars(title, histogram, period) {
   const list = element('div', { class: 'steps', role: 'list' });
   for (const row of rows) {
     const width = 4 + 96 * Math.log10(row.n) / Math.max(1, Math.log10(most));
-    list.append(element('div', { role: 'listitem' }, element('span', { class: 'step-name' }, '< ' + number(row.to * 1e6, 2) + '\u00a0\u00b5s'),
-      element('span', { class: 'step-bar' }, element('span', { class: period && row.to > period ? 'over' : null, style: 'width:' + Math.min(100, width).toFixed(1) + '%' })),
-      element('span', { class: 'step-time' }, count(row.n)), element('span', { class: 'quiet' })));
+    list.append(lengthBar('< ' + number(row.to * 1e6, 2) + '\u00a0\u00b5s', Math.min(100, width), count(row.n), { kind: period && row.to > period ? 'over' : null }));
   }
   const share = (seconds) => duration(seconds) + (period ? ' (' + percent(seconds / period) + ' of the period)' : '');
   return element('div', { class: 'histogram' }, element('h3', null, title),
