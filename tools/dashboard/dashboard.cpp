@@ -12,7 +12,7 @@
 #include "tools/dashboard/dashboard_server.hpp"
 #include "tools/dashboard/live_levels.hpp"
 #include "tools/dashboard/live_response.hpp"
-#include "tools/report/html_text.hpp"
+#include "tools/report/html_page.hpp"
 #include "tools/report/report_assets.hpp"
 #include "tools/report/timing_json.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -155,17 +155,16 @@ std::string dashboard_content_json(const ExperimentConfig& config, const Experim
 
 std::string page_of(const ExperimentConfig& config, const ExperimentPlan& plan,
                     const StageInfo& stage) {
-  const std::string content = dashboard_content_json(config, plan, stage);
-  return fill_page(
-      report::dashboard_html,
-      {{"title", escape_html(fmt::format("{}: {}", stage.name, config.file.filename().string()))},
-       {"library_css", report::library_css},
-       {"css", report::page_css},
-       {"dashboard_css", report::dashboard_css},
-       {"library_js", report::library_js},
-       {"js", report::dashboard_js},
-       {"licence", escape_html(report::library_licence)},
-       {"content", content}});
+  return html_page({.title = fmt::format("{}: {}", stage.name, config.file.filename().string()),
+                    .object = "stageidDashboard",
+                    .policy = "; connect-src 'self'; base-uri 'none'; form-action 'none'",
+                    .without_script =
+                        "The dashboard needs JavaScript, which is included in this page; enable "
+                        "scripts to see it.",
+                    .css = report::dashboard_css,
+                    .js = report::dashboard_js,
+                    .content = dashboard_content_json(config, plan, stage),
+                    .blocks = ""});
 }
 
 }  // namespace

@@ -5,8 +5,7 @@
 namespace stageid::report {
 
 // The sources of the page and the plot library, embedded by tools/report/embed.cmake.
-extern const std::string_view page_html;  ///< template with {{title}}, {{style}}, {{library}}, ...
-extern const std::string_view dashboard_html;  ///< the same with {{dashboard_css}}
+extern const std::string_view page_html;  ///< template with {{title}}, {{css}}, {{library_js}}, ...
 extern const std::string_view dashboard_css;
 extern const std::string_view dashboard_js;
 extern const std::string_view page_css;

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
-#include "tools/report/html_text.hpp"
+#include "tools/report/html_page.hpp"
 #include "tools/report/report_assets.hpp"
 #include "tools/report/report_json.hpp"
 
@@ -83,14 +83,15 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
 std::string report_page(const ReportData& data) {
   check_data(data);
   const report::PageContent content = report::page_content(data);
-  return fill_page(report::page_html, {{"title", escape_html(data.title)},
-                                       {"library_css", report::library_css},
-                                       {"css", report::page_css},
-                                       {"library_js", report::library_js},
-                                       {"js", report::page_js},
-                                       {"licence", escape_html(report::library_licence)},
-                                       {"content", content.json},
-                                       {"blocks", block_elements(content.blocks)}});
+  return html_page({.title = data.title,
+                    .object = "stageidReport",
+                    .policy = "",
+                    .without_script = "This report needs JavaScript, which is included in this "
+                                      "file; enable scripts to see the plots.",
+                    .css = "",
+                    .js = report::page_js,
+                    .content = content.json,
+                    .blocks = block_elements(content.blocks)});
 }
 
 void write_report(const std::filesystem::path& file, const ReportData& data) {

@@ -1,0 +1,69 @@
+#include "tools/report/html_page.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "tools/report/report_assets.hpp"
+
+namespace stageid {
+namespace {
+
+std::string replaced(std::string_view text,
+                     const std::vector<std::pair<char, std::string_view>>& replacements) {
+  std::string out;
+  out.reserve(text.size());
+  for (const char c : text) {
+    const auto found =
+        std::ranges::find(replacements, c, &std::pair<char, std::string_view>::first);
+    if (found == replacements.end())
+      out += c;
+    else
+      out += found->second;
+  }
+  return out;
+}
+
+/// For use between and inside elements.
+std::string escape_html(std::string_view text) {
+  return replaced(text, {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}});
+}
+
+/// Replaces every {{name}} of the template once, from left to right; inserted text is not scanned again. Unknown names
+/// are replaced by nothing.
+std::string fill_page(std::string_view page,
+                      const std::vector<std::pair<std::string_view, std::string_view>>& parts) {
+  std::string out;
+  while (true) {
+    const std::size_t begin = page.find("{{");
+    const std::size_t end = page.find("}}", begin);
+    out += page.substr(0, begin);
+    if (begin == std::string_view::npos || end == std::string_view::npos) return out;
+    const std::string_view name = page.substr(begin + 2, end - begin - 2);
+    for (const auto& [key, value] : parts)
+      if (key == name) out += value;
+    page.remove_prefix(end + 2);
+  }
+}
+
+}  // namespace
+
+// Within <script> only "</script" and "<!--" are special, and both begin with '<'.
+std::string script_safe(std::string_view json) { return replaced(json, {{'<', "\\u003c"}}); }
+
+std::string html_page(const HtmlPage& page) {
+  return fill_page(report::page_html, {{"title", escape_html(page.title)},
+                                       {"object", page.object},
+                                       {"policy", page.policy},
+                                       {"without_script", page.without_script},
+                                       {"library_css", report::library_css},
+                                       {"css", report::page_css},
+                                       {"more_css", page.css},
+                                       {"library_js", report::library_js},
+                                       {"js", page.js},
+                                       {"licence", escape_html(report::library_licence)},
+                                       {"content", page.content},
+                                       {"blocks", page.blocks}});
+}
+
+}  // namespace stageid
