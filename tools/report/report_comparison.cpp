@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "estimation/modal/modal_assurance.hpp"
-#include "tools/report/report_shapes.hpp"
+#include "tools/report/report_diagrams.hpp"
 #include "tools/steps/fit_step.hpp"
 
 namespace stageid::report {
@@ -58,8 +58,6 @@ void add_response(ReportComparison& comparison, ReportData& own, const FrfEstima
   leave_out("identical response");
 }
 
-Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
 const Submodel& submodel_of(const AdditiveModel& model, const ModeShape& mode) {
   return model.submodels[mode.submodel];
 }
@@ -69,9 +67,9 @@ Json modes_json(const AdditiveModel& model, const std::vector<ModeShape>& modes)
   for (const ModeShape& mode : modes) {
     const Submodel& submodel = submodel_of(model, mode);
     out.push_back({{"frequency_hz", mode.natural_frequency_hz},
-                   {"frequency_std_hz", number(submodel.natural_frequency_std_hz)},
+                   {"frequency_std_hz", number_json(submodel.natural_frequency_std_hz)},
                    {"damping_ratio", mode.damping_ratio},
-                   {"damping_std", number(submodel.damping_ratio_std)}});
+                   {"damping_std", number_json(submodel.damping_ratio_std)}});
   }
   return out;
 }

@@ -1,14 +1,25 @@
 #include "tools/report/report_diagrams.hpp"
 
+#include <algorithm>
 #include <cmath>
 
-#include "tools/report/report_shapes.hpp"
+#include "estimation/modal/modal_assurance.hpp"
 
 namespace stageid::report {
 namespace {
 
 using Json = nlohmann::json;
 
+/// For shapes of norm one; a pixel is a thousandth.
+constexpr int kShapeDigits = 5;
+
+Json rounded(double value, int digits) {
+  if (!std::isfinite(value)) return Json();
+  const double scale = std::pow(10.0, digits);
+  return std::round(value * scale) / scale;
+}
+
+/// Four digits; null if it is not finite.
 Json significant(double value) {
   if (!std::isfinite(value) || value == 0.0) return std::isfinite(value) ? Json(0.0) : Json();
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
@@ -16,7 +27,41 @@ Json significant(double value) {
   return std::isfinite(rounded) ? Json(rounded) : Json(value);
 }
 
+Json pairs(const Eigen::VectorXcd& shape) {
+  Json out = Json::array();
+  for (const std::complex<double> value : shape) {
+    out.push_back(rounded(value.real(), kShapeDigits));
+    out.push_back(rounded(value.imag(), kShapeDigits));
+  }
+  return out;
+}
+
+Json places(const std::vector<Channel>& places, const ChannelList& channels) {
+  Json out = Json::array();
+  for (const std::string& name : channels.names) {
+    const auto place = std::ranges::find(places, name, &Channel::name);
+    out.push_back(place == places.end()
+                      ? Json()
+                      : Json{{"position_m", place->position_m}, {"direction", place->direction}});
+  }
+  return out;
+}
+
 }  // namespace
+
+Json number_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json rounded_mac(double value) { return rounded(value, 4); }
+
+Json matrix_json(const Eigen::MatrixXd& matrix, Json (*rounding)(double)) {
+  Json out = Json::array();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    Json line = Json::array();
+    for (const double value : matrix.row(row)) line.push_back(rounding(value));
+    out.push_back(std::move(line));
+  }
+  return out;
+}
 
 Json stabilization_json(const std::vector<StabilizationPole>& poles) {
   Json out = Json::array();
@@ -35,6 +80,39 @@ Json nonlinearity_json(const NonlinearityTest& test) {
           {"p_value", matrix_json(test.p_value, significant)},
           {"distortion", matrix_json(test.distortion, significant)},
           {"chance", kNonlinearBelow}};
+}
+
+std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model) {
+  std::vector<ModeShape> modes = mode_shapes(model);
+  std::ranges::stable_sort(modes, {}, &ModeShape::natural_frequency_hz);
+  return modes;
+}
+
+Json shapes_json(const AdditiveModel& model) {
+  const std::vector<ModeShape> modes = shapes_by_frequency(model);
+  Json list = Json::array();
+  for (const ModeShape& mode : modes)
+    list.push_back({{"frequency_hz", mode.natural_frequency_hz},
+                    {"damping_ratio", mode.damping_ratio},
+                    {"modal_mass", mode.modal_mass},  // infinite: null in the page
+                    {"not_rank_one", rounded(mode.not_rank_one, kShapeDigits)},
+                    {"outputs", pairs(mode.output_shape)},
+                    {"inputs", pairs(mode.input_shape)}});
+  const Eigen::MatrixXcd outputs = output_shapes(modes);
+  const Eigen::MatrixXcd inputs = input_shapes(modes);
+  return {{"modes", list},
+          {"output_mac", matrix_json(modal_assurance(outputs, outputs), rounded_mac)},
+          {"input_mac", matrix_json(modal_assurance(inputs, inputs), rounded_mac)}};
+}
+
+Json geometry_json(const StageInfo& geometry, const ChannelList& outputs,
+                   const ChannelList& inputs) {
+  Json out = {{"outputs", places(geometry.sensors, outputs)},
+              {"inputs", places(geometry.actuators, inputs)}};
+  const auto known = [](const Json& list) {
+    return std::ranges::any_of(list, [](const Json& place) { return !place.is_null(); });
+  };
+  return known(out["outputs"]) || known(out["inputs"]) ? out : Json();
 }
 
 }  // namespace stageid::report

@@ -14,7 +14,6 @@
 #include "tools/report/report_diagrams.hpp"
 #include "tools/report/report_encoding.hpp"
 #include "tools/report/report_modes.hpp"
-#include "tools/report/report_shapes.hpp"
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
@@ -22,30 +21,23 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 
+namespace stageid {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReportFigure, label, value)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReportStep, name, seconds, note)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReportDocument, name, text)
+
+}  // namespace stageid
 namespace stageid::report {
 namespace {
 
 using Json = nlohmann::json;
-
-Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 Json channels(const ChannelList& list) {
   Json out = Json::array();
   for (std::size_t i = 0; i < list.size(); ++i)
     out.push_back({{"name", list.names[i]}, {"unit", i < list.units.size() ? list.units[i] : ""}});
   return out;
-}
-
-const char* removed_by(Compensation compensated) {
-  switch (compensated) {
-    case Compensation::none:
-      return "none";
-    case Compensation::delay:
-      return "delay";
-    case Compensation::hold:
-      return "delay and hold";
-  }
-  return "none";
 }
 
 /// An array that is already in the page, as decoded by the page.
@@ -162,7 +154,8 @@ Json frf_json(const FrfEstimate& frf) {
           {"experiments", frf.experiments},
           {"sample_rate_hz", frf.sample_rate_hz},
           {"hold", frf.hold == Hold::zoh ? "zero-order hold" : "none"},
-          {"compensated", removed_by(frf.compensated)},
+          {"compensated",
+           frf.compensated == Compensation::hold ? "delay and hold" : to_string(frf.compensated)},
           {"delay_s", frf.delay_s},
           {"deviation", uncertainty(frf).kind},
           {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
@@ -207,13 +200,13 @@ Json modes_json(const ReportData& data) {
     if (row.truth)
       truth = {{"frequency_hz", row.truth->natural_frequency_hz},
                {"damping_ratio", row.truth->damping_ratio}};
-    out.push_back({{"frequency_hz", optional_number(row.frequency_hz)},
-                   {"frequency_std_hz", optional_number(row.frequency_std_hz)},
-                   {"damping_ratio", optional_number(row.damping_ratio)},
-                   {"damping_std", optional_number(row.damping_std)},
+    out.push_back({{"frequency_hz", number_json(row.frequency_hz)},
+                   {"frequency_std_hz", number_json(row.frequency_std_hz)},
+                   {"damping_ratio", number_json(row.damping_ratio)},
+                   {"damping_std", number_json(row.damping_std)},
                    {"truth", truth},
-                   {"frequency_deviation", optional_number(row.frequency_deviation())},
-                   {"damping_deviation", optional_number(row.damping_deviation())}});
+                   {"frequency_deviation", number_json(row.frequency_deviation())},
+                   {"damping_deviation", number_json(row.damping_deviation())}});
   }
   return out;
 }
@@ -236,31 +229,12 @@ Json run_json(const LogRun& run, double sample_rate_hz) {
           {"recorded_s", recorded_s}};
 }
 
-/// A provenance as JSON if it can be parsed, else as text.
-Json provenance(const std::string& text) {
-  Json parsed = parse_json<Json>(text);
-  return parsed.is_discarded() ? Json(text) : parsed;
-}
-
-Json texts_json(const ReportData& data) {
-  Json out;
-  out["notes"] = data.notes;
-  out["figures"] = Json::array();
-  for (const ReportFigure& figure : data.figures)
-    out["figures"].push_back({{"label", figure.label}, {"value", figure.value}});
-  out["steps"] = Json::array();
-  for (const ReportStep& step : data.steps)
-    out["steps"].push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
-  out["documents"] = Json::array();
-  for (const ReportDocument& document : data.documents)
-    out["documents"].push_back({{"name", document.name}, {"text", document.text}});
-  return out;
-}
-
 Json provenances_json(const ReportData& data) {
   Json out = Json::array();
+  // As JSON if it can be parsed, else as text.
   const auto add = [&out](const char* of, const std::string& text) {
-    Json content = provenance(text);
+    Json content = parse_json<Json>(text);
+    if (content.is_discarded()) content = text;
     if (!content.empty()) out.push_back({{"of", of}, {"content", std::move(content)}});
   };
   if (data.frf) add("frequency response", data.frf->provenance_json);
@@ -285,7 +259,10 @@ std::string text_of(const Json& json) {
 
 PageContent page_content(const ReportData& data) {
   Arrays arrays;
-  Json json = texts_json(data);
+  Json json = {{"notes", data.notes},
+               {"figures", data.figures},
+               {"steps", data.steps},
+               {"documents", data.documents}};
   const Verdict verdict = judge(data);
   json["verdict"] = {
       {"level", to_string(verdict.level)}, {"text", verdict.text}, {"reasons", verdict.reasons}};

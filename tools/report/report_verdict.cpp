@@ -61,18 +61,15 @@ bool judge_findings(const ReportData& data, Reasons& reasons) {
 }
 
 void judge_runs(const ReportData& data, Reasons& reasons) {
-  std::uint64_t missing = 0;
-  std::uint64_t marked = 0;
-  int incomplete = 0;
-  for (const LogRun& run : data.runs) {
-    missing += run.health.missing;
-    marked += run.health.marked;
-    incomplete += run.complete ? 0 : 1;
-  }
-  if (missing > 0) reasons.push_back(counted(missing, "cycle is", "cycles are") + " missing");
-  if (marked > 0)
-    reasons.push_back(counted(marked, "cycle is", "cycles are") + " marked as invalid");
-  if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
+  RunHealth health;
+  for (const LogRun& run : data.runs) health += run.health;
+  const auto incomplete = std::ranges::count(data.runs, false, &LogRun::complete);
+  const auto add = [&](auto count, const char* noun, const char* plural, const char* what) {
+    if (count > 0) reasons.push_back(counted(count, noun, plural) + what);
+  };
+  add(health.missing, "cycle is", "cycles are", " missing");
+  add(health.marked, "cycle is", "cycles are", " marked as invalid");
+  add(incomplete, "run is", "runs are", " incomplete");
 }
 
 }  // namespace

@@ -6,7 +6,6 @@ target_sources(tools_tests PRIVATE
   report/report_input_test.cpp
   report/report_modes_test.cpp
   report/report_page_test.cpp
-  report/report_shapes_test.cpp
   report/report_verdict_test.cpp
   report/synthetic_other_day.cpp
   report/synthetic_report.cpp)
