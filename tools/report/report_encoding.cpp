@@ -27,14 +27,8 @@ class Extrapolation {
   explicit Extrapolation(const Expectation& expected) : expected_(expected) {}
   std::complex<double> next(Eigen::Index row, Eigen::Index column) const {
     const std::complex<double> base = base_at(row, column);
-    switch (expected_.order) {
-      case 0:
-        return base;
-      case 1:
-        return base + last_;
-      default:
-        return base + (2.0 * last_ - before_);
-    }
+    if (expected_.order == 0) return base;
+    return base + (expected_.order == 1 ? last_ : 2.0 * last_ - before_);
   }
   void turned_out(Eigen::Index row, Eigen::Index column, std::complex<double> value) {
     before_ = last_;

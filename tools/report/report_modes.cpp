@@ -27,56 +27,41 @@ std::vector<ModeRow> identified(const AdditiveModel& model) {
   return rows;
 }
 
-/// Pairs that never cross, by dynamic programming as for the alignment of two sequences. An unpaired mode costs
-/// `furthest`, so every closer pair is preferred.
-class Alignment {
- public:
-  Alignment(const std::vector<ModeRow>& rows, const std::vector<TrueMode>& truth, double furthest)
-      : rows_(rows), truth_(truth), furthest_(furthest) {
-    cost_ = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.size()) + 1,
-                                  static_cast<Eigen::Index>(truth.size()) + 1);
-    for (Eigen::Index i = cost_.rows() - 1; i >= 0; --i)
-      for (Eigen::Index j = cost_.cols() - 1; j >= 0; --j) cost_(i, j) = best(i, j);
-  }
-
-  /// Index of the true mode per row, -1 for none.
-  std::vector<int> partners() const {
-    std::vector<int> partner(rows_.size(), -1);
-    Eigen::Index i = 0;
-    Eigen::Index j = 0;
-    while (i < cost_.rows() - 1 && j < cost_.cols() - 1) {
-      if (cost_(i, j) == pair(i, j) + cost_(i + 1, j + 1))
-        partner[static_cast<std::size_t>(i++)] = static_cast<int>(j++);
-      else if (cost_(i, j) == furthest_ + cost_(i + 1, j))
-        ++i;
-      else
-        ++j;
+/// Index of the true mode per row, if there is one. Pairs never cross: by dynamic programming, as for the alignment of
+/// two sequences. An unpaired mode costs `furthest`, so every closer pair is preferred.
+std::vector<std::optional<std::size_t>> partners(const std::vector<ModeRow>& rows,
+                                                 const std::vector<TrueMode>& truth,
+                                                 double furthest) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const auto pair = [&](std::size_t i, std::size_t j) {
+    const double f = truth[j].natural_frequency_hz;
+    const double apart = std::abs(*rows[i].frequency_hz - f) / f;
+    return apart <= furthest ? apart : kNever;
+  };
+  // Least cost of the modes from row i and true mode j on.
+  std::vector cost(rows.size() + 1, std::vector<double>(truth.size() + 1, 0.0));
+  for (std::size_t i = rows.size() + 1; i-- > 0;)
+    for (std::size_t j = truth.size() + 1; j-- > 0;) {
+      const bool row = i < rows.size();
+      const bool column = j < truth.size();
+      double least = row || column ? kNever : 0.0;
+      if (row) least = std::min(least, furthest + cost[i + 1][j]);
+      if (column) least = std::min(least, furthest + cost[i][j + 1]);
+      if (row && column) least = std::min(least, pair(i, j) + cost[i + 1][j + 1]);
+      cost[i][j] = least;
     }
-    return partner;
-  }
 
- private:
-  double pair(Eigen::Index i, Eigen::Index j) const {
-    const double f = truth_[static_cast<std::size_t>(j)].natural_frequency_hz;
-    const double apart = std::abs(*rows_[static_cast<std::size_t>(i)].frequency_hz - f) / f;
-    return apart <= furthest_ ? apart : std::numeric_limits<double>::infinity();
+  std::vector<std::optional<std::size_t>> partner(rows.size());
+  for (std::size_t i = 0, j = 0; i < rows.size() && j < truth.size();) {
+    if (cost[i][j] == pair(i, j) + cost[i + 1][j + 1])
+      partner[i++] = j++;
+    else if (cost[i][j] == furthest + cost[i + 1][j])
+      ++i;
+    else
+      ++j;
   }
-  double best(Eigen::Index i, Eigen::Index j) const {
-    const bool row = i < cost_.rows() - 1;
-    const bool column = j < cost_.cols() - 1;
-    if (!row && !column) return 0.0;
-    double least = std::numeric_limits<double>::infinity();
-    if (row) least = std::min(least, furthest_ + cost_(i + 1, j));
-    if (column) least = std::min(least, furthest_ + cost_(i, j + 1));
-    if (row && column) least = std::min(least, pair(i, j) + cost_(i + 1, j + 1));
-    return least;
-  }
-
-  const std::vector<ModeRow>& rows_;
-  const std::vector<TrueMode>& truth_;
-  double furthest_;
-  Eigen::MatrixXd cost_;
-};
+  return partner;
+}
 
 double place(const ModeRow& row) {
   return row.frequency_hz ? *row.frequency_hz : row.truth->natural_frequency_hz;
@@ -104,20 +89,15 @@ std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const True
   std::vector<TrueMode> known(truth.begin(), truth.end());
   std::ranges::sort(known, {}, &TrueMode::natural_frequency_hz);
   std::vector<ModeRow> rows = identified(model);
-  const std::vector<int> partner = Alignment(rows, known, furthest).partners();
-
+  const auto partner = partners(rows, known, furthest);
   std::vector<bool> found(known.size(), false);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (partner[i] < 0) continue;
-    rows[i].truth = known[static_cast<std::size_t>(partner[i])];
-    found[static_cast<std::size_t>(partner[i])] = true;
+  for (std::size_t i = 0; i < partner.size(); ++i) {
+    if (!partner[i]) continue;
+    rows[i].truth = known[*partner[i]];
+    found[*partner[i]] = true;
   }
-  for (std::size_t j = 0; j < known.size(); ++j) {
-    if (found[j]) continue;
-    ModeRow missing;
-    missing.truth = known[j];
-    rows.push_back(missing);
-  }
+  for (std::size_t j = 0; j < known.size(); ++j)
+    if (!found[j]) rows.emplace_back().truth = known[j];
   std::ranges::stable_sort(rows, {}, place);
   return rows;
 }
