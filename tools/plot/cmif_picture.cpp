@@ -10,9 +10,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kWidth_in = 3.5;
-constexpr double kHeight_in = 2.5;
-
 /// The first curves, which show the modes, are dark and bold; curves of similar brightness differ by dashes.
 constexpr std::array kCurves = {
     "lc rgb '#0b3c7d' lw 1.4",          "lc rgb '#d55e00' lw 1.2",
@@ -92,8 +89,7 @@ Picture cmif_picture(const ReportData& data) {
                          style);
     names.push_back({fmt::format("lines {}", style), fmt::format("σ@_{}^2", i + 1), 2});
   }
-  Picture picture{kWidth_in, kHeight_in, "", {{"cmif.txt", table_text(columns)}}};
-  const auto [low, high] = magnitude_range(data.cmif_curves);
+  Picture picture{3.5, 2.5, "", {{"cmif.txt", table_text(columns)}}};
   const auto [lines, modes] = mode_lines(data);
   const auto [ring_hz, ring_value] = rings(data);
   std::vector<LegendEntry> marks;
@@ -107,17 +103,9 @@ Picture cmif_picture(const ReportData& data) {
     marks.push_back(
         {fmt::format("points {}", kRing), fmt::format("candidates ({})", ring_hz.size()), 15});
   }
-  picture.script =
-      fmt::format("set multiplot\nunset key\n{}", kFrame) +
-      panel_edges(picture, 0.62, kWidth_in - 0.12, 0.4, kHeight_in - 0.4) +
-      frequency_axis(frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], kWidth_in - 0.74) +
-      magnitude_axis(low, high, kHeight_in - 0.8) +
-      fmt::format(
-          "set xlabel 'Frequency [Hz]' offset 0,0.4\nset ylabel {} noenhanced offset 1,0\n{}plot "
-          "{}\n",
-          quoted("CMIF of ω²G" + unit_of(frf)), lines, drawn) +
-      legend_row(picture, 0.1, names) + (marks.empty() ? "" : legend_row(picture, 0.28, marks)) +
-      "unset multiplot\n";
+  picture.script = single_panel(picture, frf.frequency_hz, magnitude_range(data.cmif_curves),
+                                "CMIF of ω²G" + unit_of(frf),
+                                fmt::format("{}plot {}\n", lines, drawn), {names, marks});
   return picture;
 }
 

@@ -138,4 +138,24 @@ std::string legend_row(const Picture& picture, double y_in,
   return script;
 }
 
+std::string single_panel(const Picture& picture, const Eigen::VectorXd& frequency_hz,
+                         std::pair<double, double> magnitudes, const std::string& title,
+                         const std::string& drawn,
+                         const std::vector<std::vector<LegendEntry>>& legends) {
+  std::string script =
+      kFrame + panel_edges(picture, 0.62, picture.width_in - 0.12, 0.4, picture.height_in - 0.4) +
+      frequency_axis(frequency_hz[0], frequency_hz[frequency_hz.size() - 1],
+                     picture.width_in - 0.74) +
+      magnitude_axis(magnitudes.first, magnitudes.second, picture.height_in - 0.8) +
+      fmt::format("set xlabel 'Frequency [Hz]' offset 0,0.4\nset ylabel {} noenhanced offset 1,0\n",
+                  quoted(title)) +
+      drawn;
+  double y_in = 0.1;
+  for (const std::vector<LegendEntry>& legend : legends) {
+    if (!legend.empty()) script += legend_row(picture, y_in, legend);
+    y_in = 0.28;
+  }
+  return script + "unset multiplot\n";
+}
+
 }  // namespace stageid

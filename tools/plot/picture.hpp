@@ -43,8 +43,9 @@ std::pair<double, double> magnitude_range(const Eigen::Ref<const Eigen::MatrixXd
 std::string panel_edges(const Picture& picture, double left_in, double right_in, double bottom_in,
                         double top_in);
 
-/// Settings of every panel: a thin border, outward ticks, a faint grid.
+/// The beginning of a script: a thin border, outward ticks and a faint grid in every panel.
 inline constexpr const char* kFrame =
+    "set multiplot\nunset key\n"
     "set border 15 lw 0.5 lc rgb '#404040'\nset tics nomirror scale 0.5,0.25\n"
     "set grid xtics ytics lt 1 lw 0.4 dt 1 lc rgb '#dcdcdc'\n";
 
@@ -60,5 +61,14 @@ struct LegendEntry {
 /// Must be the last part that is drawn.
 std::string legend_row(const Picture& picture, double y_in,
                        const std::vector<LegendEntry>& entries);
+
+/// The script of a picture with one panel of magnitudes over frequency.
+/// @param title of the vertical axis, external text
+/// @param drawn commands from the first one for this panel to "plot ..." and its line end
+/// @param legends rows of the legend; empty ones are left out
+std::string single_panel(const Picture& picture, const Eigen::VectorXd& frequency_hz,
+                         std::pair<double, double> magnitudes, const std::string& title,
+                         const std::string& drawn,
+                         const std::vector<std::vector<LegendEntry>>& legends);
 
 }  // namespace stageid

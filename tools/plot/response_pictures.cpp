@@ -199,10 +199,10 @@ Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& ou
       const auto [low, high] = range_of(tables.back());
       magnitudes = {std::min(magnitudes.first, low), std::max(magnitudes.second, high)};
     }
-  picture.script = fmt::format(
-                       "set multiplot\nunset key\n{}set xtics font ',6' offset 0,0.4\nset ytics "
-                       "font ',6' offset 0.4,0\n",
-                       kFrame) +
+  picture.script = kFrame +
+                   std::string(
+                       "set xtics font ',6' offset 0,0.4\n"
+                       "set ytics font ',6' offset 0.4,0\n") +
                    around_the_panels(frf, grid, picture, outputs, inputs);
   std::vector<LegendEntry> legend;
   for (std::size_t i = 0; i < outputs.size(); ++i)
@@ -223,22 +223,13 @@ Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& ou
 Picture entry_picture(const ReportData& data, Eigen::Index output, Eigen::Index input) {
   const FrfEstimate& frf = response_of(data, "entry");
   const ElementTable table = element_table(data, output + frf.n_outputs() * input, true);
-  const auto [low, high] = range_of(table);
   Picture picture{kColumn_in, 2.6, "", {{"entry.txt", table_text(table.columns)}}};
   const Curves curves = curves_of(table, "entry.txt", report::uncertainty(frf).kind, 0.9);
   const std::string title =
       fmt::format("{} ← {}  [{}/{}]", frf.outputs.name(output), frf.inputs.name(input),
                   unit_of(frf.outputs, output), unit_of(frf.inputs, input));
-  picture.script =
-      fmt::format("set multiplot\nunset key\n{}", kFrame) +
-      panel_edges(picture, 0.62, kColumn_in - 0.12, 0.4, picture.height_in - 0.4) +
-      frequency_axis(frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], kColumn_in - 0.74) +
-      magnitude_axis(low, high, picture.height_in - 0.8) +
-      fmt::format("set xlabel 'Frequency [Hz]' offset 0,0.4\nset ylabel {} noenhanced offset 1,0\n",
-                  quoted(title)) +
-      curves.drawn + legend_row(picture, 0.1, curves.legend) +
-      (curves.errors_legend.empty() ? "" : legend_row(picture, 0.28, curves.errors_legend)) +
-      "unset multiplot\n";
+  picture.script = single_panel(picture, frf.frequency_hz, range_of(table), title, curves.drawn,
+                                {curves.legend, curves.errors_legend});
   return picture;
 }
 
