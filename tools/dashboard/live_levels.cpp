@@ -22,8 +22,6 @@ void LiveLevels::Sums::clear() {
 LiveLevels::LiveLevels(Eigen::Index channels)
     : gathered_(channels), handed_over_(channels), largest_(Eigen::ArrayXd::Zero(channels)) {}
 
-void LiveLevels::begin_run(const LogRun&) noexcept {}
-
 void LiveLevels::rows(std::span<const double> rows, std::size_t words) noexcept {
   const Eigen::Index channels = gathered_.peak.size();
   for (std::size_t at = 0; at + words <= rows.size(); at += words) {
