@@ -29,10 +29,7 @@ def start(program, configs, work, name, pace, **numbers):
     """A paced run of a stage that may be late: its log, the program, a browser that shows it."""
     folder = work / name
     folder.mkdir(parents=True)
-    config = with_experiment(configs, folder, **numbers)
-    stage = folder / "stage.yaml"
-    stage.write_text((configs / "stage/small_stage.yaml").read_text() + "\nrealtime: {policy: try, misses_allowed: 1000000}\n")
-    config.write_text(config.read_text().replace(str(configs / "stage/small_stage.yaml"), str(stage)))
+    config = with_experiment(configs, folder, late=True, **numbers)
     log = folder / "run.slog"
     running = RunningProgram(program, config, "-o", log, "--pace", str(pace))
     browser = Browser(find_browser())

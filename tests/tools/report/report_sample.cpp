@@ -19,7 +19,9 @@ using Json = nlohmann::json;
 /// it.
 class Summary {
  public:
-  void add(double value) {
+  explicit Summary(bool floats) : floats_(floats) {}
+  void add(double exact) {
+    const double value = floats_ ? static_cast<double>(static_cast<float>(exact)) : exact;
     low_ = count_ == 0 ? value : std::min(low_, value);
     high_ = count_ == 0 ? value : std::max(high_, value);
     if (count_ == 0) first_ = value;
@@ -33,26 +35,20 @@ class Summary {
   }
 
  private:
+  bool floats_;
   long count_ = 0;
   double low_ = 0.0, high_ = 0.0, first_ = 0.0, last_ = 0.0, weighted_ = 0.0;
 };
 
-double as_float(double value) { return static_cast<double>(static_cast<float>(value)); }
-
-Json summary_of(const Eigen::MatrixXcd& values, bool floats) {
-  Summary out;
+template <typename Matrix>
+Json summary_of(const Matrix& values, bool floats) {
+  Summary out(floats);
   for (Eigen::Index c = 0; c < values.rows(); ++c)
-    for (const std::complex<double> value : values.row(c)) {
-      out.add(floats ? as_float(value.real()) : value.real());
-      out.add(floats ? as_float(value.imag()) : value.imag());
+    for (Eigen::Index k = 0; k < values.cols(); ++k) {
+      out.add(std::real(values(c, k)));
+      if constexpr (Eigen::NumTraits<typename Matrix::Scalar>::IsComplex)
+        out.add(std::imag(values(c, k)));
     }
-  return out.json();
-}
-
-Json summary_of(const Eigen::MatrixXd& values, bool floats) {
-  Summary out;
-  for (Eigen::Index c = 0; c < values.rows(); ++c)
-    for (const double value : values.row(c)) out.add(floats ? as_float(value) : value);
   return out.json();
 }
 
@@ -70,14 +66,14 @@ Json extremes(const Eigen::MatrixXcd& values) {
 Json expected_nyquist(const ReportData& data) {
   Json out = Json::array();
   for (const Eigen::Index c : {Eigen::Index{0}, data.frf->response.rows() - 1}) {
-    Json element = {{"measured", summary_of(Eigen::MatrixXcd(data.frf->response.row(c)), true)}};
+    Json element = {{"measured", summary_of(data.frf->response.row(c), true)}};
     if (data.model_response.size() > 0)
-      element["model"] = summary_of(Eigen::MatrixXcd(data.model_response.row(c)), false);
+      element["model"] = summary_of(data.model_response.row(c), false);
     if (data.frf->total_variance.size() > 0) {
       const double nu = data.frf->total_dof;
       const double point = nu > 0.0 ? nu * (std::pow(0.05, -1.0 / nu) - 1.0) : -std::log(0.05);
-      const Eigen::MatrixXd radius = std::sqrt(point) * data.frf->total_variance.row(c).cwiseSqrt();
-      element["radius"] = summary_of(radius, false);
+      element["radius"] =
+          summary_of(std::sqrt(point) * data.frf->total_variance.row(c).cwiseSqrt(), false);
     }
     out.push_back(element);
   }
@@ -161,25 +157,23 @@ Json expected(const ReportData& data) {
   out["shape"] = {frf.n_outputs(), frf.n_inputs()};
   out["measured"] = extremes(frf.response);
   out["nyquist"] = expected_nyquist(data);
-  out["arrays"]["frequency"] = summary_of(Eigen::MatrixXd(frf.frequency_hz.transpose()), false);
+  out["arrays"]["frequency"] = summary_of(frf.frequency_hz.transpose(), false);
   out["arrays"]["response"] = summary_of(frf.response, true);
   if (frf.interpolation_misfit.size() > 0) {
     Eigen::Index worst = 0;
     frf.interpolation_misfit.maxCoeff(&worst);
-    out["arrays"]["interpolation_misfit"] =
-        summary_of(Eigen::MatrixXd(frf.interpolation_misfit.transpose()), true);
+    out["arrays"]["interpolation_misfit"] = summary_of(frf.interpolation_misfit.transpose(), true);
     out["correlated"] = {
         {"independent", std::lround(static_cast<double>(frf.lines()) / frf.correlated_lines)},
         {"largest", frf.interpolation_misfit[worst]},
         {"at_hz", frf.frequency_hz[worst]}};
   }
   if (data.model_response.size() > 0) {
-    out["arrays"]["residual"] =
-        summary_of(Eigen::MatrixXcd(frf.response - data.model_response), false);
+    out["arrays"]["residual"] = summary_of(frf.response - data.model_response, false);
     out["model"] = extremes(data.model_response);
   }
   if (frf.total_variance.size() > 0)
-    out["arrays"]["deviation"] = summary_of(Eigen::MatrixXd(frf.total_variance.cwiseSqrt()), false);
+    out["arrays"]["deviation"] = summary_of(frf.total_variance.cwiseSqrt(), false);
   if (data.cmif_curves.size() > 0) out["arrays"]["cmif"] = summary_of(data.cmif_curves, true);
   return out;
 }

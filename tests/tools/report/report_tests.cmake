@@ -7,13 +7,11 @@ target_sources(tools_tests PRIVATE
   report/report_modes_test.cpp
   report/report_page_test.cpp
   report/report_verdict_test.cpp
-  report/synthetic_other_day.cpp
   report/synthetic_report.cpp)
 target_link_libraries(tools_tests PRIVATE fmt::fmt nlohmann_json::nlohmann_json ZLIB::ZLIB)
 
 add_executable(report_sample
   report/report_sample.cpp
-  report/synthetic_other_day.cpp
   report/synthetic_report.cpp)
 target_link_libraries(report_sample PRIVATE stageid::tools fmt::fmt nlohmann_json::nlohmann_json
   stageid::warnings)

@@ -18,17 +18,17 @@ ReportData sound() {
   return data;
 }
 
-void expect_doubt(const ReportData& data, const char* why) {
+void expect_level(Level level, const ReportData& data, const char* why) {
   const Verdict verdict = judge(data);
-  EXPECT_EQ(verdict.level, Level::doubt);
+  EXPECT_EQ(verdict.level, level);
   EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
 }
 
-void expect_bad(const ReportData& data, const char* why) {
-  const Verdict verdict = judge(data);
-  EXPECT_EQ(verdict.level, Level::bad);
-  EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr(why)));
+void expect_doubt(const ReportData& data, const char* why) {
+  expect_level(Level::doubt, data, why);
 }
+
+void expect_bad(const ReportData& data, const char* why) { expect_level(Level::bad, data, why); }
 
 TEST(Verdict, ASoundResultIsGood) {
   const Verdict verdict = judge(sound());

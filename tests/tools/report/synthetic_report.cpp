@@ -5,16 +5,45 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
+#include <random>
 
 #include "excitation/decompositions/decompositions.hpp"
-#include "tests/tools/report/synthetic_random.hpp"
 
 namespace stageid::test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double delay_s = 1.63e-4;
+
+/// Uniform and normal numbers that do not depend on the standard library's distributions.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
+  double normal() {
+    return std::sqrt(-2.0 * std::log(1.0 - uniform())) * std::cos(2.0 * pi * uniform());
+  }
+  /// E|z|^2 = 1.
+  std::complex<double> circular() {
+    const double re = normal();
+    return std::complex<double>(re, normal()) / std::sqrt(2.0);
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Circular Gaussian noise of the variance on every number.
+Eigen::MatrixXcd with_noise(const Eigen::MatrixXcd& response, const Eigen::MatrixXd& variance,
+                            Random& random) {
+  Eigen::MatrixXcd out = response;
+  for (Eigen::Index k = 0; k < out.cols(); ++k)
+    for (Eigen::Index c = 0; c < out.rows(); ++c)
+      out(c, k) += std::sqrt(variance(c, k)) * random.circular();
+  return out;
+}
 
 ChannelList named(const char* prefix, Eigen::Index count, const char* unit) {
   ChannelList list;
@@ -284,6 +313,23 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   data.documents = {{"configs/experiment/wafer_stage_quick.yaml",
                      "realizations: 3\nperiods: 3\nband_hz: [0.25, 2000]\n"}};
   return data;
+}
+
+void add_other_day(ReportData& data, std::uint64_t seed) {
+  ReportComparison other;
+  other.title = "Tuesday";
+  other.model = data.model;
+  std::vector<Submodel>& submodels = other.model->submodels;
+  submodels.erase(std::ranges::find_if(submodels, &Submodel::is_mode));
+  for (Submodel& submodel : submodels)
+    if (submodel.is_mode()) {
+      submodel.denominator[1] /= 1.0 + kOtherDayShift;
+      submodel.denominator[2] /= (1.0 + kOtherDayShift) * (1.0 + kOtherDayShift);
+    }
+  Random random(seed);
+  other.model_response = 0.98 * data.model_response;
+  other.response = with_noise(other.model_response, data.frf->total_variance, random);
+  data.comparison = other;
 }
 
 }  // namespace stageid::test
