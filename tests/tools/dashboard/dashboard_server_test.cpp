@@ -22,31 +22,23 @@ namespace test_dashboard_server {
 
 using namespace std::chrono_literals;
 
-bool connect_here(int socket, int port) {
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(port));
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  return ::connect(socket, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0;
-}
-
-/// A connection that requests the stream and may or may not read it.
-class RawWatcher {
+/// A connection to this machine that may or may not read what it is sent.
+class RawClient {
  public:
-  struct Request {
-    std::string bytes;
-  };
-  explicit RawWatcher(int port, const std::string& path = "/events")
-      : RawWatcher(port, Request{"GET " + path + " HTTP/1.1\r\nHost: localhost:" +
-                                 std::to_string(port) + "\r\n\r\n"}) {}
-  RawWatcher(int port, const Request& request) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  /// Sends `begin` of a request. @param more flags of the socket
+  RawClient(int port, const std::string& begin, int more = 0)
+      : socket_(::socket(AF_INET, SOCK_STREAM | more, 0)) {
     const int small = 1024;
     ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
-    good_ = connect_here(socket_, port) && send(request.bytes);
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    good_ = ::connect(socket_, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0 && send(begin);
   }
-  ~RawWatcher() { ::close(socket_); }
-  RawWatcher(const RawWatcher&) = delete;
-  RawWatcher& operator=(const RawWatcher&) = delete;
+  ~RawClient() { ::close(socket_); }
+  RawClient(const RawClient&) = delete;
+  RawClient& operator=(const RawClient&) = delete;
   bool good() const { return good_; }
   /// False if the other end has hung up.
   bool send(const std::string& bytes) const {
@@ -70,6 +62,9 @@ class RawWatcher {
   bool good_ = false;
 };
 
+/// A request that never ends.
+const std::string kEndless = "GET / HTTP/1.1\r\nX: ";
+
 class DashboardServerTest : public testing::Test {
  protected:
   DashboardServerTest() {
@@ -85,6 +80,20 @@ class DashboardServerTest : public testing::Test {
     if (const auto at = url.find("token="); at != std::string::npos) token_ = url.substr(at + 6);
   }
   httplib::Client client() const { return httplib::Client("127.0.0.1", port_); }
+  /// Of our page, with its header.
+  httplib::Result abort(const std::string& query, const std::string& body = "") const {
+    return client().Post("/abort" + query, {{"X-Stageid", "abort"}}, body, "text/plain");
+  }
+  std::string with_token() const { return "?token=" + token_; }
+  std::string events() const {
+    return "GET /events HTTP/1.1\r\nHost: localhost:" + std::to_string(port_) + "\r\n\r\n";
+  }
+  std::vector<std::unique_ptr<RawClient>> clients(int count, const std::string& begin,
+                                                  int more = 0) const {
+    std::vector<std::unique_ptr<RawClient>> all;
+    for (int i = 0; i < count; ++i) all.push_back(std::make_unique<RawClient>(port_, begin, more));
+    return all;
+  }
   bool watchers_become(int wanted) const {
     for (int i = 0; i < 2000 && server_->watchers() != wanted; ++i)
       std::this_thread::sleep_for(10ms);
@@ -113,17 +122,12 @@ TEST_F(DashboardServerTest, ServesThePageAndTheNewestResponse) {
 TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   serve();
   constexpr int kMoreThanThreads = DashboardServer::kWatchers + 16;
-  std::vector<int> sockets;
-  for (int i = 0; i < kMoreThanThreads; ++i) {
-    sockets.push_back(::socket(AF_INET, SOCK_STREAM, 0));
-    ASSERT_TRUE(connect_here(sockets.back(), port_));
-    const std::string begin = "GET / HTTP/1.1\r\nX: ";
-    ASSERT_GT(::send(sockets.back(), begin.data(), begin.size(), MSG_NOSIGNAL), 0);
-  }
+  const auto slow = clients(kMoreThanThreads, kEndless);
+  for (const auto& one : slow) ASSERT_TRUE(one->good());
   std::atomic<bool> stop = false;
   std::thread trickle([&] {
     while (!stop) {
-      for (const int socket : sockets) ::send(socket, "x", 1, MSG_NOSIGNAL);
+      for (const auto& one : slow) one->send("x");
       std::this_thread::sleep_for(200ms);
     }
   });
@@ -132,7 +136,6 @@ TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   const httplib::Result result = other.Get("/");
   stop = true;
   trickle.join();
-  for (const int socket : sockets) ::close(socket);
   ASSERT_TRUE(result) << "no answer";
   EXPECT_EQ(result->body, "<p>page</p>");
 }
@@ -144,24 +147,18 @@ TEST_F(DashboardServerTest, AThousandIdleAndAHundredSlowClientsDelayNobody) {
   ::setrlimit(RLIMIT_NOFILE, &files);
   serve();
   const std::size_t before = test::resident_bytes();
-  std::vector<std::unique_ptr<RawWatcher>> slow;
-  for (int i = 0; i < 100; ++i)
-    slow.push_back(
-        std::make_unique<RawWatcher>(port_, RawWatcher::Request{"GET / HTTP/1.1\r\nX: "}));
-  std::vector<int> idle;
-  for (int i = 0; i < 1000; ++i) {  // none waits for its turn in the short queue of the port
-    idle.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0));
-    connect_here(idle.back(), port_);
-  }
+  const auto slow = clients(100, kEndless);
+  // None waits for its turn in the short queue of the port.
+  auto idle = clients(1000, "", SOCK_NONBLOCK);
   const auto began = std::chrono::steady_clock::now();
   httplib::Client other = client();
   other.set_read_timeout(30s);
   other.set_keep_alive(false);
   const httplib::Result page = other.Get("/");
   const httplib::Result abort =
-      other.Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain");
+      other.Post("/abort" + with_token(), {{"X-Stageid", "abort"}}, "", "text/plain");
   const auto took = std::chrono::steady_clock::now() - began;
-  for (const int socket : idle) ::close(socket);
+  idle.clear();
   EXPECT_LT(took, 10s) << "silent clients keep their threads while others wait";
   ASSERT_TRUE(page) << "no answer";
   EXPECT_EQ(page->body, "<p>page</p>");
@@ -177,7 +174,7 @@ TEST_F(DashboardServerTest, KeepsNoMoreOfARequestThanABrowserSends) {
   for (const std::string& begin :
        {std::string(), post + "\r\n\r\n", post + "\r\nContent-Length: 1000000000\r\n\r\n",
         post + "\r\nTransfer-Encoding: chunked\r\n\r\n7FFFFFFF\r\n"}) {
-    const RawWatcher client(port_, RawWatcher::Request{begin});
+    const RawClient client(port_, begin);
     std::size_t sent = 0;
     constexpr std::size_t kMost = std::size_t{64} << 20;
     while (sent < kMost && client.send(junk)) sent += junk.size();
@@ -198,7 +195,7 @@ TEST_F(DashboardServerTest, SendsThePageOnceHoweverManyRangesAreAskedFor) {
 TEST_F(DashboardServerTest, StreamsTheNewestState) {
   content_.state.publish("{\"n\":1}");
   serve();
-  const RawWatcher watcher(port_);
+  const RawClient watcher(port_, events());
   EXPECT_THAT(watcher.read_until("\"n\":1"), testing::HasSubstr("text/event-stream"));
   EXPECT_EQ(watched_, 1);
   content_.state.publish("{\"n\":2}");
@@ -209,19 +206,17 @@ TEST_F(DashboardServerTest, OnlyAPageOfOursCanAbort) {
   serve();
   EXPECT_EQ(client().Post("/abort")->status, 403);
   EXPECT_EQ(client().Get("/abort")->status, 404);
-  EXPECT_EQ(client().Post("/abort?token=" + token_)->status, 403) << "not a page of ours";
+  EXPECT_EQ(client().Post("/abort" + with_token())->status, 403) << "not a page of ours";
   EXPECT_EQ(aborts_, 0);
-  EXPECT_EQ(
-      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain")->status,
-      200);
+  EXPECT_EQ(abort(with_token())->status, 200);
   EXPECT_EQ(aborts_, 1);
 }
 
 TEST_F(DashboardServerTest, WithoutTheTokenOneMayWatchOnLoopbackButNotAbort) {
   serve();
-  for (const char* path : {"/abort", "/abort?token=", "/abort?token=wrong"}) {
-    const auto answer = client().Post(path, {{"X-Stageid", "abort"}}, "", "text/plain");
-    EXPECT_EQ(answer->status, 403) << path;
+  for (const char* query : {"", "?token=", "?token=wrong"}) {
+    const auto answer = abort(query);
+    EXPECT_EQ(answer->status, 403) << query;
     EXPECT_THAT(answer->body, testing::HasSubstr("with its token"));
   }
   EXPECT_EQ(aborts_, 0);
@@ -230,9 +225,7 @@ TEST_F(DashboardServerTest, WithoutTheTokenOneMayWatchOnLoopbackButNotAbort) {
 
 TEST_F(DashboardServerTest, RefusesLargeBodiesAndSaysWhatItRefuses) {
   serve();
-  const std::string large(DashboardServer::kLargestBody + 1, 'x');
-  const auto answer =
-      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, large, "text/plain");
+  const auto answer = abort(with_token(), std::string(DashboardServer::kLargestBody + 1, 'x'));
   EXPECT_EQ(answer->status, 413);
   EXPECT_EQ(answer->body, "body too large; at most 1024 bytes\n");
   EXPECT_EQ(aborts_, 0);
@@ -252,12 +245,10 @@ TEST_F(DashboardServerTest, ReachableFromOutsideItAsksForTheToken) {
   ASSERT_EQ(token_.size(), 32U);
   for (const char* path : {"/", "/events", "/response.json", "/?token=", "/?token=wrong"})
     EXPECT_EQ(client().Get(path)->status, 403) << path;
-  EXPECT_EQ(client().Post("/abort", {{"X-Stageid", "abort"}}, "", "text/plain")->status, 403);
+  EXPECT_EQ(abort("")->status, 403);
   EXPECT_EQ(aborts_, 0);
-  EXPECT_EQ(client().Get("/?token=" + token_)->status, 200);
-  EXPECT_EQ(
-      client().Post("/abort?token=" + token_, {{"X-Stageid", "abort"}}, "", "text/plain")->status,
-      200);
+  EXPECT_EQ(client().Get("/" + with_token())->status, 200);
+  EXPECT_EQ(abort(with_token())->status, 200);
 }
 
 TEST_F(DashboardServerTest, AnAddressThatCannotBeHadIsAnError) {
@@ -279,9 +270,7 @@ TEST_F(DashboardServerTest, TooManyWatchersAreSentAwayAndPlacesComeFree) {
   content_.state.publish("{}");
   serve();
   {
-    std::vector<std::unique_ptr<RawWatcher>> watchers;
-    for (int i = 0; i < DashboardServer::kWatchers; ++i)
-      watchers.push_back(std::make_unique<RawWatcher>(port_));
+    const auto watchers = clients(DashboardServer::kWatchers, events());
     ASSERT_TRUE(watchers_become(DashboardServer::kWatchers));
     EXPECT_EQ(client().Get("/events")->status, 503);
     EXPECT_EQ(client().Get("/")->status, 200) << "the page, and with it the button, is still there";
@@ -291,8 +280,8 @@ TEST_F(DashboardServerTest, TooManyWatchersAreSentAwayAndPlacesComeFree) {
 
 TEST_F(DashboardServerTest, OneThatNeverReadsIsLetGoAndHoldsNobodyUp) {
   serve();
-  const RawWatcher deaf(port_);
-  const RawWatcher good(port_);
+  const RawClient deaf(port_, events());
+  const RawClient good(port_, events());
   ASSERT_TRUE(deaf.good() && watchers_become(2));
   std::thread reader([&] { good.read_until("last"); });
   // More than all buffers on the way hold.
@@ -309,7 +298,7 @@ TEST_F(DashboardServerTest, OneThatNeverReadsIsLetGoAndHoldsNobodyUp) {
 TEST_F(DashboardServerTest, FinishWaitsForNobodyForEver) {
   content_.state.publish("{}");
   serve();
-  const RawWatcher stays(port_);
+  const RawClient stays(port_, events());
   ASSERT_TRUE(watchers_become(1));
   server_->finish(100ms);
   EXPECT_EQ(server_->watchers(), 1);
