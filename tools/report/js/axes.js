@@ -73,6 +73,15 @@ function makeGraph(id, rows, options) {
   return graph;
 }
 
+// A plot of one line, drawn a moment later. @returns {graph}
+function lineGraph(id, labels, rows, options) {
+  const line = { graph: null };
+  const series = () => ({ [labels[1]]: { color: palette().curves[0] } });
+  afterFirstPaint(() => { line.graph = makeGraph(id, rows, { labels, logscale: true, series: series(), ...options }); });
+  onColours(() => recolourGraph(line.graph, series()));
+  return line;
+}
+
 function removeGraph(graph) {
   if (!graph) return;
   plots.delete(graph);

@@ -4,19 +4,15 @@
 function canvasFigure(id, label, draw, kind) {
   const canvas = element('canvas', { 'aria-hidden': 'true' });
   const node = element('div', { class: 'plot ' + (kind || ''), id, role: 'img', 'aria-label': label, tabindex: '0' }, canvas);
-  const figure = { node, canvas, draw, redraw: () => paintFigure(figure), resize: () => paintFigure(figure) };
+  const redraw = () => {
+    const { clientWidth: width, clientHeight: height } = node;
+    if (width > 0 && height > 0) draw(sharpContext(canvas, width, height), width, height);
+  };
+  const figure = { node, draw, redraw, resize: redraw };
   plots.add(figure);
-  onColours(figure.redraw);
-  new ResizeObserver(figure.redraw).observe(node);
+  onColours(redraw);
+  new ResizeObserver(redraw).observe(node);
   return figure;
-}
-
-function paintFigure(figure) {
-  const { canvas, node } = figure;
-  const width = node.clientWidth;
-  const height = node.clientHeight;
-  if (width === 0 || height === 0) return;
-  figure.draw(sharpContext(canvas, width, height), width, height);
 }
 
 // An empty canvas of that size on the page, with all pixels of the screen.

@@ -1,8 +1,6 @@
 // Zippered experiments: each axis has its own lines, with a local model between them. Shows the residual of that
 // model, and the number of independent lines.
 
-const interpolation = { graph: null };
-
 function isZippered() {
   return Boolean(content.frf) && content.frf.correlated_lines > 1;
 }
@@ -22,12 +20,14 @@ function buildInterpolation() {
     return;
   }
   body.append(element('div', { class: 'plot-head' }, element('p', null, misfitText()), saveButtons('interpolation', () => ({
-    title: 'Residual of the local models relative to noise', panels: [graphPanel(interpolation.graph, 'Misfit over frequency in Hz')],
+    title: 'Residual of the local models relative to noise', panels: [graphPanel(line.graph, 'Misfit over frequency in Hz')],
   }))), bandPlot('interpolation-plot', '', { 'aria-label': misfitText() }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'));
-  afterFirstPaint(drawInterpolation);
-  onColours(() => recolourGraph(interpolation.graph, misfitSeries()));
-  followBand(() => showBandIn(interpolation.graph));
+  const misfit = array('interpolation_misfit');
+  const line = lineGraph('interpolation-plot', ['f', 'misfit'], Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
+    axes: { x: frequencyAxis, y: magnitudeAxis }, ...tiedToBand(),
+  });
+  followBand(() => showBandIn(line.graph));
 }
 
 function misfitText() {
@@ -38,16 +38,4 @@ function misfitText() {
   return 'Residual of the local models relative to noise: about 1 where they are valid, larger where a resonance is too narrow for the line spacing ' +
     'or the plant is nonlinear; there the error of the response exceeds its standard deviation. Median ' + number(sorted[sorted.length >> 1]) +
     ', largest ' + number(misfit[most]) + ' at ' + hertz(f[most]) + '.';
-}
-
-function drawInterpolation() {
-  const misfit = array('interpolation_misfit');
-  interpolation.graph = makeGraph('interpolation-plot', Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
-    labels: ['f', 'misfit'], logscale: true, series: misfitSeries(),
-    axes: { x: frequencyAxis, y: magnitudeAxis }, ...tiedToBand(),
-  });
-}
-
-function misfitSeries() {
-  return { misfit: { color: palette().curves[0] } };
 }
