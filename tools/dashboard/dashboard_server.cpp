@@ -158,116 +158,109 @@ struct DashboardServer::State {
   std::atomic<int> watchers = 0;
   std::atomic<bool> finishing = false;
 
-  bool has_token(const httplib::Request& request) const;
-  bool allowed(const httplib::Request& request) const;
-  void listen();
-  void route();
-  void stream(httplib::Response& response);
-  bool feed(std::uint64_t& seen, httplib::DataSink& sink);
-};
-
-bool DashboardServer::State::has_token(const httplib::Request& request) const {
-  return same_token(request.get_param_value("token"), token);
-}
-
-bool DashboardServer::State::allowed(const httplib::Request& request) const {
-  if (!address.is_loopback()) return has_token(request);
-  const std::string host = request.get_header_value("Host");
-  const std::string mine = fmt::format("{}:{}", host_in_url(address.host), address.port);
-  return host == mine || host == fmt::format("localhost:{}", address.port) ||
-         host == fmt::format("127.0.0.1:{}", address.port);
-}
-
-void DashboardServer::State::listen() {
-  server.set_socket_options(set_socket_options);
-  server.set_tcp_nodelay(true);
-  server.set_payload_max_length(kLargestBody);
-  errno = 0;
-  if (address.port == 0) {
-    address.port = server.bind_to_any_port(address.host);
-  } else if (!server.bind_to_port(address.host, address.port)) {
-    address.port = -1;
+  bool has_token(const httplib::Request& request) const {
+    return same_token(request.get_param_value("token"), token);
   }
-  if (address.port > 0) {
-    server.let_many_wait();
-    return;
-  }
-  const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
-  throw StageError(
-      fmt::format("--dashboard: cannot listen on {} ({}); use another port, or 0 for any free one",
-                  address.host, why));
-}
 
-/// Rejects requests that are not allowed before any other processing.
-void DashboardServer::State::route() {
-  server.set_pre_routing_handler(
-      [this](const httplib::Request& request, httplib::Response& response) {
-        response.set_header("Cache-Control", "no-store");
-        response.set_header("X-Content-Type-Options", "nosniff");
-        response.set_header("Referrer-Policy", "no-referrer");
-        if (allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
-        refuse(response, 403, kWholeAddress);
-        return httplib::Server::HandlerResponse::Handled;
-      });
-  server.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
-    if (!response.body.empty()) return;
-    if (response.status == 404)
-      refuse(response, 404, fmt::format("{}: not found; open /", request.path));
-    else if (response.status == 413)
-      refuse(response, 413, fmt::format("body too large; at most {} bytes", kLargestBody));
-    else
-      refuse(response, response.status, "bad request; open the address printed by stageid");
-  });
-  server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
-    response.set_content(content.page, "text/html; charset=utf-8");
-  });
-  server.Get("/events",
-             [this](const httplib::Request&, httplib::Response& response) { stream(response); });
-  server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
-    const LatestText::Edition edition = content.response.get();
-    if (edition.number == 0) {
-      refuse(response, 404, "no response yet; wait for the first complete realization");
-    } else {
-      response.set_content(*edition.text, "application/json");
+  bool allowed(const httplib::Request& request) const {
+    if (!address.is_loopback()) return has_token(request);
+    const std::string host = request.get_header_value("Host");
+    const std::string mine = fmt::format("{}:{}", host_in_url(address.host), address.port);
+    return host == mine || host == fmt::format("localhost:{}", address.port) ||
+           host == fmt::format("127.0.0.1:{}", address.port);
+  }
+
+  void listen() {
+    server.set_socket_options(set_socket_options);
+    server.set_tcp_nodelay(true);
+    server.set_payload_max_length(kLargestBody);
+    errno = 0;
+    if (address.port == 0) {
+      address.port = server.bind_to_any_port(address.host);
+    } else if (!server.bind_to_port(address.host, address.port)) {
+      address.port = -1;
     }
-  });
-  server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
-    if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {
-      refuse(response, 403, kWholeAddress);
+    if (address.port > 0) {
+      server.let_many_wait();
       return;
     }
-    content.abort();
-    response.set_content("stopping\n", "text/plain");
-  });
-}
-
-void DashboardServer::State::stream(httplib::Response& response) {
-  if (watchers.fetch_add(1) >= kWatchers) {
-    watchers.fetch_sub(1);
-    refuse(response, 503, fmt::format("{} pages are already open; close one", kWatchers));
-    return;
+    const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
+    throw StageError(fmt::format(
+        "--dashboard: cannot listen on {} ({}); use another port, or 0 for any free one",
+        address.host, why));
   }
-  content.watched();
-  response.set_chunked_content_provider(
-      "text/event-stream",
-      [this, seen = std::uint64_t{0}](std::size_t, httplib::DataSink& sink) mutable {
-        return feed(seen, sink);
-      },
-      [this](bool) { watchers.fetch_sub(1); });
-}
 
-/// Sends one piece of the stream; false ends it.
-bool DashboardServer::State::feed(std::uint64_t& seen, httplib::DataSink& sink) {
-  const bool last = finishing;
-  const LatestText::Edition edition = content.state.wait(seen, last ? 0ms : kKeepAlive);
-  // An SSE comment detects whether the watcher is still connected.
-  std::string text = ":\n\n";
-  if (edition.number > seen) text = fmt::format("data: {}\n\n", *edition.text);
-  seen = edition.number;
-  if (!sink.write(text.data(), text.size())) return false;
-  if (last) sink.done();
-  return true;
-}
+  /// Rejects requests that are not allowed before any other processing.
+  void route() {
+    server.set_pre_routing_handler(
+        [this](const httplib::Request& request, httplib::Response& response) {
+          response.set_header("Cache-Control", "no-store");
+          response.set_header("X-Content-Type-Options", "nosniff");
+          response.set_header("Referrer-Policy", "no-referrer");
+          if (allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
+          refuse(response, 403, kWholeAddress);
+          return httplib::Server::HandlerResponse::Handled;
+        });
+    server.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
+      if (!response.body.empty()) return;
+      if (response.status == 404)
+        refuse(response, 404, fmt::format("{}: not found; open /", request.path));
+      else if (response.status == 413)
+        refuse(response, 413, fmt::format("body too large; at most {} bytes", kLargestBody));
+      else
+        refuse(response, response.status, "bad request; open the address printed by stageid");
+    });
+    server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
+      response.set_content(content.page, "text/html; charset=utf-8");
+    });
+    server.Get("/events",
+               [this](const httplib::Request&, httplib::Response& response) { stream(response); });
+    server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
+      const LatestText::Edition edition = content.response.get();
+      if (edition.number == 0) {
+        refuse(response, 404, "no response yet; wait for the first complete realization");
+      } else {
+        response.set_content(*edition.text, "application/json");
+      }
+    });
+    server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
+      if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {
+        refuse(response, 403, kWholeAddress);
+        return;
+      }
+      content.abort();
+      response.set_content("stopping\n", "text/plain");
+    });
+  }
+
+  void stream(httplib::Response& response) {
+    if (watchers.fetch_add(1) >= kWatchers) {
+      watchers.fetch_sub(1);
+      refuse(response, 503, fmt::format("{} pages are already open; close one", kWatchers));
+      return;
+    }
+    content.watched();
+    response.set_chunked_content_provider(
+        "text/event-stream",
+        [this, seen = std::uint64_t{0}](std::size_t, httplib::DataSink& sink) mutable {
+          return feed(seen, sink);
+        },
+        [this](bool) { watchers.fetch_sub(1); });
+  }
+
+  /// Sends one piece of the stream; false ends it.
+  bool feed(std::uint64_t& seen, httplib::DataSink& sink) {
+    const bool last = finishing;
+    const LatestText::Edition edition = content.state.wait(seen, last ? 0ms : kKeepAlive);
+    // An SSE comment detects whether the watcher is still connected.
+    std::string text = ":\n\n";
+    if (edition.number > seen) text = fmt::format("data: {}\n\n", *edition.text);
+    seen = edition.number;
+    if (!sink.write(text.data(), text.size())) return false;
+    if (last) sink.done();
+    return true;
+  }
+};
 
 DashboardServer::DashboardServer(const DashboardAddress& address, DashboardContent& content)
     : state_(std::make_unique<State>(address, content)) {
