@@ -6,11 +6,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -26,10 +29,22 @@ constexpr double kPngDotsPerInch = 300.0;
 constexpr double kSvgUnitsPerInch = 96.0;
 constexpr double kPointsPerInch = 72.0;
 
-/// Cairo interprets a point of a font as 1/96 inch, readers of SVG as a point.
-double font_scale(PictureFormat format) {
-  return format == PictureFormat::svg ? 1.0 : kPointsPerInch / kSvgUnitsPerInch;
-}
+/// A terminal of gnuplot, with sizes such that all formats look alike. Cairo does not report a full disk, so a picture
+/// is checked for its last bytes.
+struct Format {
+  const char* ending;
+  const char* terminal;
+  const char* unit;
+  double per_inch, line, point;
+  double font;  ///< Cairo interprets a point of a font as 1/96 inch, readers of SVG as a point
+  std::string_view last;
+};
+constexpr double kCairoFont = kPointsPerInch / kSvgUnitsPerInch;
+constexpr Format kFormats[] = {  // in the order of PictureFormat
+    {".pdf", "pdfcairo rounded", "in", 1.0, 1.25, 1.0, kCairoFont, "%%EOF\n"},
+    {".svg", "svg", "", kSvgUnitsPerInch, 1.0, kSvgUnitsPerInch / kPointsPerInch, 1.0, "</svg>\n"},
+    {".png", "pngcairo rounded", "", kPngDotsPerInch, kPngDotsPerInch / kSvgUnitsPerInch,
+     kPngDotsPerInch / kPointsPerInch, kCairoFont, "IEND\xae\x42\x60\x82"}};
 
 /// A directory that only this user can read, removed with its content at the end.
 class PrivateDirectory {
@@ -55,28 +70,15 @@ class PrivateDirectory {
   std::filesystem::path path_;
 };
 
-/// Sizes in the units of a terminal, such that all formats look alike. Names of files are our own and relative:
-/// external texts are in the script only through quoted().
-std::string preamble(const Picture& picture, PictureFormat format) {
-  const auto terminal = [&](const char* name, const char* unit, double per_inch, double line,
-                            double point) {
-    return fmt::format(
-        "set encoding utf8\nset terminal {} enhanced size {}{},{}{} font 'Helvetica,8' "
-        "fontscale {:.6g} linewidth {:.6g} dashlength {:.6g}\npoint = {:.6g}\n"
-        "set output 'picture'\n",
-        name, picture.width_in * per_inch, unit, picture.height_in * per_inch, unit,
-        point * font_scale(format), line, 2.0 * point, point);
-  };
-  switch (format) {
-    case PictureFormat::pdf:
-      return terminal("pdfcairo rounded", "in", 1.0, 1.25, 1.0);
-    case PictureFormat::svg:
-      return terminal("svg", "", kSvgUnitsPerInch, 1.0, kSvgUnitsPerInch / kPointsPerInch);
-    case PictureFormat::png:
-      return terminal("pngcairo rounded", "", kPngDotsPerInch, kPngDotsPerInch / kSvgUnitsPerInch,
-                      kPngDotsPerInch / kPointsPerInch);
-  }
-  return "";
+/// Names of files are our own and relative: external texts are in the script only through quoted().
+std::string preamble(const Picture& picture, const Format& format) {
+  return fmt::format(
+      "set encoding utf8\nset terminal {} enhanced size {}{},{}{} font 'Helvetica,8' "
+      "fontscale {:.6g} linewidth {:.6g} dashlength {:.6g}\npoint = {:.6g}\n"
+      "set output 'picture'\n",
+      format.terminal, picture.width_in * format.per_inch, format.unit,
+      picture.height_in * format.per_inch, format.unit, format.point * format.font, format.line,
+      2.0 * format.point, format.point);
 }
 
 std::atomic<pid_t> running_gnuplot = -1;
@@ -129,20 +131,9 @@ std::string first_message(const std::string& text) {
   return text.empty() ? "no message" : text.substr(0, text.find('\n'));
 }
 
-/// Cairo does not report a full disk, so check the end marker of the format.
-bool is_whole(const std::string& bytes, PictureFormat format) {
-  std::string_view text = bytes;
-  if (format == PictureFormat::svg)
-    while (text.ends_with("\n\n")) text.remove_suffix(1);
-  switch (format) {
-    case PictureFormat::pdf:
-      return text.ends_with("%%EOF\n");
-    case PictureFormat::svg:
-      return text.ends_with("</svg>\n");
-    case PictureFormat::png:
-      return text.ends_with("IEND\xae\x42\x60\x82");
-  }
-  return false;
+bool is_whole(std::string_view bytes, const Format& format) {
+  while (bytes.ends_with("\n\n")) bytes.remove_suffix(1);  // of SVG
+  return bytes.ends_with(format.last);
 }
 
 /// Sets the creation time of a PDF to 1970, so that equal requests give equal bytes.
@@ -158,15 +149,16 @@ void forget_date(std::string& pdf) {
 
 PictureFormat picture_format(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
-  if (ending == ".pdf") return PictureFormat::pdf;
-  if (ending == ".svg") return PictureFormat::svg;
-  if (ending == ".png") return PictureFormat::png;
-  throw std::invalid_argument(fmt::format(
-      "{}: unsupported picture format '{}'; use .pdf, .svg or .png", file.string(), ending));
+  const Format* const format = std::ranges::find(kFormats, ending, &Format::ending);
+  if (format == std::end(kFormats))
+    throw std::invalid_argument(fmt::format(
+        "{}: unsupported picture format '{}'; use .pdf, .svg or .png", file.string(), ending));
+  return static_cast<PictureFormat>(format - kFormats);
 }
 
 void draw(const Picture& picture, const std::filesystem::path& file) {
-  const PictureFormat format = picture_format(file);
+  const PictureFormat kind = picture_format(file);
+  const Format& format = kFormats[static_cast<std::size_t>(kind)];
   const PrivateDirectory directory;
   const CleanedUpAtInterrupt clean_up([&directory] {
     if (const pid_t child = running_gnuplot; child > 0) ::kill(child, SIGKILL);
@@ -185,7 +177,7 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
     throw FileError(fmt::format("{}: gnuplot failed: {}; check the free space in {}", file.string(),
                                 first_message(read_whole_file(directory.path() / "messages")),
                                 std::filesystem::temp_directory_path().string()));
-  if (format == PictureFormat::pdf) forget_date(bytes);
+  if (kind == PictureFormat::pdf) forget_date(bytes);
   write_text_file(file, bytes);
 }
 
