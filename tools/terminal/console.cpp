@@ -126,26 +126,25 @@ void Progress::update(double done, double total, const std::string& note) {
 
 void Progress::draw(double done, double total, const std::string& note) {
   const double elapsed = seconds();
-  const double share = total > 0.0 ? std::clamp(done / total, 0.0, 1.0) : 0.0;
-  const double left = share > 0.0 ? elapsed * (1.0 - share) / share : std::nan("");
-  const double rate = elapsed > 0.0 ? done * scale_ / elapsed : 0.0;
   const std::string tail = note.empty() ? "" : "  " + note;
+  std::string line;
   if (!(total > 0.0)) {
-    tell("{}{}: {:.0f} s  {:.0f} {}{}{}", terminal_ ? "\r" : "", label_, elapsed, done * scale_,
-         unit_, tail, terminal_ ? "\x1b[K" : "\n");
-    std::fflush(stderr);
-    drawn_ = true;
-    return;
+    line = fmt::format("{}: {:.0f} s  {:.0f} {}{}", label_, elapsed, done * scale_, unit_, tail);
+  } else {
+    const double share = std::clamp(done / total, 0.0, 1.0);
+    const double left = share > 0.0 ? elapsed * (1.0 - share) / share : std::nan("");
+    const double rate = elapsed > 0.0 ? done * scale_ / elapsed : 0.0;
+    constexpr int kWidth = 24;
+    const int full = static_cast<int>(std::lround(share * kWidth));
+    line = terminal_ ? fmt::format("{} [{:#<{}}{:.<{}}]", label_, "", full, "", kWidth - full)
+                     : label_ + ":";
+    line += fmt::format(" {:3.0f} %  {:.4g} {}/s  {} left{}", 100.0 * share, rate, unit_,
+                        duration(left), tail);
   }
-  const std::string numbers = fmt::format("{:3.0f} %  {:.4g} {}/s  {} left{}", 100.0 * share, rate,
-                                          unit_, duration(left), tail);
-  if (!terminal_) {
-    tell("{}: {}\n", label_, numbers);
-    return;
-  }
-  constexpr int kWidth = 24;
-  const int full = static_cast<int>(std::lround(share * kWidth));
-  tell("\r{} [{:#<{}}{:.<{}}] {}\x1b[K", label_, "", full, "", kWidth - full, numbers);
+  if (terminal_)
+    tell("\r{}\x1b[K", line);
+  else
+    tell("{}\n", line);
   std::fflush(stderr);
   drawn_ = true;
 }

@@ -52,7 +52,6 @@ std::optional<double> parse_number(std::string_view text) {
   const char* last = digits.data() + digits.size();
   double value = 0.0;
   const auto [stop, error] = std::from_chars(first, last, value);
-  if (error == std::errc::result_out_of_range) return std::nullopt;
   if (stop != last || error != std::errc{} || !std::isfinite(value)) return std::nullopt;
   return value;
 }
