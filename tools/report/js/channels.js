@@ -53,7 +53,7 @@ function makeCurves(channel) {
     change: own && magnitudes(difference(pairs.other || pairs.otherModel, own)),
     deviation: partOf('deviation', channel, 1),
     modelDeviation: partOf('model_deviation', channel, 1),
-    validationResidual: partOf('validation_residual', channel, 1),
+    validation: partOf('validation_residual', channel, 1),
     relativeError: null,
   };
   if (curves.residual && content.frf.responds[channel]) curves.relativeError = relativeRms(curves.residual, curves.measured);
@@ -78,5 +78,6 @@ function relativeRms(errors, values) {
 
 // Phases of one channel in degrees, -180 to 180.
 function channelPhases(channel) {
-  return mapValues(channelPairs(channel), phases);
+  const { residual, ...responses } = channelPairs(channel);
+  return mapValues(responses, phases);
 }

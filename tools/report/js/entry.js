@@ -2,6 +2,8 @@
 
 const entry = { magnitude: null, phase: null, channel: 0, hidden: new Set(['validation']), order: [] };
 
+const traces = ['measured', 'model', 'residual', 'validation', 'other', 'otherModel', 'change', 'deviation'];  // in the order of drawing
+
 const traceNames = {
   measured: 'measured', model: 'model', residual: 'residual', validation: 'residual, held-back data', deviation: 'standard deviation',
 };
@@ -85,38 +87,36 @@ function smallestPositive(lists) {
 function magnitudeTable(channel) {
   const scale = lineScale();
   const curves = channelCurves(channel);
-  const get = (values) => scaled(values, scale);
-  const columns = [['measured', get(curves.measured), get(curves.deviation)]];
-  if (curves.model) columns.push(['model', get(curves.model), get(curves.modelDeviation)]);
-  if (curves.residual) columns.push(['residual', get(curves.residual), null]);
-  if (curves.validationResidual) columns.push(['validation', get(curves.validationResidual), null]);
-  for (const name of ['other', 'otherModel', 'change']) if (curves[name]) columns.push([name, get(curves[name]), null]);
-  if (curves.deviation) columns.push(['deviation', get(curves.deviation), null]);
-  const floor = smallestPositive(columns.map(([, values]) => values));
+  const names = traces.filter((name) => curves[name]);
+  const columns = names.map((name) => [scaled(curves[name], scale), scaled(deviationOf(curves, name), scale)]);
+  const floor = smallestPositive(columns.map(([values]) => values));
   const half = (deviation, k) => deviation && content.frf.band_factor * deviation[k];
-  const rows = Array.from(array('frequency'), (hz, k) => [hz, ...columns.map(([, values, deviation]) => bar(values[k], half(deviation, k), floor))]);
-  return { rows, names: columns.map(([name]) => name) };
+  const rows = Array.from(array('frequency'), (hz, k) => [hz, ...columns.map(([values, deviation]) => bar(values[k], half(deviation, k), floor))]);
+  return { rows, names };
+}
+
+function deviationOf(curves, name) {
+  return { measured: curves.deviation, model: curves.modelDeviation }[name];
 }
 
 // Phases wrap: a row of gaps between two lines interrupts the trace there instead of drawing a vertical line.
 function phaseTable(channel) {
   const curves = channelCurves(channel);
   const phases = channelPhases(channel);
-  const columns = [['measured', phases.measured, curves.measured, curves.deviation]];
-  if (phases.model) columns.push(['model', phases.model, curves.model, curves.modelDeviation]);
-  for (const name of ['other', 'otherModel']) if (phases[name]) columns.push([name, phases[name], curves[name], null]);
+  const names = traces.filter((name) => phases[name]);
   const f = array('frequency');
-  const cut = calmestCut(columns.map(([, phase]) => phase));
-  for (const column of columns) column[1] = column[1].map((phase) => (phase < cut ? phase + 360 : phase >= cut + 360 ? phase - 360 : phase));
+  const cut = calmestCut(names.map((name) => phases[name]));
+  const turned = (phase) => (phase < cut ? phase + 360 : phase >= cut + 360 ? phase - 360 : phase);
+  const columns = names.map((name) => [phases[name].map(turned), curves[name], deviationOf(curves, name)]);
   const rows = [];
   for (let k = 0; k < f.length; ++k) {
-    const wraps = columns.map(([, phase]) => k > 0 && Math.abs(phase[k] - phase[k - 1]) > 180);
+    const wraps = columns.map(([phase]) => k > 0 && Math.abs(phase[k] - phase[k - 1]) > 180);
     if (wraps.some(Boolean)) {
       rows.push([Math.sqrt(f[k] * f[k - 1]), ...wraps.map((w) => (w ? [NaN, NaN, NaN] : null))]);
     }
-    rows.push([f[k], ...columns.map(([, phase, magnitude, deviation]) => phaseBar(phase[k], magnitude[k], deviation && deviation[k], cut))]);
+    rows.push([f[k], ...columns.map(([phase, magnitude, deviation]) => phaseBar(phase[k], magnitude[k], deviation && deviation[k], cut))]);
   }
-  return { rows, names: columns.map(([name]) => name), cut };
+  return { rows, names, cut };
 }
 
 // Angle at which to cut the circle, such that the traces wrap least: the phase of a rigid body is -180 degrees, where

@@ -42,27 +42,22 @@ function buildMatrix() {
   const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'));
   if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel'));
   if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
-  const times = element('input', { type: 'checkbox', id: 'times-omega' });
-  times.addEventListener('change', () => {
+  const times = element('input', { type: 'checkbox', id: 'times-omega', onchange: () => {
     matrix.timesOmega = times.checked ? 2 : 0;
     redrawMatrix();
     if (matrix.onselect) matrix.onselect(matrix.selected);
-  });
+  } });
   legend.append(element('label', { class: 'toggle', for: 'times-omega' }, times, ' times \u03c9\u00b2'));
   const grid = element('div', {
-    class: 'matrix', role: 'group', 'aria-label': 'Panels',
+    class: 'matrix', role: 'group', 'aria-label': 'Panels', onkeydown: moveFocus, onpointerdown: dragAcross,
     style: '--inputs:' + inputs.length + ';--outputs:' + outputs.length,
   });
   inputs.forEach((input, i) => grid.append(element('span', { class: 'input-name', style: '--i:' + i, title: input.name }, input.name)));
   outputs.forEach((output, o) => grid.append(element('span', { class: 'output-name', style: '--o:' + o, title: output.name }, output.name)));
-  for (let i = 0; i < inputs.length; ++i) {
-    for (let o = 0; o < outputs.length; ++o) grid.append(makePanel(o, i));
-  }
+  for (let c = 0; c < channelCount(); ++c) grid.append(makePanel(c));
   legend.append(saveButtons('frequency response', savedMatrix));
   body.append(legend, bandBar(), element('div', { class: 'matrix-scroll' }, grid),
     element('p', { class: 'quiet', id: 'matrix-scale' }));
-  grid.addEventListener('keydown', moveFocus);
-  grid.addEventListener('pointerdown', dragAcross);
   followBand(() => {
     if (!matrix.pending) matrix.pending = requestAnimationFrame(redrawMatrix);
   });
@@ -80,12 +75,11 @@ function swatch(kind, text) {
   return element('span', { class: 'swatch ' + kind }, text);
 }
 
-function makePanel(output, input) {
-  const channel = channelIndex(output, input);
+function makePanel(channel) {
   const canvas = element('canvas', { 'aria-hidden': 'true' });
   const error = element('span', { class: 'error' });
   const button = element('button', {
-    type: 'button', class: 'panel', style: '--i:' + input + ';--o:' + output, 'data-channel': channel,
+    type: 'button', class: 'panel', style: '--i:' + inputOf(channel) + ';--o:' + outputOf(channel), 'data-channel': channel,
     tabindex: channel === 0 ? '0' : '-1', title: channelName(channel), 'aria-label': channelName(channel),
     'aria-pressed': 'false', onclick: () => selectPanel(channel),
   }, canvas, error);

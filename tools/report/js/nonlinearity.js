@@ -34,14 +34,10 @@ function isDistorted(test) {
 function distortionSummary() {
   const tests = distortionTests();
   const found = tests.filter(isDistorted).length;
-  return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter by more than noise; expected for a linear plant: about ' +
-    number(content.nonlinearity.chance * tests.length, 2) + unsettledSummary();
-}
-
-function unsettledSummary() {
-  const { bands, settled } = content.nonlinearity;
+  const { bands, chance, settled } = content.nonlinearity;
   const open = settled.filter((whether) => !whether).length;
-  return open ? '; in ' + count(open) + ' of ' + count(bands.length) + ' bands the records are not settled' : '';
+  return count(found) + ' of ' + count(tests.length) + ' pairs and bands scatter by more than noise; expected for a linear plant: about ' +
+    number(chance * tests.length, 2) + (open ? '; in ' + count(open) + ' of ' + count(bands.length) + ' bands the records are not settled' : '');
 }
 
 function distortionTable(bands) {

@@ -54,7 +54,7 @@ function showShape(index) {
   document.getElementById('shape-mode').value = index;
   shapes.scene = makeScene(mode);
   const mass = isNumber(mode.modal_mass) ? '; modal mass ' + number(mode.modal_mass, 4) + ' (shapes of norm one)' : '';
-  shapes.text.textContent = 'Mode ' + (index + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz, \u03b6 ' + hundred(mode.damping_ratio) + ' %' + mass +
+  shapes.text.textContent = shapeTitle(index) + mass +
     (mode.not_rank_one > 0.01 ? '; second singular value ' + percent(mode.not_rank_one) + ' of the first' : '');
   shapes.figure.node.setAttribute('aria-label', shapes.text.textContent + '. The table below lists the values.');
   shapes.table.replaceChildren(shapeTable(mode));
@@ -64,14 +64,10 @@ function showShape(index) {
 
 // Channels with their complex components, scaled to equal rms; and the grid of the surface.
 function makeScene(mode) {
-  const list = (kind, channels) => {
-    const own = mode[kind];
-    const scale = Math.sqrt(own.length / 2);
-    return channels.map((channel, i) => ({
-      name: channel.name, kind, re: scale * own[2 * i], im: scale * own[2 * i + 1], place: content.geometry && content.geometry[kind][i],
-    }));
-  };
-  const points = [...list('outputs', content.shape_channels.outputs), ...list('inputs', content.shape_channels.inputs)];
+  const points = ['outputs', 'inputs'].flatMap((kind) => content.shape_channels[kind].map(({ name }, i, { length }) => ({
+    name, kind, re: Math.sqrt(length) * mode[kind][2 * i], im: Math.sqrt(length) * mode[kind][2 * i + 1],
+    place: content.geometry && content.geometry[kind][i],
+  })));
   const most = Math.max(...points.map((p) => Math.hypot(p.re, p.im)), 1e-12);
   const placed = points.filter((p) => p.place);
   return { points, placed, most, ...(placed.length ? surfaceOf(placed) : { grid: null }) };
@@ -151,13 +147,16 @@ function turnShape(event) {
 }
 
 function shapeTable(mode) {
-  const part = (kind, channels, title) => channels.map((channel, i) =>
-    [rowHead(channel.name, 'name'), title, number(mode[kind][2 * i]), number(mode[kind][2 * i + 1])]);
-  return table(['channel', 'kind', 'real', 'imaginary'],
-    [...part('outputs', content.shape_channels.outputs, 'sensor'), ...part('inputs', content.shape_channels.inputs, 'actuator')]);
+  const part = (kind, title) => content.shape_channels[kind].map(({ name }, i) =>
+    [rowHead(name, 'name'), title, number(mode[kind][2 * i]), number(mode[kind][2 * i + 1])]);
+  return table(['channel', 'kind', 'real', 'imaginary'], [...part('outputs', 'sensor'), ...part('inputs', 'actuator')]);
 }
 
 function savedShape() {
-  const mode = content.shapes.modes[shapes.index];
-  return { title: 'Mode ' + (shapes.index + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz, \u03b6 ' + hundred(mode.damping_ratio) + ' %', panels: [canvasPanel(shapes.figure)] };
+  return { title: shapeTitle(shapes.index), panels: [canvasPanel(shapes.figure)] };
+}
+
+function shapeTitle(index) {
+  const mode = content.shapes.modes[index];
+  return 'Mode ' + (index + 1) + ': ' + fixed(mode.frequency_hz) + ' Hz, \u03b6 ' + hundred(mode.damping_ratio) + ' %';
 }
