@@ -38,22 +38,18 @@ inline std::vector<std::uint8_t> from_base64(std::string_view text) {
 /// Base64, then zlib. @throws std::invalid_argument
 inline std::vector<std::uint8_t> unpacked(std::string_view text) {
   const std::vector<std::uint8_t> deflated = from_base64(text);
-  z_stream stream = {};
-  if (inflateInit(&stream) != Z_OK) throw std::runtime_error("zlib: init");
-  std::vector<std::uint8_t> in = deflated, out;
-  stream.next_in = in.data();
-  stream.avail_in = static_cast<uInt>(in.size());
-  int status = Z_OK;
-  while (status == Z_OK) {
-    std::uint8_t piece[4096];
-    stream.next_out = piece;
-    stream.avail_out = sizeof piece;
-    status = inflate(&stream, Z_NO_FLUSH);
-    out.insert(out.end(), piece, piece + (sizeof piece - stream.avail_out));
+  std::vector<std::uint8_t> out;
+  uLong read = 0, written = 0;
+  int status = Z_BUF_ERROR;  // no room
+  for (std::size_t size = 1 << 16; status == Z_BUF_ERROR && size < (1u << 28); size *= 4) {
+    out.resize(size);
+    read = deflated.size();
+    written = size;
+    status = uncompress2(out.data(), &written, deflated.data(), &read);
   }
-  inflateEnd(&stream);
-  if (status != Z_STREAM_END || stream.avail_in != 0)
+  if (status != Z_OK || read != deflated.size())
     throw std::invalid_argument("zlib: not one whole stream");
+  out.resize(written);
   return out;
 }
 

@@ -9,8 +9,6 @@
 #include <numbers>
 #include <random>
 
-#include "excitation/decompositions/decompositions.hpp"
-
 namespace stageid::test {
 namespace {
 
@@ -85,11 +83,6 @@ AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& 
   model.hold = HoldModel::exact;
   model.input_delay_s = Eigen::VectorXd::Constant(size.inputs, delay_s);
   model.output_delay_s = Eigen::VectorXd::Zero(size.outputs);
-  Submodel rigid{.integrators = 2,
-                 .denominator = {1.0},
-                 .numerator = {},
-                 .natural_frequency_std_hz = {},
-                 .damping_ratio_std = {}};
   Eigen::MatrixXd b(size.outputs, size.inputs);
   for (Eigen::Index o = 0; o < size.outputs; ++o)
     for (Eigen::Index i = 0; i < size.inputs; ++i) {
@@ -97,8 +90,10 @@ AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& 
       const auto [xi, yi] = position(i, size.inputs);
       b(o, i) = (1.0 + 1.9 * xo * xi + 1.7 * yo * yi) / 22.0;
     }
+  Submodel& rigid = model.submodels.emplace_back();
+  rigid.integrators = 2;
+  rigid.denominator = {1.0};
   rigid.numerator = {b};
-  model.submodels.push_back(rigid);
 
   for (int mode = 0; mode < size.modes; ++mode) {
     double f = 148.0 * std::pow(13.0, static_cast<double>(mode) / std::max(1, size.modes - 1));
@@ -207,21 +202,11 @@ Validation compare(const ReportData& data) {
 }
 
 void add_cmif(ReportData& data) {
-  const FrfEstimate& frf = *data.frf;
-  data.cmif_curves.resize(std::min(frf.n_outputs(), frf.n_inputs()), frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd g = frf.response.col(k).reshaped(frf.n_outputs(), frf.n_inputs());
-    const double scale = std::pow(2.0 * pi * frf.frequency_hz[k], 4);
-    const Eigen::MatrixXcd square = g.rows() <= g.cols() ? Eigen::MatrixXcd(g * g.adjoint())
-                                                         : Eigen::MatrixXcd(g.adjoint() * g);
-    data.cmif_curves.col(k) = (scale * hermitian_eigenvalues(square).reverse()).cwiseMax(1e-30);
-  }
-  int curve = 1;
+  data.cmif_curves = cmif(*data.frf, CmifKind::accelerance);
   for (const TrueMode& mode : data.true_modes) {
     const bool close = !data.chosen_modes.empty() &&
                        mode.natural_frequency_hz < 1.01 * data.chosen_modes.back().frequency_hz;
-    curve = close ? 2 : 1;
-    data.chosen_modes.push_back({mode.natural_frequency_hz * 1.0004, 0.01, curve});
+    data.chosen_modes.push_back({mode.natural_frequency_hz * 1.0004, 0.01, close ? 2 : 1});
   }
 }
 
