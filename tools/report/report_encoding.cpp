@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <new>
+#include <utility>
 
 namespace stageid::report {
 
@@ -21,27 +22,24 @@ std::string packed_planes(const std::vector<T>& values) {
   return packed(byte_planes(values));
 }
 
-/// Predicts values one after another from the actual ones before.
-class Extrapolation {
- public:
-  explicit Extrapolation(const Expectation& expected) : expected_(expected) {}
-  std::complex<double> next(Eigen::Index row, Eigen::Index column) const {
-    const std::complex<double> base = base_at(row, column);
-    if (expected_.order == 0) return base;
-    return base + (expected_.order == 1 ? last_ : 2.0 * last_ - before_);
-  }
-  void turned_out(Eigen::Index row, Eigen::Index column, std::complex<double> value) {
-    before_ = last_;
-    last_ = value - base_at(row, column);
-  }
-
- private:
-  std::complex<double> base_at(Eigen::Index row, Eigen::Index column) const {
-    return expected_.base != nullptr ? (*expected_.base)(row, column) : 0.0;
-  }
-  Expectation expected_;
-  std::complex<double> last_ = 0.0, before_ = 0.0;
-};
+/// Encodes numbers one after another, each with the value expected from those before. `encode(number, expected)` returns
+/// the number as the page decodes it. @returns the decoded numbers
+template <typename Encode>
+Eigen::MatrixXcd encode_each(const Eigen::MatrixXcd& values, const Expectation& expected,
+                             Encode encode) {
+  Eigen::MatrixXcd decoded(values.rows(), values.cols());
+  std::complex<double> last = 0.0, before = 0.0;
+  for (Eigen::Index row = 0; row < values.rows(); ++row)
+    for (Eigen::Index k = 0; k < values.cols(); ++k) {
+      const std::complex<double> base = expected.base != nullptr ? (*expected.base)(row, k) : 0.0;
+      std::complex<double> guess = base;
+      if (expected.order > 0) guess += expected.order == 1 ? last : 2.0 * last - before;
+      decoded(row, k) = encode(values(row, k), guess);
+      before = last;
+      last = decoded(row, k) - base;
+    }
+  return decoded;
+}
 
 float to_float(double value) {
   constexpr double most = std::numeric_limits<float>::max();
@@ -137,53 +135,40 @@ std::string encode_float32(const Eigen::Ref<const Eigen::MatrixXd>& values) {
 }
 
 ComplexCode encode_complex_float32(const Eigen::MatrixXcd& values, Expectation expected) {
-  ComplexCode out{"", Eigen::MatrixXcd(values.rows(), values.cols())};
-  Extrapolation extrapolation(expected);
   std::vector<std::uint32_t> words;
   words.reserve(2 * static_cast<std::size_t>(values.size()));
-  const auto add = [&words](float value, double guess) {
+  const auto encode = [&words](double part, double guess) {
+    const float value = to_float(part);
     const std::uint32_t expected_place = place_of(to_float(guess + 0.0));  // -0 is expected as 0
     words.push_back(sign_last(static_cast<std::int32_t>(place_of(value) - expected_place)));
+    return static_cast<double>(value);
   };
-  for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    for (Eigen::Index k = 0; k < values.cols(); ++k) {
-      const std::complex<double> guess = extrapolation.next(row, k);
-      const float re = to_float(values(row, k).real());
-      const float im = to_float(values(row, k).imag());
-      add(re, guess.real());
-      add(im, guess.imag());
-      out.decoded(row, k) = {re, im};
-      extrapolation.turned_out(row, k, out.decoded(row, k));
-    }
-  }
-  out.text = packed_planes(words);
-  return out;
+  Eigen::MatrixXcd decoded =
+      encode_each(values, expected, [&](std::complex<double> value, std::complex<double> guess) {
+        const double re = encode(value.real(), guess.real());
+        return std::complex(re, encode(value.imag(), guess.imag()));
+      });
+  return {packed_planes(words), std::move(decoded)};
 }
 
 ComplexCode encode_complex_block16(const Eigen::MatrixXcd& values, Expectation expected) {
-  ComplexCode out{"", Eigen::MatrixXcd(values.rows(), values.cols())};
-  Extrapolation extrapolation(expected);
   std::vector<std::uint16_t> mantissas;
   std::vector<std::uint8_t> exponents;
   mantissas.reserve(2 * static_cast<std::size_t>(values.size()));
   exponents.reserve(static_cast<std::size_t>(values.size()));
   int before = 0;
-  for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    for (Eigen::Index k = 0; k < values.cols(); ++k) {
-      const std::complex<double> guess = extrapolation.next(row, k);
-      const Block16 block = to_block16(values(row, k));
-      mantissas.push_back(mantissa_code(block.re, guess.real(), block.exponent));
-      mantissas.push_back(mantissa_code(block.im, guess.imag(), block.exponent));
-      exponents.push_back(static_cast<std::uint8_t>(block.exponent - before));
-      before = block.exponent;
-      out.decoded(row, k) = value_of(block);
-      extrapolation.turned_out(row, k, out.decoded(row, k));
-    }
-  }
+  Eigen::MatrixXcd decoded =
+      encode_each(values, expected, [&](std::complex<double> value, std::complex<double> guess) {
+        const Block16 block = to_block16(value);
+        mantissas.push_back(mantissa_code(block.re, guess.real(), block.exponent));
+        mantissas.push_back(mantissa_code(block.im, guess.imag(), block.exponent));
+        exponents.push_back(static_cast<std::uint8_t>(block.exponent - before));
+        before = block.exponent;
+        return value_of(block);
+      });
   std::vector<std::uint8_t> bytes = byte_planes(mantissas);
   bytes.insert(bytes.end(), exponents.begin(), exponents.end());
-  out.text = packed(bytes);
-  return out;
+  return {packed(bytes), std::move(decoded)};
 }
 
 LogBytes encode_log_bytes(const Eigen::Ref<const Eigen::MatrixXd>& values) {

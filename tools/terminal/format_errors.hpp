@@ -32,9 +32,9 @@ class FormatErrorList {
     try {
       work();
     } catch (const FormatErrors& errors) {
-      for (const FormatError& error : errors.all()) add(error);
+      errors_.insert(errors_.end(), errors.all().begin(), errors.all().end());
     } catch (const FormatError& error) {
-      add(error);
+      errors_.push_back(error);
     }
   }
   std::size_t size() const noexcept { return errors_.size(); }
@@ -44,8 +44,6 @@ class FormatErrorList {
   }
 
  private:
-  void add(const FormatError& error) { errors_.push_back(error); }
-
   std::vector<FormatError> errors_;
 };
 

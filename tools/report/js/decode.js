@@ -56,7 +56,7 @@ function interleaved(planes, width) {
   return bytes.buffer;
 }
 
-// Pairs (re, im) from their expected values: value(guess, i) returns number i. Rounds as class Extrapolation does.
+// Pairs (re, im) from their expected values: value(guess, i) returns number i. Rounds as encode_each() does.
 function expectedPairs(out, about, base, value) {
   const twice = about.order === 2 ? 2 : about.order;
   const once = about.order === 2 ? 1 : 0;
