@@ -19,23 +19,6 @@
 
 namespace stageid {
 
-/// State that changes during a measurement, read by the script of the page.
-struct DashboardState {
-  const char* state = "starting";  ///< starting, running, stopping, estimating, ended
-  ExperimentProgress progress;
-  int runs_before = 0;      ///< already complete in the log
-  double wall_s = 0.0;      ///< since the first cycle
-  LiveLevels::Ended ended;  ///< completed runs
-  Levels levels;
-  std::string response_status;
-  std::uint64_t response_edition = 0;
-  std::optional<PlantSnapshot> plant;  ///< of the plant around the stage
-  std::vector<std::string> events;     ///< JSON objects, oldest first
-  int watchers = 0;
-  std::optional<int> exit_code;  ///< set at the end
-  std::string message;
-};
-
 namespace {
 
 using Json = nlohmann::json;
@@ -72,12 +55,12 @@ bool same_run(const LogRun& ended, const RunId& run) {
 }
 
 /// Total counts of the completed runs and the current one.
-void add_counts(const DashboardState& s, Json& json) {
-  RunHealth health = s.ended.health;
-  RunTiming timing = s.ended.timing;
-  if (s.ended.runs == 0 || !same_run(s.ended.last, s.progress.run)) {
-    health += s.progress.health;
-    timing += s.progress.timing;
+void add_counts(const LiveLevels::Ended& ended, const ExperimentProgress& progress, Json& json) {
+  RunHealth health = ended.health;
+  RunTiming timing = ended.timing;
+  if (ended.runs == 0 || !same_run(ended.last, progress.run)) {
+    health += progress.health;
+    timing += progress.timing;
   }
   json["health"] = {{"cycles", health.cycles},
                     {"late", health.late},
@@ -102,35 +85,6 @@ Json plant_json(const PlantSnapshot& plant) {
   if (plant.cause != FaultCause::none) state += fmt::format(": {}", to_string(plant.cause));
   if (!plant.interlock_closed) state += ", interlock open";
   return {{"state", state}, {"values", values}};
-}
-
-/// One line of JSON.
-std::string dashboard_state_json(const DashboardState& s) {
-  const ExperimentProgress& p = s.progress;
-  const double rate = s.wall_s > 0.0 ? p.seconds_done / s.wall_s : 0.0;
-  Json json = {
-      {"state", s.state},
-      {"node_state", to_string(p.node_state)},
-      {"run", {{"realization", p.run.realization}, {"experiment", p.run.experiment}}},
-      {"runs_done", p.runs_done + s.runs_before},
-      {"runs_total", p.runs_total + s.runs_before},
-      {"seconds_done", p.seconds_done},
-      {"seconds_total", p.seconds_total},
-      {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
-      {"speed", rate},
-      {"levels",
-       {{"peak", list(s.levels.peak)},
-        {"rms", list(s.levels.rms)},
-        {"largest_peak", list(s.levels.largest_peak)}}},
-      {"response", {{"edition", s.response_edition}, {"status", s.response_status}}},
-      {"supervisor", s.plant ? plant_json(*s.plant) : Json()},
-      {"watchers", s.watchers},
-      {"message", s.message},
-      {"exit_code", s.exit_code ? Json(*s.exit_code) : Json()}};
-  add_counts(s, json);
-  json["events"] = Json::array();
-  for (const std::string& event : s.events) json["events"].push_back(parse_json<Json>(event));
-  return text_of(json);
 }
 
 /// Constant content: names, units, limits, periods. Safe inside <script>.
@@ -182,27 +136,56 @@ struct Dashboard::State {
         log_of_events->write("abort", {{"from", std::string("dashboard")}});
     };
     content.watched = [this] { response.watch(); };
-    shown.levels = levels.take();
-    content.state.publish(dashboard_state_json(shown));
+    shown_levels = levels.take();
+    publish();
     server = std::make_unique<DashboardServer>(address, content);
   }
 
-  void publish() {
-    shown.ended = levels.ended();
-    shown.response_status = response.status();
-    shown.response_edition = content.response.get().number;
-    shown.watchers = server->watchers();
-    if (plant) shown.plant = plant();
-    if (const EventLog* const log = events) shown.events = log->latest(kEventsShown);
-    content.state.publish(dashboard_state_json(shown));
+  void publish() { content.state.publish(state_json()); }
+
+  /// What changes during a measurement, for the script of the page: one line.
+  std::string state_json() const {
+    const ExperimentProgress& p = progress;
+    const double rate = wall_s > 0.0 ? p.seconds_done / wall_s : 0.0;
+    Json json = {
+        {"state", state},
+        {"node_state", to_string(p.node_state)},
+        {"run", {{"realization", p.run.realization}, {"experiment", p.run.experiment}}},
+        {"runs_done", p.runs_done + runs_before},
+        {"runs_total", p.runs_total + runs_before},
+        {"seconds_done", p.seconds_done},
+        {"seconds_total", p.seconds_total},
+        {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
+        {"speed", rate},
+        {"levels",
+         {{"peak", list(shown_levels.peak)},
+          {"rms", list(shown_levels.rms)},
+          {"largest_peak", list(shown_levels.largest_peak)}}},
+        {"response", {{"edition", content.response.get().number}, {"status", response.status()}}},
+        {"supervisor", plant ? plant_json(plant()) : Json()},
+        {"watchers", server ? server->watchers() : 0},
+        {"message", message},
+        {"exit_code", exit_code ? Json(*exit_code) : Json()}};
+    add_counts(levels.ended(), p, json);
+    json["events"] = Json::array();
+    if (const EventLog* const log = events)
+      for (const std::string& event : log->latest(kEventsShown))
+        json["events"].push_back(parse_json<Json>(event));
+    return text_of(json);
   }
 
   DashboardContent content;
-  DashboardState shown;
-  std::function<PlantSnapshot()> plant;
+  const char* state = "starting";  ///< starting, running, stopping, estimating, ended
+  ExperimentProgress progress;
+  int runs_before = 0;  ///< already complete in the log
+  SteadyClock::time_point start = SteadyClock::now();
+  double wall_s = 0.0;  ///< since the first cycle
+  Levels shown_levels;
+  std::optional<int> exit_code;  ///< set at the end
+  std::string message;
+  std::function<PlantSnapshot()> plant;  ///< of the plant around the stage, if there is one
   std::atomic<EventLog*> events = nullptr;
   std::atomic<bool> aborted = false;
-  SteadyClock::time_point start = SteadyClock::now();
   LiveLevels levels;
   LiveResponse response;
   std::unique_ptr<DashboardServer> server;  // last: its threads use all other members
@@ -212,8 +195,8 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
                      const ExperimentPlan& plan, const StageInfo& stage,
                      const std::filesystem::path& log, int runs_before)
     : state_(std::make_unique<State>(address, config, plan, stage, log)) {
-  state_->shown.runs_before = runs_before;
-  state_->shown.progress.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
+  state_->runs_before = runs_before;
+  state_->progress.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
 }
 
 Dashboard::~Dashboard() = default;
@@ -235,23 +218,23 @@ void Dashboard::watch(std::function<PlantSnapshot()> snapshot) {
 
 void Dashboard::update(const ExperimentProgress& progress) {
   State& s = *state_;
-  s.shown.state = s.aborted ? "stopping" : "running";
-  s.shown.progress = progress;
-  s.shown.wall_s = std::chrono::duration<double>(SteadyClock::now() - s.start).count();
-  if (Levels fresh = s.levels.take(); fresh.rows > 0) s.shown.levels = std::move(fresh);
+  s.state = s.aborted ? "stopping" : "running";
+  s.progress = progress;
+  s.wall_s = std::chrono::duration<double>(SteadyClock::now() - s.start).count();
+  if (Levels fresh = s.levels.take(); fresh.rows > 0) s.shown_levels = std::move(fresh);
   s.publish();
 }
 
 void Dashboard::finish(int exit_code, const std::string& message) {
   State& s = *state_;
   if (s.server->watchers() > 0) {
-    s.shown.state = "estimating";
+    s.state = "estimating";
     s.publish();
     s.response.catch_up();
   }
-  s.shown.state = "ended";
-  s.shown.exit_code = exit_code;
-  s.shown.message = message;
+  s.state = "ended";
+  s.exit_code = exit_code;
+  s.message = message;
   s.publish();
   s.server->finish(std::chrono::seconds(kFarewell_s));
   s.events = nullptr;
