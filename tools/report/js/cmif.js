@@ -5,7 +5,7 @@ const cmif = { graph: null };
 function buildCmif() {
   const body = section('cmif', 'CMIF', 'Complex mode indicator function',
     'The squared singular values of \u03c9\u00b2G, which removes the slope of the rigid body.');
-  const legend = element('div', { class: 'legend' }, ...curveNames().map((name, i) => element('span', { class: 'swatch', style: '--colour:var(--curve-' + (i % 6) + ')' }, name)));
+  const legend = element('div', { class: 'legend' }, ...curveNames().map((name, i) => swatch('curve-' + (i % 6), name)));
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'starting value (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
   legend.append(saveButtons('CMIF', savedCmif));

@@ -200,9 +200,8 @@ function savedEntry() {
 
 function buildLegend() {
   const legend = document.getElementById('entry-legend');
-  legend.replaceChildren(...entry.order.map((name) => element('button', {
-    type: 'button', class: 'swatch ' + name, 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name),
-  }, traceName(name))), element('output', { id: 'entry-values', class: 'values' }));
+  legend.replaceChildren(...entry.order.map((name) => swatch(name, traceName(name), 'button',
+    { type: 'button', 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name) })), element('output', { id: 'entry-values', class: 'values' }));
 }
 
 function toggleTrace(name) {

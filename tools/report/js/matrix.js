@@ -71,8 +71,9 @@ function otherTrace() {
   return content.arrays.other_model ? 'otherModel' : null;
 }
 
-function swatch(kind, text) {
-  return element('span', { class: 'swatch ' + kind }, text);
+// The name of a trace beside its colour.
+function swatch(kind, text, tag = 'span', more = {}) {
+  return element(tag, { class: 'swatch ' + kind, style: '--colour:var(--' + kind + ')', ...more }, text);
 }
 
 function makePanel(channel) {
