@@ -27,16 +27,17 @@ std::vector<ModeRow> identified(const AdditiveModel& model) {
   return rows;
 }
 
+constexpr double kFurthest = 0.02;  // relative, of two modes that may be the same
+
 /// Index of the true mode per row, if there is one. Pairs never cross: by dynamic programming, as for the alignment of
-/// two sequences. An unpaired mode costs `furthest`, so every closer pair is preferred.
+/// two sequences. An unpaired mode costs kFurthest, so every closer pair is preferred.
 std::vector<std::optional<std::size_t>> partners(const std::vector<ModeRow>& rows,
-                                                 const std::vector<TrueMode>& truth,
-                                                 double furthest) {
+                                                 const std::vector<TrueMode>& truth) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   const auto pair = [&](std::size_t i, std::size_t j) {
     const double f = truth[j].natural_frequency_hz;
     const double apart = std::abs(*rows[i].frequency_hz - f) / f;
-    return apart <= furthest ? apart : kNever;
+    return apart <= kFurthest ? apart : kNever;
   };
   // Least cost of the modes from row i and true mode j on.
   std::vector cost(rows.size() + 1, std::vector<double>(truth.size() + 1, 0.0));
@@ -45,8 +46,8 @@ std::vector<std::optional<std::size_t>> partners(const std::vector<ModeRow>& row
       const bool row = i < rows.size();
       const bool column = j < truth.size();
       double least = row || column ? kNever : 0.0;
-      if (row) least = std::min(least, furthest + cost[i + 1][j]);
-      if (column) least = std::min(least, furthest + cost[i][j + 1]);
+      if (row) least = std::min(least, kFurthest + cost[i + 1][j]);
+      if (column) least = std::min(least, kFurthest + cost[i][j + 1]);
       if (row && column) least = std::min(least, pair(i, j) + cost[i + 1][j + 1]);
       cost[i][j] = least;
     }
@@ -55,7 +56,7 @@ std::vector<std::optional<std::size_t>> partners(const std::vector<ModeRow>& row
   for (std::size_t i = 0, j = 0; i < rows.size() && j < truth.size();) {
     if (cost[i][j] == pair(i, j) + cost[i + 1][j + 1])
       partner[i++] = j++;
-    else if (cost[i][j] == furthest + cost[i + 1][j])
+    else if (cost[i][j] == kFurthest + cost[i + 1][j])
       ++i;
     else
       ++j;
@@ -84,12 +85,11 @@ std::optional<double> ModeRow::relative_frequency_error() const {
   return std::abs(*frequency_hz / truth->natural_frequency_hz - 1.0);
 }
 
-std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth,
-                                double furthest) {
+std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth) {
   std::vector<TrueMode> known(truth.begin(), truth.end());
   std::ranges::sort(known, {}, &TrueMode::natural_frequency_hz);
   std::vector<ModeRow> rows = identified(model);
-  const auto partner = partners(rows, known, furthest);
+  const auto partner = partners(rows, known);
   std::vector<bool> found(known.size(), false);
   for (std::size_t i = 0; i < partner.size(); ++i) {
     if (!partner[i]) continue;

@@ -25,9 +25,8 @@ struct ModeRow {
 };
 
 /// Pairs the modes of a model with true ones, one to one and in the order of frequency, such that the number of pairs
-/// is largest and the sum of |f - f_true| / f_true smallest; no pair differs by more than `furthest`. Rows by
+/// is largest and the sum of |f - f_true| / f_true smallest; no pair differs by more than 2 %. Rows by
 /// frequency (that of the truth if nothing was identified).
-std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth,
-                                double furthest = 0.02);
+std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth);
 
 }  // namespace stageid

@@ -261,8 +261,8 @@ void add_checks(ReportData& data) {
 
 }  // namespace
 
-ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
-  Random random(seed);
+ReportData synthetic_report(const SyntheticSize& size) {
+  Random random(1);
   ReportData data;
   data.title = "Wafer stage, out of plane";
   data.model = synthetic_model(size, data.true_modes, random);
@@ -300,7 +300,7 @@ ReportData synthetic_report(const SyntheticSize& size, std::uint64_t seed) {
   return data;
 }
 
-void add_other_day(ReportData& data, std::uint64_t seed) {
+void add_other_day(ReportData& data) {
   ReportComparison other;
   other.title = "Tuesday";
   other.model = data.model;
@@ -311,7 +311,7 @@ void add_other_day(ReportData& data, std::uint64_t seed) {
       submodel.denominator[1] /= 1.0 + kOtherDayShift;
       submodel.denominator[2] /= (1.0 + kOtherDayShift) * (1.0 + kOtherDayShift);
     }
-  Random random(seed);
+  Random random(2);
   other.model_response = 0.98 * data.model_response;
   other.response = with_noise(other.model_response, data.frf->total_variance, random);
   data.comparison = other;

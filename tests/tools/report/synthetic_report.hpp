@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "tools/report/report_page.hpp"
 
 namespace stageid::test {
@@ -18,14 +16,14 @@ struct SyntheticSize {
 
 /// A complete report of a stage with rigid body, modes (two pairs of them close) and delay;
 /// measured data are its exact response and circular noise of the variance stated. Modal sums are
-/// evaluated here, without the code under test. The same seed gives the same data.
-ReportData synthetic_report(const SyntheticSize& size = {}, std::uint64_t seed = 1);
+/// evaluated here, without the code under test. The same size gives the same data.
+ReportData synthetic_report(const SyntheticSize& size = {});
 
 /// Share by which add_other_day() moves every natural frequency.
 constexpr double kOtherDayShift = 4e-4;
 
 /// Another day for comparison: every natural frequency higher by kOtherDayShift, the first mode gone, the
 /// response 2 % smaller and with noise of its own.
-void add_other_day(ReportData& data, std::uint64_t seed = 2);
+void add_other_day(ReportData& data);
 
 }  // namespace stageid::test

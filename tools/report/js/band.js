@@ -1,6 +1,6 @@
 // The visible part of the band, common to the whole page. A change of it updates all figures.
 
-const band = { low: null, high: null, telling: false, followers: [], texts: [] };
+const band = { low: null, high: null, telling: false, followers: [] };
 
 const leastLines = 4;  // minimum after a zoom
 
@@ -48,7 +48,6 @@ function tellBand() {
   } finally {
     band.telling = false;
   }
-  for (const text of band.texts) text.textContent = bandText();
 }
 
 function linesBetween(low, high) {
@@ -111,7 +110,7 @@ function bandText() {
 
 function bandBar() {
   const text = element('output', { class: 'band-text', 'aria-live': 'polite' }, bandText());
-  band.texts.push(text);
+  followBand(() => { text.textContent = bandText(); });
   return element('div', { class: 'band-bar', role: 'group', 'aria-label': 'Visible band of all plots' },
     smallButton('\u25c2', 'To lower frequencies', () => moveBand(1, -0.5)), smallButton('\u25b8', 'To higher frequencies', () => moveBand(1, 0.5)),
     smallButton('+', 'Zoom in', () => moveBand(0.5, 0)), smallButton('\u2212', 'Zoom out', () => moveBand(2, 0)),

@@ -73,8 +73,8 @@ function count(value) {
   return String(value).replace(/\B(?=(\d{3})+(?!\d))/g, '\u202f');
 }
 
-function plural(n, one, many) {
-  return count(n) + ' ' + (n === 1 ? one : many || one + 's');
+function plural(n, noun) {
+  return count(n) + ' ' + noun + (n === 1 ? '' : 's');
 }
 
 // At most that many characters.
