@@ -2,16 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "acquisition/files/json_text.hpp"
-#include "tools/dashboard/dashboard_server.hpp"
-#include "tools/dashboard/live_levels.hpp"
-#include "tools/dashboard/live_response.hpp"
 #include "tools/report/html_page.hpp"
 #include "tools/report/report_assets.hpp"
 #include "tools/report/timing_json.hpp"
@@ -22,7 +16,6 @@ namespace stageid {
 namespace {
 
 using Json = nlohmann::json;
-using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::size_t kEventsShown = 14;
 
@@ -123,121 +116,90 @@ std::string page_of(const ExperimentConfig& config, const ExperimentPlan& plan,
 
 }  // namespace
 
-struct Dashboard::State {
-  State(const DashboardAddress& address, const ExperimentConfig& config, const ExperimentPlan& plan,
-        const StageInfo& stage, const std::filesystem::path& log)
-      : levels(static_cast<Eigen::Index>(stage.actuators.size() + stage.sensors.size())),
-        response(log, config.frf, content.response) {
-    content.page = page_of(config, plan, stage);
-    content.abort = [this] {
-      aborted = true;
-      request_interrupt();
-      if (EventLog* const log_of_events = events)
-        log_of_events->write("abort", {{"from", std::string("dashboard")}});
-    };
-    content.watched = [this] { response.watch(); };
-    shown_levels = levels.take();
-    publish();
-    server = std::make_unique<DashboardServer>(address, content);
-  }
-
-  void publish() { content.state.publish(state_json()); }
-
-  /// What changes during a measurement, for the script of the page: one line.
-  std::string state_json() const {
-    const ExperimentProgress& p = progress;
-    const double rate = wall_s > 0.0 ? p.seconds_done / wall_s : 0.0;
-    Json json = {
-        {"state", state},
-        {"node_state", to_string(p.node_state)},
-        {"run", {{"realization", p.run.realization}, {"experiment", p.run.experiment}}},
-        {"runs_done", p.runs_done + runs_before},
-        {"runs_total", p.runs_total + runs_before},
-        {"seconds_done", p.seconds_done},
-        {"seconds_total", p.seconds_total},
-        {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
-        {"speed", rate},
-        {"levels",
-         {{"peak", list(shown_levels.peak)},
-          {"rms", list(shown_levels.rms)},
-          {"largest_peak", list(shown_levels.largest_peak)}}},
-        {"response", {{"edition", content.response.get().number}, {"status", response.status()}}},
-        {"supervisor", plant ? plant_json(plant()) : Json()},
-        {"watchers", server ? server->watchers() : 0},
-        {"message", message},
-        {"exit_code", exit_code ? Json(*exit_code) : Json()}};
-    add_counts(levels.ended(), p, json);
-    json["events"] = Json::array();
-    if (const EventLog* const log = events)
-      for (const std::string& event : log->latest(kEventsShown))
-        json["events"].push_back(parse_json<Json>(event));
-    return text_of(json);
-  }
-
-  DashboardContent content;
-  const char* state = "starting";  ///< starting, running, stopping, estimating, ended
-  ExperimentProgress progress;
-  int runs_before = 0;  ///< already complete in the log
-  SteadyClock::time_point start = SteadyClock::now();
-  double wall_s = 0.0;  ///< since the first cycle
-  Levels shown_levels;
-  std::optional<int> exit_code;  ///< set at the end
-  std::string message;
-  std::function<PlantSnapshot()> plant;  ///< of the plant around the stage, if there is one
-  std::atomic<EventLog*> events = nullptr;
-  std::atomic<bool> aborted = false;
-  LiveLevels levels;
-  LiveResponse response;
-  std::unique_ptr<DashboardServer> server;  // last: its threads use all other members
-};
-
 Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
                      const ExperimentPlan& plan, const StageInfo& stage,
                      const std::filesystem::path& log, int runs_before)
-    : state_(std::make_unique<State>(address, config, plan, stage, log)) {
-  state_->runs_before = runs_before;
-  state_->progress.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
+    : runs_before_(runs_before),
+      levels_(static_cast<Eigen::Index>(stage.actuators.size() + stage.sensors.size())),
+      response_(log, config.frf, content_.response) {
+  progress_.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
+  content_.page = page_of(config, plan, stage);
+  content_.abort = [this] {
+    aborted_ = true;
+    request_interrupt();
+    if (EventLog* const events = events_)
+      events->write("abort", {{"from", std::string("dashboard")}});
+  };
+  content_.watched = [this] { response_.watch(); };
+  shown_levels_ = levels_.take();
+  publish();
+  server_ = std::make_unique<DashboardServer>(address, content_);
 }
 
-Dashboard::~Dashboard() = default;
-
-const std::string& Dashboard::url() const noexcept { return state_->server->url(); }
-
-std::vector<RunObserver*> Dashboard::observers() noexcept {
-  return {&state_->levels, &state_->response};
+/// What changes during a measurement, for the script of the page: one line.
+std::string Dashboard::state_json() const {
+  const ExperimentProgress& p = progress_;
+  const double rate = wall_s_ > 0.0 ? p.seconds_done / wall_s_ : 0.0;
+  Json json = {
+      {"state", state_},
+      {"node_state", to_string(p.node_state)},
+      {"run", {{"realization", p.run.realization}, {"experiment", p.run.experiment}}},
+      {"runs_done", p.runs_done + runs_before_},
+      {"runs_total", p.runs_total + runs_before_},
+      {"seconds_done", p.seconds_done},
+      {"seconds_total", p.seconds_total},
+      {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
+      {"speed", rate},
+      {"levels",
+       {{"peak", list(shown_levels_.peak)},
+        {"rms", list(shown_levels_.rms)},
+        {"largest_peak", list(shown_levels_.largest_peak)}}},
+      {"response", {{"edition", content_.response.get().number}, {"status", response_.status()}}},
+      {"supervisor", plant_ ? plant_json(plant_()) : Json()},
+      {"watchers", server_ ? server_->watchers() : 0},
+      {"message", message_},
+      {"exit_code", exit_code_ ? Json(*exit_code_) : Json()}};
+  add_counts(levels_.ended(), p, json);
+  json["events"] = Json::array();
+  if (const EventLog* const log = events_)
+    for (const std::string& event : log->latest(kEventsShown))
+      json["events"].push_back(parse_json<Json>(event));
+  return text_of(json);
 }
+
+void Dashboard::publish() { content_.state.publish(state_json()); }
+
+const std::string& Dashboard::url() const noexcept { return server_->url(); }
+
+std::vector<RunObserver*> Dashboard::observers() noexcept { return {&levels_, &response_}; }
 
 void Dashboard::watch(EventLog& events) noexcept {
-  state_->events = &events;
-  state_->start = SteadyClock::now();
+  events_ = &events;
+  start_ = SteadyClock::now();
 }
 
-void Dashboard::watch(std::function<PlantSnapshot()> snapshot) {
-  state_->plant = std::move(snapshot);
-}
+void Dashboard::watch(std::function<PlantSnapshot()> snapshot) { plant_ = std::move(snapshot); }
 
 void Dashboard::update(const ExperimentProgress& progress) {
-  State& s = *state_;
-  s.state = s.aborted ? "stopping" : "running";
-  s.progress = progress;
-  s.wall_s = std::chrono::duration<double>(SteadyClock::now() - s.start).count();
-  if (Levels fresh = s.levels.take(); fresh.rows > 0) s.shown_levels = std::move(fresh);
-  s.publish();
+  state_ = aborted_ ? "stopping" : "running";
+  progress_ = progress;
+  wall_s_ = std::chrono::duration<double>(SteadyClock::now() - start_).count();
+  if (Levels fresh = levels_.take(); fresh.rows > 0) shown_levels_ = std::move(fresh);
+  publish();
 }
 
 void Dashboard::finish(int exit_code, const std::string& message) {
-  State& s = *state_;
-  if (s.server->watchers() > 0) {
-    s.state = "estimating";
-    s.publish();
-    s.response.catch_up();
+  if (server_->watchers() > 0) {
+    state_ = "estimating";
+    publish();
+    response_.catch_up();
   }
-  s.state = "ended";
-  s.exit_code = exit_code;
-  s.message = message;
-  s.publish();
-  s.server->finish(std::chrono::seconds(kFarewell_s));
-  s.events = nullptr;
+  state_ = "ended";
+  exit_code_ = exit_code;
+  message_ = message;
+  publish();
+  server_->finish(std::chrono::seconds(kFarewell_s));
+  events_ = nullptr;
 }
 
 }  // namespace stageid

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/record/event_log.hpp"
 #include "hal/stage/supervisor.hpp"
-#include "tools/dashboard/dashboard_address.hpp"
+#include "tools/dashboard/dashboard_server.hpp"
+#include "tools/dashboard/live_levels.hpp"
+#include "tools/dashboard/live_response.hpp"
 #include "tools/experiment/experiment_config.hpp"
 
 namespace stageid {
@@ -24,7 +29,8 @@ class Dashboard {
   Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
             const ExperimentPlan& plan, const StageInfo& stage, const std::filesystem::path& log,
             int runs_before);
-  ~Dashboard();
+  Dashboard(const Dashboard&) = delete;
+  Dashboard& operator=(const Dashboard&) = delete;
 
   const std::string& url() const noexcept;
   /// Observers of the rows of the log. Valid during the lifetime of *this.
@@ -43,8 +49,25 @@ class Dashboard {
   static constexpr int kFarewell_s = 10;  ///< a page may be busy drawing
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  using SteadyClock = std::chrono::steady_clock;
+  void publish();
+  std::string state_json() const;
+
+  DashboardContent content_;
+  const char* state_ = "starting";  ///< starting, running, stopping, estimating, ended
+  ExperimentProgress progress_;
+  int runs_before_;  ///< already complete in the log
+  SteadyClock::time_point start_ = SteadyClock::now();
+  double wall_s_ = 0.0;  ///< since the first cycle
+  Levels shown_levels_;
+  std::optional<int> exit_code_;  ///< set at the end
+  std::string message_;
+  std::function<PlantSnapshot()> plant_;
+  std::atomic<EventLog*> events_ = nullptr;
+  std::atomic<bool> aborted_ = false;
+  LiveLevels levels_;
+  LiveResponse response_;
+  std::unique_ptr<DashboardServer> server_;  // last: its threads use all other members
 };
 
 }  // namespace stageid
