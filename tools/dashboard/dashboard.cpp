@@ -7,7 +7,6 @@
 
 #include "acquisition/files/json_text.hpp"
 #include "tools/report/html_page.hpp"
-#include "tools/report/report_assets.hpp"
 #include "tools/report/timing_json.hpp"
 #include "tools/terminal/interrupt.hpp"
 
@@ -100,20 +99,6 @@ std::string dashboard_content_json(const ExperimentConfig& config, const Experim
   return script_safe(text_of(json));
 }
 
-std::string page_of(const ExperimentConfig& config, const ExperimentPlan& plan,
-                    const StageInfo& stage) {
-  return html_page({.title = fmt::format("{}: {}", stage.name, config.file.filename().string()),
-                    .object = "stageidDashboard",
-                    .policy = "; connect-src 'self'; base-uri 'none'; form-action 'none'",
-                    .without_script =
-                        "The dashboard needs JavaScript, which is included in this page; enable "
-                        "scripts to see it.",
-                    .css = report::dashboard_css,
-                    .js = report::dashboard_js,
-                    .content = dashboard_content_json(config, plan, stage),
-                    .blocks = ""});
-}
-
 }  // namespace
 
 Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
@@ -123,7 +108,9 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
       levels_(static_cast<Eigen::Index>(stage.actuators.size() + stage.sensors.size())),
       response_(log, config.frf, content_.response) {
   progress_.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
-  content_.page = page_of(config, plan, stage);
+  content_.page = html_page(HtmlPage::dashboard,
+                            fmt::format("{}: {}", stage.name, config.file.filename().string()),
+                            dashboard_content_json(config, plan, stage));
   content_.abort = [this] {
     aborted_ = true;
     request_interrupt();

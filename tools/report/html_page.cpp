@@ -51,19 +51,26 @@ std::string fill_page(std::string_view page,
 // Within <script> only "</script" and "<!--" are special, and both begin with '<'.
 std::string script_safe(std::string_view json) { return replaced(json, {{'<', "\\u003c"}}); }
 
-std::string html_page(const HtmlPage& page) {
-  return fill_page(report::page_html, {{"title", escape_html(page.title)},
-                                       {"object", page.object},
-                                       {"policy", page.policy},
-                                       {"without_script", page.without_script},
-                                       {"library_css", report::library_css},
-                                       {"css", report::page_css},
-                                       {"more_css", page.css},
-                                       {"library_js", report::library_js},
-                                       {"js", page.js},
-                                       {"licence", escape_html(report::library_licence)},
-                                       {"content", page.content},
-                                       {"blocks", page.blocks}});
+std::string html_page(HtmlPage page, std::string_view title, std::string_view content,
+                      std::string_view blocks) {
+  const bool live = page == HtmlPage::dashboard;
+  return fill_page(
+      report::page_html,
+      {{"title", escape_html(title)},
+       {"object", live ? "stageidDashboard" : "stageidReport"},
+       {"policy", live ? "; connect-src 'self'; base-uri 'none'; form-action 'none'" : ""},
+       {"without_script", live ? "The dashboard needs JavaScript, which is included in this page; "
+                                 "enable scripts to see it."
+                               : "This report needs JavaScript, which is included in this file; "
+                                 "enable scripts to see the plots."},
+       {"library_css", report::library_css},
+       {"css", report::page_css},
+       {"more_css", live ? report::dashboard_css : ""},
+       {"library_js", report::library_js},
+       {"js", live ? report::dashboard_js : report::page_js},
+       {"licence", escape_html(report::library_licence)},
+       {"content", content},
+       {"blocks", blocks}});
 }
 
 }  // namespace stageid

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -8,19 +9,13 @@ namespace stageid {
 /// Escapes JSON for use inside <script>: no '<'. @pre `json` is JSON.
 std::string script_safe(std::string_view json);
 
-/// What the report and the dashboard have of their own.
-struct HtmlPage {
-  std::string title;                ///< plain text
-  std::string_view object;          ///< name of the script's object in `window`
-  std::string_view policy;          ///< more directives of the content security policy
-  std::string_view without_script;  ///< shown if scripts are disabled
-  std::string_view css;             ///< besides that of the report
-  std::string_view js;
-  std::string content;  ///< script_safe() JSON, with the id "content"
-  std::string blocks;   ///< elements with packed numbers
-};
+enum class HtmlPage : std::uint8_t { report, dashboard };
 
-/// One self-contained page with the styles of the report and the plot library.
-std::string html_page(const HtmlPage& page);
+/// One self-contained page with its script, its styles and the plot library.
+/// @param title plain text
+/// @param content script_safe() JSON for the script
+/// @param blocks elements with packed numbers
+std::string html_page(HtmlPage page, std::string_view title, std::string_view content,
+                      std::string_view blocks = {});
 
 }  // namespace stageid

@@ -6,7 +6,6 @@
 
 #include "acquisition/files/output_file.hpp"
 #include "tools/report/html_page.hpp"
-#include "tools/report/report_assets.hpp"
 #include "tools/report/report_json.hpp"
 
 namespace stageid {
@@ -83,15 +82,7 @@ std::string block_elements(const std::vector<report::Block>& blocks) {
 std::string report_page(const ReportData& data) {
   check_data(data);
   const report::PageContent content = report::page_content(data);
-  return html_page({.title = data.title,
-                    .object = "stageidReport",
-                    .policy = "",
-                    .without_script = "This report needs JavaScript, which is included in this "
-                                      "file; enable scripts to see the plots.",
-                    .css = "",
-                    .js = report::page_js,
-                    .content = content.json,
-                    .blocks = block_elements(content.blocks)});
+  return html_page(HtmlPage::report, data.title, content.json, block_elements(content.blocks));
 }
 
 void write_report(const std::filesystem::path& file, const ReportData& data) {
