@@ -1,6 +1,6 @@
 // Levels of every channel against its limit.
 
-const levels = { rows: [], largest: [] };
+const levels = { rows: [] };
 
 function buildLevels() {
   const body = section('levels', 'Levels', 'Levels against limits',

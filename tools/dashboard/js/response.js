@@ -13,7 +13,6 @@ function showResponse() {
   if (matrix.panels.length === 0) {
     buildMatrix();
     buildEntry();
-    matrix.onselect = (channel) => showEntry(channel);
     selectPanel(0);
     buildCmif();
     for (const id of ['timing', 'events']) moveToEnd(id);

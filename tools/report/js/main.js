@@ -9,7 +9,6 @@ function buildPage() {
   if (content.frf) {
     buildMatrix();
     buildEntry();
-    matrix.onselect = (channel) => showEntry(channel);
     afterFirstPaint(() => selectPanel(0));
   }
   if (content.arrays.cmif) buildCmif();

@@ -1,6 +1,6 @@
 // The element-wise Bode matrix: one small canvas per channel, drawn when it becomes visible.
 
-const matrix = { panels: [], selected: -1, onselect: null, timesOmega: 0, pending: 0 };
+const matrix = { panels: [], timesOmega: 0, pending: 0 };
 
 // Factor of the magnitudes: 1 or omega^2 (acceleration instead of position).
 function lineScale() {
@@ -45,7 +45,7 @@ function buildMatrix() {
   const times = element('input', { type: 'checkbox', id: 'times-omega', onchange: () => {
     matrix.timesOmega = times.checked ? 2 : 0;
     redrawMatrix();
-    if (matrix.onselect) matrix.onselect(matrix.selected);
+    showEntry(entry.channel);
   } });
   legend.append(element('label', { class: 'toggle', for: 'times-omega' }, times, ' times \u03c9\u00b2'));
   const grid = element('div', {
@@ -93,8 +93,7 @@ function selectPanel(channel) {
     button.setAttribute('aria-pressed', String(i === channel));
     button.tabIndex = i === channel ? 0 : -1;
   });
-  matrix.selected = channel;
-  if (matrix.onselect) matrix.onselect(channel);
+  showEntry(channel);
 }
 
 function moveFocus(event) {

@@ -1,6 +1,6 @@
 // Pairs and bands in which the scatter over realizations is larger than noise: nonlinear distortions.
 
-const distortion = { figure: null, text: null };
+const distortion = { figure: null };
 
 function buildNonlinearity() {
   const { bands, chance, settled } = content.nonlinearity;
@@ -8,11 +8,11 @@ function buildNonlinearity() {
     'the height is the distortion of one realization over |G| on a logarithmic scale from 0.01\u00a0% to 100\u00a0%. ' +
     'Coloured: above noise (p\u00a0<\u00a0' + chance + ' of the F test); grey: within the noise' +
     (settled.every(Boolean) ? '.' : '; outlined: undetermined, the records contain a transient or a drift there.'));
-  distortion.text = element('output', { class: 'values' });
+  const text = element('output', { class: 'values' });
   distortion.figure = canvasFigure('nonlinearity-plot', distortionSummary(), drawNonlinearity, 'tall');
-  tellUnderPointer(distortion.figure, distortion.text, distortionAt);
+  tellUnderPointer(distortion.figure, text, distortionAt);
   body.append(element('div', { class: 'plot-head' }, element('p', null, distortionSummary() + '.'), saveButtons('nonlinear distortions', savedNonlinearity)),
-    distortion.figure.node, element('p', { class: 'plot-title' }, distortion.text),
+    distortion.figure.node, element('p', { class: 'plot-title' }, text),
     folded('Table of the bands and pairs above noise', distortionTable(bands)));
 }
 

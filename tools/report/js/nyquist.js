@@ -1,12 +1,12 @@
 // The chosen element in the complex plane: measured lines with their 95 % circles, and the model.
 
-const nyquist = { figure: null, shown: null, text: null };
+const nyquist = { figure: null, shown: null, title: null };
 
 function buildNyquist() {
   const figure = canvasFigure('entry-nyquist', 'Element in the complex plane', drawNyquist, 'square');
   const title = element('p', { class: 'plot-title', id: 'nyquist-title' }, 'Nyquist');
   const text = element('output', { class: 'values', id: 'nyquist-values' });
-  Object.assign(nyquist, { figure, title, text });
+  Object.assign(nyquist, { figure, title });
   tellUnderPointer(figure, text, nearestText);
   figure.node.addEventListener('keydown', bandKey);
   return element('div', { class: 'nyquist' }, element('div', { class: 'plot-head' }, title, saveButtons('Nyquist', savedNyquist)), figure.node,
