@@ -46,24 +46,29 @@ struct Based {
   const Eigen::MatrixXcd* values = nullptr;
 };
 
+/// Encodings of complex numbers and their names in the page.
+struct ComplexType {
+  const char* name;
+  ComplexCode (*encode)(const Eigen::MatrixXcd& values, Expectation expected);
+};
+constexpr ComplexType kFloat32 = {"c64", encode_complex_float32};
+constexpr ComplexType kBlock16 = {"c40", encode_complex_block16};
+
 /// Blocks with their descriptions, always added together.
-class Arrays {
- public:
+struct Arrays {
   void add(const std::string& id, const char* type, std::string text, Json more = Json::object()) {
     more["type"] = type;
-    description_[id] = std::move(more);
-    blocks_.push_back({id, std::move(text)});
+    description[id] = std::move(more);
+    blocks.push_back({id, std::move(text)});
   }
   /// Expected from the decoded numbers of `base` (none: 0), extrapolated by `order`. @returns the decoded
-  Eigen::MatrixXcd add_float32(const std::string& id, const Eigen::MatrixXcd& values, int order,
-                               const Based& base = {}) {
-    return add_complex(id, "c64", encode_complex_float32(values, {base.values, order}), order,
-                       base);
-  }
-  Eigen::MatrixXcd add_block16(const std::string& id, const Eigen::MatrixXcd& values, int order,
-                               const Based& base = {}) {
-    return add_complex(id, "c40", encode_complex_block16(values, {base.values, order}), order,
-                       base);
+  Eigen::MatrixXcd add(const std::string& id, const ComplexType& type,
+                       const Eigen::MatrixXcd& values, int order, const Based& base = {}) {
+    ComplexCode code = type.encode(values, {base.values, order});
+    Json more = {{"order", order}};
+    if (base.values != nullptr) more["base"] = base.id;
+    add(id, type.name, std::move(code.text), std::move(more));
+    return std::move(code.decoded);
   }
   /// Square roots of variances by std::sqrt, because that of Eigen is an approximation on some machines, and a page
   /// must not depend on the machine.
@@ -74,20 +79,9 @@ class Arrays {
     LogBytes bytes = encode_log_bytes(values);
     add(id, "log8", std::move(bytes.text), {{"low", bytes.low}, {"step", bytes.step}});
   }
-  Json& description() { return description_; }
-  std::vector<Block>& blocks() { return blocks_; }
 
- private:
-  Eigen::MatrixXcd add_complex(const std::string& id, const char* type, ComplexCode code, int order,
-                               const Based& base) {
-    Json more = {{"order", order}};
-    if (base.values != nullptr) more["base"] = base.id;
-    add(id, type, std::move(code.text), std::move(more));
-    return std::move(code.decoded);
-  }
-
-  Json description_ = Json::object();
-  std::vector<Block> blocks_;
+  Json description = Json::object();
+  std::vector<Block> blocks;
 };
 
 /// The model is stored as the residual, so that small errors of small numbers remain small in both.
@@ -96,22 +90,22 @@ void add_measured(const ReportData& data, Arrays& arrays) {
   Eigen::MatrixXcd residual;
   Based from_residual;
   if (data.model_response.size() > 0) {
-    residual = arrays.add_block16("residual", frf.response - data.model_response, 0);
+    residual = arrays.add("residual", kBlock16, frf.response - data.model_response, 0);
     from_residual = {"residual", &residual};
   }
   // Measured minus residual is the model, which is smooth; second differences would amplify noise.
   const int order = from_residual.values != nullptr ? 2 : 1;
   const Eigen::MatrixXcd response =
-      arrays.add_float32("response", frf.response, order, from_residual);
+      arrays.add("response", kFloat32, frf.response, order, from_residual);
   if (!data.comparison) return;
   Eigen::MatrixXcd other_model;
   Based like = {"response", &response};
   if (data.comparison->model_response.size() > 0) {
-    other_model = arrays.add_block16("other_model", data.comparison->model_response, 2);
+    other_model = arrays.add("other_model", kBlock16, data.comparison->model_response, 2);
     like = {"other_model", &other_model};
   }
   if (data.comparison->response.size() > 0)
-    arrays.add_block16("other_response", data.comparison->response, 0, like);
+    arrays.add("other_response", kBlock16, data.comparison->response, 0, like);
 }
 
 void add_response(const ReportData& data, Arrays& arrays) {
@@ -296,8 +290,8 @@ PageContent page_content(const ReportData& data) {
   if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
   if (data.comparison) json["comparison"] = comparison_json(data);
   if (data.validation) json["validation"] = validation_json(*data.validation);
-  json["arrays"] = std::move(arrays.description());
-  return {text_of(json), std::move(arrays.blocks())};
+  json["arrays"] = std::move(arrays.description);
+  return {text_of(json), std::move(arrays.blocks)};
 }
 
 }  // namespace stageid::report
