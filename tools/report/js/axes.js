@@ -66,9 +66,11 @@ function phaseTicks(min, max, pixels) {
 
 const phaseAxis = { axisLabelWidth: 58, ticker: phaseTicks };
 
-// A plot of dygraphs in the element with that id. It follows the size of the page.
-function makeGraph(id, rows, options) {
-  const graph = new Dygraph(document.getElementById(id), rows, { ...plotBasics, ...plotColours(), ...options });
+// A plot of dygraphs in the element with that id; series() returns the styles of its lines in the current colours.
+function makeGraph(id, rows, series, options) {
+  const graph = new Dygraph(document.getElementById(id), rows, { ...plotBasics, ...plotColours(), series: series(), ...options });
+  graph.recolour = () => graph.updateOptions({ ...plotColours(), series: series() });
+  graph.followsBand = Boolean(options.dateWindow);
   plots.add(graph);
   return graph;
 }
@@ -77,8 +79,7 @@ function makeGraph(id, rows, options) {
 function lineGraph(id, labels, rows, options) {
   const line = { graph: null };
   const series = () => ({ [labels[1]]: { color: palette().curves[0] } });
-  afterFirstPaint(() => { line.graph = makeGraph(id, rows, { labels, logscale: true, series: series(), ...options }); });
-  onColours(() => recolourGraph(line.graph, series()));
+  afterFirstPaint(() => { line.graph = makeGraph(id, rows, series, { labels, logscale: true, ...options }); });
   return line;
 }
 
@@ -86,11 +87,6 @@ function removeGraph(graph) {
   if (!graph) return;
   plots.delete(graph);
   graph.destroy();
-}
-
-// To be called after a change of the colours, with the styles of the series in them.
-function recolourGraph(graph, series) {
-  if (graph) graph.updateOptions({ ...plotColours(), series });
 }
 
 // Options shared by all plots, in the current colours.

@@ -45,6 +45,7 @@ function tellBand() {
   band.telling = true;
   try {
     for (const follower of band.followers) follower(...shownBand());
+    for (const plot of plots) if (plot.followsBand) showBandIn(plot);
   } finally {
     band.telling = false;
   }
@@ -131,7 +132,6 @@ function tiedToBand() {
 }
 
 function showBandIn(graph) {
-  if (!graph) return;
   const [low, high] = graph.xAxisRange();
   const shown = shownBand();
   if (Math.abs(low / shown[0] - 1) > 1e-12 || Math.abs(high / shown[1] - 1) > 1e-12) graph.updateOptions({ dateWindow: shown });

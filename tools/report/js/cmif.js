@@ -9,12 +9,10 @@ function buildCmif() {
   if (content.candidates.length) legend.append(element('span', { class: 'mark ring' }, 'starting value (' + content.candidates.length + ')'));
   if (identifiedModes().length) legend.append(element('span', { class: 'mark line' }, 'identified mode (' + identifiedModes().length + ')'));
   legend.append(saveButtons('CMIF', savedCmif));
-  followBand(() => showBandIn(cmif.graph));
   body.append(legend, bandPlot('cmif-plot', 'tall', { 'aria-labelledby': 'cmif-title' }),
     element('p', { class: 'axis-title' }, 'Frequency [Hz]'),
     content.arrays.cmif_deviation ? element('p', { class: 'quiet' }, 'The shaded bands contain the true values with 95 % probability, to first order in the errors of the elements.') : null);
   afterFirstPaint(drawCmif);
-  onColours(() => recolourGraph(cmif.graph, cmifSeries()));
 }
 
 function curveNames() {
@@ -40,8 +38,8 @@ function drawCmif() {
   const cell = (place) => bar(Math.max(values[place], floor), deviation && 1.96 * deviation[place], floor);
   const rows = Array.from(f, (hz, k) => [hz, ...curveNames().map((_, i) => cell(i * f.length + k))]);
   removeGraph(cmif.graph);
-  cmif.graph = makeGraph('cmif-plot', rows, {
-    labels: ['f', ...curveNames()], logscale: true, customBars: true, series: cmifSeries(), ...tiedToBand(),
+  cmif.graph = makeGraph('cmif-plot', rows, cmifSeries, {
+    labels: ['f', ...curveNames()], logscale: true, customBars: true, ...tiedToBand(),
     axes: { x: frequencyAxis, y: magnitudeAxis }, underlayCallback: markModes,
   });
 }

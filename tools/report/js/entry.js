@@ -33,10 +33,7 @@ function buildEntry() {
       buildNyquist()),
     buildEntryTable(),
     element('p', { class: 'quiet' }, entryHelp()));
-  onColours(recolourEntry);
   followBand(() => {
-    showBandIn(entry.magnitude);
-    showBandIn(entry.phase);
     if (entry.magnitude) showNyquist(entry.channel);
     fillEntryTable();
   });
@@ -52,10 +49,6 @@ function entryHelp() {
     ? 'total variance: noise and nonlinear distortions' : 'noise variance') + '; circular complex Gaussian). ' : '';
   return known + 'Drag to zoom, Shift-drag to pan, double-click for the whole band; all plots of the page move together. ' +
     'Click a name above to show or hide its trace.';
-}
-
-function recolourEntry() {
-  for (const plot of [entry.magnitude, entry.phase]) if (plot) recolourGraph(plot, traceStyles(plot.getLabels().slice(1)));
 }
 
 function pickEntry() {
@@ -156,8 +149,8 @@ function traceStyles(names) {
 }
 
 function plotTable(id, table, axisY, more) {
-  return makeGraph(id, table.rows, {
-    customBars: true, labels: ['f', ...table.names], series: traceStyles(table.names),
+  return makeGraph(id, table.rows, () => traceStyles(table.names), {
+    customBars: true, labels: ['f', ...table.names],
     visibility: table.names.map((name) => !entry.hidden.has(name)),
     axes: { x: frequencyAxis, y: axisY }, highlightCallback: tellValues, unhighlightCallback: () => tellValues(),
     ...tiedToBand(), ...more,

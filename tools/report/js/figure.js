@@ -8,9 +8,8 @@ function canvasFigure(id, label, draw, kind) {
     const { clientWidth: width, clientHeight: height } = node;
     if (width > 0 && height > 0) draw(sharpContext(canvas, width, height), width, height);
   };
-  const figure = { node, draw, redraw, resize: redraw };
+  const figure = { node, draw, redraw, resize: redraw, recolour: redraw };
   plots.add(figure);
-  onColours(redraw);
   new ResizeObserver(redraw).observe(node);
   return figure;
 }

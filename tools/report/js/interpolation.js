@@ -27,7 +27,6 @@ function buildInterpolation() {
   const line = lineGraph('interpolation-plot', ['f', 'misfit'], Array.from(array('frequency'), (hz, k) => [hz, misfit[k]]), {
     axes: { x: frequencyAxis, y: magnitudeAxis }, ...tiedToBand(),
   });
-  followBand(() => showBandIn(line.graph));
 }
 
 function misfitText() {

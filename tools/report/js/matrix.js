@@ -61,7 +61,7 @@ function buildMatrix() {
   followBand(() => {
     if (!matrix.pending) matrix.pending = requestAnimationFrame(redrawMatrix);
   });
-  onColours(redrawMatrix);
+  plots.add({ resize: () => {}, recolour: redrawMatrix });
   watchPanels();
 }
 

@@ -16,25 +16,21 @@ const palettes = {
 
 const darkScheme = window.matchMedia('(prefers-color-scheme: dark)');
 let printing = false;
-const redraws = [];  // called after a change of the colours
 
 function palette() {
   return darkScheme.matches && !printing ? palettes.dark : palettes.light;
 }
 
-function onColours(redraw) {
-  redraws.push(redraw);
-}
+// Figures {resize, recolour}: those of dygraphs and others.
+const plots = new Set();
 
 function recolour() {
-  for (const redraw of redraws) redraw();
+  for (const plot of plots) plot.recolour();
 }
 
 darkScheme.addEventListener('change', recolour);
 
 // Plots keep their pixels on paper, so they are resized to the page (class "printing") before printing.
-const plots = new Set();  // of dygraphs and figures
-
 function print(on) {
   printing = on;
   document.documentElement.classList.toggle('printing', on);
