@@ -38,21 +38,21 @@ struct CountRule {
 
 /// A value that may have several forms.
 struct FlexibleValue {
-  std::string word;             ///< set if the value is a word
-  std::vector<double> numbers;  ///< one entry for a bare number
-  bool is_list = false;         ///< the numbers are in brackets
-  std::vector<std::pair<double, double>> pairs;
+  std::string word;                  ///< set if the value is a word
+  std::vector<double> numbers = {};  ///< one entry for a bare number
+  bool is_list = false;              ///< the numbers are in brackets
+  std::vector<std::pair<double, double>> pairs = {};
 };
 
 /// Allowed forms of a FlexibleValue.
 struct FlexibleRule {
-  std::vector<std::string> words;  ///< allowed words
-  bool any_text = false;           ///< or any text, described by `text_meaning`
-  std::string_view text_meaning;
+  std::vector<std::string> words = {};  ///< allowed words
+  bool any_text = false;                ///< or any text, described by `text_meaning`
+  std::string_view text_meaning = {};
   bool number = false;
   bool list = false;
-  bool pairs = false;  ///< list of [number, number]
-  NumberRule rule;     ///< of every number
+  bool pairs = false;    ///< list of [number, number]
+  NumberRule rule = {};  ///< of every number
 };
 
 /// The single description of a configuration: functions `describe(ConfigVisitor&, Config&)` name every key once. A

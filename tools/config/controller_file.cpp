@@ -92,14 +92,15 @@ std::complex<double> polynomial(const std::vector<double>& coefficients, std::co
   return sum;
 }
 
-NominalStage of_state_space(const ControllerFile& f) {
+using ControllerResponse = decltype(NominalStage::controller);
+
+ControllerResponse response_of_state_space(const ControllerFile& f) {
   const auto n_y = static_cast<Index>(f.linear.sensors.size());
   const auto n_u = static_cast<Index>(f.linear.actuators.size());
   const LinearControllerKeys::StateSpace& s = f.linear.state_space;
   const Index n = s.a.empty() ? 0 : static_cast<Index>(s.b.size()) / n_y;
-  NominalStage nominal;
-  nominal.controller = [f, A = matrix_of(s.a, n, n), B = matrix_of(s.b, n, n_y),
-                        C = matrix_of(s.c, n_u, n), D = matrix_of(s.d, n_u, n_y)](double hz) {
+  return [f, A = matrix_of(s.a, n, n), B = matrix_of(s.b, n, n_y), C = matrix_of(s.c, n_u, n),
+          D = matrix_of(s.d, n_u, n_y)](double hz) {
     Eigen::MatrixXcd response = D.cast<std::complex<double>>();
     if (A.rows() > 0) {
       const Eigen::MatrixXcd M =
@@ -108,12 +109,10 @@ NominalStage of_state_space(const ControllerFile& f) {
     }
     return Eigen::MatrixXcd(-response);
   };
-  return nominal;
 }
 
-NominalStage of_transfer(const ControllerFile& f) {
-  NominalStage nominal;
-  nominal.controller = [f](double hz) {
+ControllerResponse response_of_transfer(const ControllerFile& f) {
+  return [f](double hz) {
     Eigen::MatrixXcd response = Eigen::MatrixXcd::Zero(
         static_cast<Index>(f.linear.actuators.size()), static_cast<Index>(f.linear.sensors.size()));
     const std::complex<double> x = variable_of(f, hz);
@@ -125,7 +124,6 @@ NominalStage of_transfer(const ControllerFile& f) {
     }
     return response;
   };
-  return nominal;
 }
 
 /// Interpolates linearly between two lines.
@@ -179,12 +177,14 @@ LinearControllerKeys read_discrete_controller(const YamlDocument& document,
 NominalStage read_controller_file(const YamlDocument& document) {
   const ControllerFile f = read_keys(document);
   const std::filesystem::path folder = document.file().parent_path();
-  NominalStage nominal = f.linear.has_state_space     ? of_state_space(f)
-                         : !f.linear.transfer.empty() ? of_transfer(f)
-                                                      : of_measured(folder / f.measured);
-  if (f.measured.empty()) {
+  NominalStage nominal;
+  if (!f.measured.empty()) {
+    nominal = of_measured(folder / f.measured);
+  } else {
     nominal.sensors = f.linear.sensors;
     nominal.actuators = f.linear.actuators;
+    nominal.controller =
+        f.linear.has_state_space ? response_of_state_space(f) : response_of_transfer(f);
   }
   if (!f.stage.empty()) {
     const NominalStage stage = nominal_stage(load_stage_config(folder / f.stage).spec);

@@ -19,11 +19,17 @@ namespace {
 
 constexpr const char* kPeer = "peer";
 
-template <typename Member>
-Eigen::VectorXd limit_vector(const std::vector<ChannelConfig>& channels, Member member) {
+/// @param value a member of ChannelConfig, or a function of it
+template <typename Value>
+Eigen::VectorXd per_channel(const std::vector<ChannelConfig>& channels, Value value) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(channels.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i)
-    values[i] = channels[static_cast<std::size_t>(i)].*member;
+  std::ranges::transform(channels, values.data(), value);
+  return values;
+}
+
+Eigen::VectorXd limit_vector(const std::vector<ChannelConfig>& channels,
+                             double ChannelConfig::*limit) {
+  Eigen::VectorXd values = per_channel(channels, limit);
   return values.array().isInf().all() ? Eigen::VectorXd() : values;
 }
 
@@ -57,27 +63,18 @@ Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channe
   return shape;
 }
 
-/// Omitted entries are `scale` times the window.
-Eigen::VectorXd by_window(const std::vector<ChannelConfig>& sensors, double ChannelConfig::*member,
-                          double scale) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(sensors.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    const ChannelConfig& sensor = sensors[static_cast<std::size_t>(i)];
-    values[i] = sensor.*member > 0.0 ? sensor.*member : scale * sensor.window_m;
-  }
-  return values;
-}
-
 void take_limits(const StageFile& file, WaferStageSpec& spec) {
   spec.limits.actuator_n = limit_vector(file.actuators, &ChannelConfig::limit_n);
   spec.limits.slew_n_s = limit_vector(file.actuators, &ChannelConfig::slew_n_s);
   spec.limits.thermal_rms_n = limit_vector(file.actuators, &ChannelConfig::thermal_rms_n);
   spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
-  spec.limits.hard_window_m = by_window(file.sensors, &ChannelConfig::hard_window_m, 2.0);
-  spec.limits.deviation_m = by_window(file.sensors, &ChannelConfig::deviation_m, 0.5);
-  for (std::size_t i = 0; i < file.sensors.size(); ++i)
-    if (is_acceleration(file.sensors[i].channel))  // not predicted
-      spec.limits.deviation_m[static_cast<Eigen::Index>(i)] = kNoLimit;
+  spec.limits.hard_window_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
+    return sensor.hard_window_m > 0.0 ? sensor.hard_window_m : 2.0 * sensor.window_m;
+  });
+  spec.limits.deviation_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
+    if (is_acceleration(sensor.channel)) return kNoLimit;  // not predicted
+    return sensor.deviation_m > 0.0 ? sensor.deviation_m : 0.5 * sensor.window_m;
+  });
   spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
   spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
 }
@@ -117,9 +114,7 @@ void take_controller(StageConfig& config, const StageFile& file,
     take_linear_controller(linear, info.actuators, info.sensors, controller);
   }
   controller.feed_forward_ramp_s = config.ramp_s;
-  controller.feed_forward_n.resize(static_cast<Eigen::Index>(file.actuators.size()));
-  for (Eigen::Index i = 0; i < controller.feed_forward_n.size(); ++i)
-    controller.feed_forward_n[i] = file.actuators[static_cast<std::size_t>(i)].bias_n;
+  controller.feed_forward_n = per_channel(file.actuators, &ChannelConfig::bias_n);
 }
 
 void complete_spec(StageConfig& config, const StageFile& file) {
@@ -146,15 +141,6 @@ void complete_spec(StageConfig& config, const StageFile& file) {
   spec.limits.motion =
       rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors, inertia);
 }
-
-}  // namespace
-
-void describe_stage_keys(ConfigVisitor& visitor) {
-  StageFile file;
-  describe_stage_file(visitor, file);
-}
-
-namespace {
 
 StageFile stage_file(const YamlDocument& document) {
   StageFile file;
@@ -189,6 +175,11 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
 }
 
 }  // namespace
+
+void describe_stage_keys(ConfigVisitor& visitor) {
+  StageFile file;
+  describe_stage_file(visitor, file);
+}
 
 StageConfig load_stage_config(const std::filesystem::path& path) {
   const YamlDocument document = YamlDocument::read(path);

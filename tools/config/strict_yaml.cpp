@@ -215,14 +215,9 @@ void check_text(const YamlDocument& document) {
 
 }  // namespace
 
-const YamlNode::Entry* YamlNode::entry(std::string_view key) const {
-  const auto found = std::ranges::find(entries, key, &Entry::key);
-  return found == entries.end() ? nullptr : &*found;
-}
-
 const YamlNode* YamlDocument::value(const YamlNode& map, std::string_view key) const {
-  const YamlNode::Entry* entry = map.entry(key);
-  return entry == nullptr ? nullptr : &node(entry->value);
+  const auto found = std::ranges::find(map.entries, key, &YamlNode::Entry::key);
+  return found == map.entries.end() ? nullptr : &node(found->value);
 }
 
 YamlDocument::YamlDocument(std::filesystem::path file, std::string text)

@@ -29,9 +29,6 @@ struct YamlNode {
   bool plain = true;  ///< scalar: not in quotes
   std::vector<std::size_t> items;
   std::vector<Entry> entries;
-
-  /// Null if a map lacks the key.
-  const Entry* entry(std::string_view key) const;
 };
 
 /// A YAML file as a tree with positions. Stricter than YAML: one document, UTF-8, text keys, no duplicate keys, no

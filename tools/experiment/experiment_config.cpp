@@ -25,7 +25,7 @@ struct ExperimentFile {
   std::vector<std::string> axes;
   FlexibleValue rms_n;
   FlexibleValue peak_n;
-  FlexibleValue shape = {"flat", {}, false, {}};
+  FlexibleValue shape = {"flat"};
   std::vector<double> band_hz;
   double period_s = 0.0;
   ExperimentConfig config;  // without what is derived from the keys above
@@ -57,10 +57,7 @@ void describe_neutral(ConfigVisitor& v, const char* key, const char* si_key, Fle
 }
 
 void describe_level(ConfigVisitor& v, ExperimentFile& f) {
-  FlexibleRule rule;
-  rule.number = true;
-  rule.list = true;
-  rule.rule = positive("N");
+  FlexibleRule rule = {.number = true, .list = true, .rule = positive("N")};
   v.flexible("rms_n", f.rms_n, rule, kOptional, "rms of each axis; a list: one per axis");
   v.flexible("peak_n", f.peak_n, rule, kOptional, "instead: largest sample of each axis");
   rule.rule = positive("");
@@ -89,11 +86,7 @@ void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
             "lowest and highest frequency");
   v.require(f.band_hz.size() != 2 || f.band_hz[0] < f.band_hz[1], "band_hz",
             "band_hz: the band is empty; write [LOW, HIGH] with LOW < HIGH");
-  FlexibleRule shape;
-  shape.words = {"flat"};
-  shape.pairs = true;
-  shape.rule = positive("");
-  v.flexible("shape", f.shape, shape, kOptional,
+  v.flexible("shape", f.shape, {.words = {"flat"}, .pairs = true, .rule = positive("")}, kOptional,
              "amplitude spectrum: flat, or [frequency_hz, relative amplitude] points, log-log "
              "interpolation");
   const bool increasing =
@@ -313,15 +306,6 @@ void complete(ExperimentFile& file, const YamlDocument& document) {
   config.measurement_id = measurement_id(file);
 }
 
-}  // namespace
-
-void describe_experiment_keys(ConfigVisitor& visitor) {
-  ExperimentFile file;
-  describe(visitor, file);
-}
-
-namespace {
-
 std::filesystem::path stage_file_of(const std::filesystem::path& path, const YamlDocument& document,
                                     const std::string& stage) {
   std::filesystem::path file = (path.parent_path() / stage).lexically_normal();
@@ -335,6 +319,11 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
 }
 
 }  // namespace
+
+void describe_experiment_keys(ConfigVisitor& visitor) {
+  ExperimentFile file;
+  describe(visitor, file);
+}
 
 ExperimentConfig load_experiment_config(const std::filesystem::path& path) {
   const YamlDocument document = YamlDocument::read(path);

@@ -17,12 +17,8 @@ namespace {
 
 /// One entry of `submodels`, with the parts of --submodel as keys.
 void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
-  FlexibleValue order = {"", {0.0}, false, {}};
-  FlexibleRule rule;
-  rule.words = {"auto"};
-  rule.number = true;
-  rule.rule = not_negative("");
-  v.flexible("n", order, rule, kOptional,
+  FlexibleValue order = {"", {0.0}};
+  v.flexible("n", order, {.words = {"auto"}, .number = true, .rule = not_negative("")}, kOptional,
              "order of the denominator; auto: twice the number of modes found by a search");
   r.order_by_search = order.word == "auto";
   const double n = order.numbers.empty() ? 0.0 : order.numbers.front();
@@ -68,12 +64,11 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   }
 
   describe_submodels(v, f);
-  FlexibleValue modes = {"by_submodels", {}, false, {}};
-  FlexibleRule modes_rule;
-  modes_rule.words = {"auto", "none", "by_submodels"};
-  modes_rule.number = true;
-  modes_rule.list = true;
-  modes_rule.rule = positive("");
+  FlexibleValue modes = {"by_submodels"};
+  const FlexibleRule modes_rule = {.words = {"auto", "none", "by_submodels"},
+                                   .number = true,
+                                   .list = true,
+                                   .rule = positive("")};
   v.flexible("modes", modes, modes_rule, kOptional,
              "auto, none, a number of modes, or a list of frequencies in Hz; by_submodels: none if "
              "submodels are listed, else auto");
@@ -112,12 +107,9 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   /// Reads a word or a rank. @returns the rank; 0: a word
   const auto rank = [&](const char* key, std::string& word_given, std::vector<std::string> words,
                         const char* help) {
-    FlexibleValue given = {word_given, {}, false, {}};
-    FlexibleRule rule;
-    rule.words = std::move(words);
-    rule.number = true;
-    rule.rule = positive("");
-    v.flexible(key, given, rule, kOptional, help);
+    FlexibleValue given = {word_given};
+    v.flexible(key, given, {.words = std::move(words), .number = true, .rule = positive("")},
+               kOptional, help);
     word_given = given.word;
     if (given.numbers.empty()) return 0;
     const double number = given.numbers.front();
@@ -126,12 +118,11 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
     return static_cast<int>(std::min(number, 1000.0));
   };
 
-  FlexibleValue delay = {"by_frf", {}, false, {}};
-  FlexibleRule delay_rule;
-  delay_rule.words = {to_string(DelayModel::estimate), to_string(DelayModel::per_channel),
-                      "by_frf"};
-  delay_rule.number = true;
-  delay_rule.rule = any_number("s");
+  FlexibleValue delay = {"by_frf"};
+  const FlexibleRule delay_rule = {
+      .words = {to_string(DelayModel::estimate), to_string(DelayModel::per_channel), "by_frf"},
+      .number = true,
+      .rule = any_number("s")};
   v.flexible("delay_s", delay, delay_rule, kOptional,
              "delay. A number: known; estimate: one for the plant; per_channel: one per channel; "
              "by_frf: from the FRF");
