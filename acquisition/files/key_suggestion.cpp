@@ -76,6 +76,11 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
   return best;
 }
 
+std::string nearest_hint(const std::string& word, const std::vector<std::string>& allowed) {
+  const std::string nearest = nearest_word(word, allowed);
+  return nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest);
+}
+
 std::string suggest_key(const std::string& unknown, const std::vector<std::string>& allowed) {
   for (const std::string& key : allowed)
     if (stem(key) == stem(unknown) && key != unknown && stem(key) != key)

@@ -13,4 +13,7 @@ std::string suggest_key(const std::string& unknown, const std::vector<std::strin
 /// swap of neighbours counts as one). Empty if none is near.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& allowed);
 
+/// " (did you mean 'X'?)" with the nearest word, to follow a list of them; empty if none is near.
+std::string nearest_hint(const std::string& word, const std::vector<std::string>& allowed);
+
 }  // namespace stageid

@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -21,6 +20,7 @@
 #include "acquisition/files/version.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/commands/commands.hpp"
+#include "tools/fit/flag_values.hpp"
 #include "tools/manual/command_tree.hpp"
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -66,22 +66,14 @@ std::string mismatch(const std::string& what) {
   return what;
 }
 
-/// "--method: lmp not in {periodic,lpm}", with the names in the first braces of `choices`
-std::string choice(const std::string& place, const std::string& got, const std::string& choices) {
-  std::istringstream list(choices.substr(0, choices.find('}')));
-  std::vector<std::string> names;
-  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
-  const std::string nearest = nearest_word(got, names);
-  return fmt::format("{}: got '{}'; expected one of {}{}", place, got, fmt::join(names, ", "),
-                     nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest));
-}
-
+/// "--method: lmp not in {periodic,lpm}", "--can: Value 70 not in range 0 to 60"
 std::string invalid(const std::string& what) {
   const auto halves = split_at(what, ": ");
   if (!halves) return what;
   const auto& [place, problem] = *halves;
   if (const auto set = split_at(problem, " not in {"))
-    return choice(place, set->first, set->second);
+    return wrong_word(place, set->first,
+                      CLI::detail::split(set->second.substr(0, set->second.find('}')), ','));
   if (const auto range = split_at(problem, " not in range ");
       range && range->first.starts_with("Value "))
     if (const auto ends = split_at(range->second, " to "))
@@ -180,7 +172,7 @@ class Program {
     const CommandTree command = command_tree(*innermost);
     std::vector<std::string> known = names_of(command.commands);
     for (const CommandTree& tree : {command, command_tree(app_)})
-      for (const std::string& flag : flags_of(tree)) known.push_back(flag);
+      for (const std::string& flag : flags_of(tree.options)) known.push_back(flag);
     const std::vector<std::string> left_over = app_.remaining(true);
     for (const std::string& unknown : left_over) {
       const std::string nearest = nearest_word(unknown.substr(0, unknown.find('=')), known);

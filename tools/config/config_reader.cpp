@@ -298,9 +298,7 @@ class MapReader final : public ConfigVisitor {
                       nearest_of(node, names)));
   }
   static std::string nearest_of(const YamlNode& node, const std::vector<std::string>& words) {
-    const std::string nearest =
-        node.kind == YamlNode::Kind::scalar ? nearest_word(node.text, words) : "";
-    return nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest);
+    return node.kind == YamlNode::Kind::scalar ? nearest_hint(node.text, words) : "";
   }
 
   const YamlDocument& document_;

@@ -75,13 +75,10 @@ void parse_weighting(const std::string& text, FitRequest& request) {
     request.weighting = *weighting;
     return;
   }
-  if (text.find('.') == std::string::npos && text.find('/') == std::string::npos) {
-    const std::string nearest = nearest_word(text, offered);
+  if (text.find('.') == std::string::npos && text.find('/') == std::string::npos)
     refuse("--weighting", text,
            fmt::format("{}, or the name of an HDF5 file with /weights or /weight_matrices{}",
-                       fmt::join(offered, ", "),
-                       nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
-  }
+                       fmt::join(offered, ", "), nearest_hint(text, offered)));
   request.weighting = Weighting::user;
   request.weight_file = text;
 }
@@ -114,10 +111,9 @@ RigidBodyRequest parse_rigid_body(const std::string& text) {
   if (text.empty()) return {};
   if (text.starts_with(kSuspension)) return {Kind::suspension, 0, parse_suspension(text)};
   if (const auto kind = from_word<Kind>(text); kind && *kind != Kind::by_submodels) return {*kind};
-  const std::string nearest =
-      nearest_word(text.substr(0, text.find(':')), words_before(Kind::by_submodels));
-  if (!parse_number(text) && !nearest.empty())
-    refuse("--rigid-body", text, fmt::format("{} (did you mean '{}'?)", kRigidBodies, nearest));
+  const std::string hint =
+      nearest_hint(text.substr(0, text.find(':')), words_before(Kind::by_submodels));
+  if (!parse_number(text) && !hint.empty()) refuse("--rigid-body", text, kRigidBodies + hint);
   return {Kind::free, parse_rank("--rigid-body", text, kRigidBodies)};
 }
 

@@ -13,11 +13,14 @@ void refuse(const char* flag, const std::string& given, const std::string& right
   throw std::invalid_argument(fmt::format("{}: got '{}'; expected {}", flag, given, right));
 }
 
+std::string wrong_word(const std::string& flag, const std::string& word,
+                       const std::vector<std::string>& names) {
+  return fmt::format("{}: got '{}'; expected one of {}{}", flag, word, fmt::join(names, ", "),
+                     nearest_hint(word, names));
+}
+
 void refuse_word(const char* flag, const std::string& word, const std::vector<std::string>& names) {
-  const std::string nearest = nearest_word(word, names);
-  refuse(flag, word,
-         fmt::format("one of {}{}", fmt::join(names, ", "),
-                     nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)));
+  throw std::invalid_argument(wrong_word(flag, word, names));
 }
 
 bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two) {

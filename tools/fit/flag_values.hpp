@@ -8,10 +8,13 @@
 
 namespace stageid {
 
-/// @throws std::invalid_argument "FLAG: 'given'; write RIGHT"
+/// @throws std::invalid_argument "FLAG: got 'given'; expected RIGHT"
 [[noreturn]] void refuse(const char* flag, const std::string& given, const std::string& right);
 
-/// @throws std::invalid_argument "FLAG: 'word'; write one of ..." with the nearest word
+/// "FLAG: got 'word'; expected one of ..." with the nearest word
+std::string wrong_word(const std::string& flag, const std::string& word,
+                       const std::vector<std::string>& names);
+/// @throws std::invalid_argument with that text
 [[noreturn]] void refuse_word(const char* flag, const std::string& word,
                               const std::vector<std::string>& names);
 

@@ -1,6 +1,7 @@
 #include "tools/manual/command_tree.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <regex>
 
 namespace stageid {
@@ -79,17 +80,15 @@ std::string path_below(const std::string& path, const CommandTree& sub) {
 std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
   std::vector<CommandOption> options = command.options;
   if (&command == &program) return options;
-  for (const CommandOption& option : program.options)
-    if (std::none_of(option.flags.begin(), option.flags.end(), [](const std::string& flag) {
-          return flag == "--help" || flag == "--version";
-        }))
-      options.push_back(option);
+  std::ranges::copy_if(program.options, std::back_inserter(options), [](const auto& option) {
+    return option.flags.back() != "--help" && option.flags.back() != "--version";
+  });
   return options;
 }
 
-std::vector<std::string> flags_of(const CommandTree& command) {
+std::vector<std::string> flags_of(const std::vector<CommandOption>& options) {
   std::vector<std::string> flags;
-  for (const CommandOption& option : command.options)
+  for (const CommandOption& option : options)
     flags.insert(flags.end(), option.flags.begin(), option.flags.end());
   return flags;
 }

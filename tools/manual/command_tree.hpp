@@ -43,8 +43,8 @@ std::string path_below(const std::string& path, const CommandTree& sub);
 void for_each_command(const CommandTree& program,
                       const std::function<void(const std::string&, const CommandTree&)>& visit);
 
-/// All flags of the options of a command, "-o", "--output", ...
-std::vector<std::string> flags_of(const CommandTree& command);
+/// All flags of the options, "-o", "--output", ...
+std::vector<std::string> flags_of(const std::vector<CommandOption>& options);
 std::vector<std::string> names_of(const std::vector<CommandTree>& commands);
 
 }  // namespace stageid

@@ -59,9 +59,7 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
 
 std::string bash_completion(const CommandTree& program) {
   const auto assign_words = [&](const CommandTree& command) {
-    std::vector<std::string> flags;
-    for (const CommandOption& option : options_taken(command, program))
-      flags.insert(flags.end(), option.flags.begin(), option.flags.end());
+    const std::vector<std::string> flags = flags_of(options_taken(command, program));
     std::vector<std::string> words = names_of(command.commands);
     for (const CommandOption& argument : command.arguments)
       words.insert(words.end(), argument.words.begin(), argument.words.end());

@@ -36,7 +36,7 @@ TEST_F(Manual, TheTreeIsWhatTheParserHolds) {
   const CommandTree tree = command_tree(app_);
   ASSERT_EQ(tree.commands.size(), 1U);
   const CommandTree& cut = tree.commands[0];
-  EXPECT_THAT(flags_of(cut),
+  EXPECT_THAT(flags_of(cut.options),
               ElementsAre("-h", "--help", "-o", "--output", "--kind", "--shape", "--dry"));
   ASSERT_EQ(cut.arguments.size(), 1U);
   EXPECT_EQ(cut.arguments[0].name, "files");
