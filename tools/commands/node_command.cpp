@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -33,25 +34,32 @@ namespace {
 constexpr std::int64_t kTick_ns = 1'000'000;
 constexpr std::int64_t kLongestStop_ns = 5'000'000'000;
 
-/// The Modbus side of `stageid node`: its options, and one server thread per connection (TCP, RTU) to the same
-/// StageNode. Every server has its own request count and faults.
+/// The Modbus options of `stageid node`.
+struct ModbusFlags {
+  int tcp_port = -1;
+  std::string rtu_device;
+  int baud = 115200;
+  std::string parity = "E";
+  int unit = 1;
+  std::vector<std::string> faults;
+
+  bool wanted() const noexcept { return tcp_port >= 0 || !rtu_device.empty(); }
+};
+
+/// The Modbus side of `stageid node`: one server thread per connection (TCP, RTU) to the same StageNode. Every server
+/// has its own request count and faults.
 class ModbusFront {
  public:
-  ModbusFront() = default;
-  ~ModbusFront() { stop(); }
-  ModbusFront(const ModbusFront&) = delete;
-  ModbusFront& operator=(const ModbusFront&) = delete;
-
-  void add_options(CLI::App& command);
-  bool wanted() const noexcept { return tcp_port_ >= 0 || !rtu_device_.empty(); }
-
   /// Opens the requested connections and serves them. `node` must outlive the front.
   /// @throws std::invalid_argument for unknown faults or invalid values.
   /// @throws StageError if a port or device cannot be opened.
-  void start(StageNode& node, const StageLimits& limits);
+  ModbusFront(const ModbusFlags& flags, StageNode& node, const StageLimits& limits);
   /// Ends the threads and closes the connections.
-  void stop();
-  /// One line per connection, after start().
+  ~ModbusFront() { stop_ = true; }
+  ModbusFront(const ModbusFront&) = delete;
+  ModbusFront& operator=(const ModbusFront&) = delete;
+
+  /// One line per connection.
   std::vector<std::string> places() const;
 
  private:
@@ -64,17 +72,13 @@ class ModbusFront {
     ModbusFaultScript faults;
     ModbusNode registers;
     ModbusServer server;
-    std::thread thread;
+    std::jthread thread;  // ends before what it uses
   };
 
-  int tcp_port_ = -1;
-  std::string rtu_device_;
-  int baud_ = 115200;
-  std::string parity_ = "E";
-  int unit_ = 1;
-  std::vector<std::string> faults_;
-  std::vector<std::unique_ptr<Door>> doors_;
+  ModbusFront() = default;
+
   std::atomic<bool> stop_ = false;
+  std::vector<std::unique_ptr<Door>> doors_;
 };
 
 template <typename Parse>
@@ -98,53 +102,48 @@ std::uint32_t fresh_boot_id() {
   return id == 0 ? 1 : id;
 }
 
-void ModbusFront::stop() {
-  stop_ = true;
-  for (const std::unique_ptr<Door>& door : doors_)
-    if (door->thread.joinable()) door->thread.join();
-  doors_.clear();
-}
-
-void ModbusFront::add_options(CLI::App& command) {
+void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
   command
-      .add_option("--modbus-tcp", tcp_port_,
+      .add_option("--modbus-tcp", flags.tcp_port,
                   "Modbus TCP port on the loopback interface; 0: a free one")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--modbus-rtu", rtu_device_, "Modbus RTU on this serial line");
-  command.add_option("--modbus-baud", baud_, "baud rate of the serial line")->capture_default_str();
-  command.add_option("--modbus-parity", parity_, "N | E | O")
+  command.add_option("--modbus-rtu", flags.rtu_device, "Modbus RTU on this serial line");
+  command.add_option("--modbus-baud", flags.baud, "baud rate of the serial line")
+      ->capture_default_str();
+  command.add_option("--modbus-parity", flags.parity, "N | E | O")
       ->check(CLI::IsMember({"N", "E", "O"}))
       ->capture_default_str();
-  command.add_option("--modbus-unit", unit_, "unit identifier of the node")
+  command.add_option("--modbus-unit", flags.unit, "unit identifier of the node")
       ->check(CLI::Range(1, 247))
       ->capture_default_str();
   command.add_option(
-      "--modbus-fault", faults_,
+      "--modbus-fault", flags.faults,
       "KIND[@REQUEST][xCOUNT][:VALUE], counted from the first request: late_reply:SECONDS, "
       "half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, interlock, "
       "temperature:KELVIN, gravity:NEWTON");
 }
 
-void ModbusFront::start(StageNode& node, const StageLimits& limits) {
-  const auto faults = parsed_faults("--modbus-fault", faults_, parse_modbus_fault);
+ModbusFront::ModbusFront(const ModbusFlags& flags, StageNode& node, const StageLimits& limits)
+    : ModbusFront() {  // from here on, the threads end after an exception too
+  const auto faults = parsed_faults("--modbus-fault", flags.faults, parse_modbus_fault);
   ModbusAddress address;
-  address.unit = unit_;
+  address.unit = flags.unit;
   const std::uint32_t boot_id = fresh_boot_id();
   const auto open = [&] {
     doors_.push_back(std::make_unique<Door>(address, node, limits, boot_id, faults));
   };
-  if (tcp_port_ >= 0) {
-    address.port = tcp_port_;
+  if (flags.tcp_port >= 0) {
+    address.port = flags.tcp_port;
     open();
   }
-  if (!rtu_device_.empty()) {
-    address.device = rtu_device_;
-    address.baud = baud_;
-    address.parity = parity_.front();
+  if (!flags.rtu_device.empty()) {
+    address.device = flags.rtu_device;
+    address.baud = flags.baud;
+    address.parity = flags.parity.front();
     open();
   }
   for (const std::unique_ptr<Door>& door : doors_)
-    door->thread = std::thread([this, server = &door->server] { server->run(stop_); });
+    door->thread = std::jthread([this, server = &door->server] { server->run(stop_); });
 }
 
 std::vector<std::string> ModbusFront::places() const {
@@ -197,14 +196,10 @@ CanSpec can_spec(const StageConfig& config, const std::vector<std::string>& inte
   return spec;
 }
 
-void wait_a_tick(StageNode& node) {
-  node.tick(monotonic_ns());
-  std::this_thread::sleep_for(std::chrono::nanoseconds(kTick_ns));
-}
-
-/// Stops the stage and calls `serve` until it is at rest.
+/// Calls `serve` until the program is interrupted, then stops the stage and goes on until it is at rest.
 template <typename Serve>
-void come_to_rest(StageNode& node, Serve serve) {
+void serve_to_rest(StageNode& node, Serve serve) {
+  while (!interrupt_flag()) serve();
   static_cast<void>(node.request(SupervisorCommand::quick_stop));
   const std::int64_t give_up_ns = monotonic_ns() + kLongestStop_ns;
   static_cast<void>(node.request(SupervisorCommand::disable));
@@ -221,7 +216,7 @@ struct NodeFlags {
   double pace = 0.0;
   double hold_s = 0.1;
   double watchdog_s = 0.0;
-  ModbusFront modbus;
+  ModbusFlags modbus;
 };
 
 double node_watchdog_s(const NodeFlags& flags, const StageConfig& config) {
@@ -263,12 +258,10 @@ void serve_can(const NodeFlags& flags, Console& console, const StageConfig& conf
   console.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
                              fmt::join(flags.can_interfaces, ", ")));
   std::fflush(stdout);  // programs that wait for the node read this line
-  while (!interrupt_flag()) front.serve(socket.now_ns() + kTick_ns);
-
-  come_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
+  serve_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
 }
 
-void serve(NodeFlags& flags, Console& console) {
+void serve(const NodeFlags& flags, Console& console) {
   if (flags.can_interfaces.empty() && !flags.modbus.wanted())
     throw std::invalid_argument(
         "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
@@ -282,20 +275,22 @@ void serve(NodeFlags& flags, Console& console) {
         "the node closes the loop, but its controller is 'peer'; write the controller");
   const ControlledStop comes_to_rest;
   StageNode node = make_node(flags, config);
-  // Its servers use the node, so they end first, after an error too.
-  const std::shared_ptr<void> servers(nullptr, [&flags](void*) { flags.modbus.stop(); });
-  if (flags.modbus.wanted()) flags.modbus.start(node, config.spec.limits);
-  for (const std::string& place : flags.modbus.places())
-    console.result(
-        fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
-  std::fflush(stdout);  // programs that wait for the node read these lines
-  if (flags.can_interfaces.empty()) {
-    while (!interrupt_flag()) wait_a_tick(node);
-    come_to_rest(node, [&] { wait_a_tick(node); });
-  } else {
-    serve_can(flags, console, config, node);
+  std::optional<ModbusFront> modbus;
+  if (flags.modbus.wanted()) {
+    modbus.emplace(flags.modbus, node, config.spec.limits);
+    for (const std::string& place : modbus->places())
+      console.result(
+          fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
   }
-  flags.modbus.stop();
+  std::fflush(stdout);  // programs that wait for the node read these lines
+  if (flags.can_interfaces.empty())
+    serve_to_rest(node, [&node] {
+      node.tick(monotonic_ns());
+      std::this_thread::sleep_for(std::chrono::nanoseconds(kTick_ns));
+    });
+  else
+    serve_can(flags, console, config, node);
+  modbus.reset();
   console.result(fmt::format("at rest: {}", to_string(node.state())));
 }
 
@@ -329,7 +324,7 @@ void node_command(CLI::App& app, Console& console) {
           "after a quick stop or a fault: seconds in the node's own loop before it cuts the forces")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
-  flags->modbus.add_options(*command);
+  add_modbus_options(*command, flags->modbus);
   command
       ->add_option(
           "--watchdog", flags->watchdog_s,
