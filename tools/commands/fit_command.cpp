@@ -88,9 +88,8 @@ void fit(const FitCommandFlags& flags, Console& console) {
                   {"modes", modes_json(result.model)},
                   {"delays", delays_json(result.model)},
                   {"seconds", step.seconds}});
-  for (const std::string& finding : result.findings)
-    if (result.trustworthy() || result.message.find(finding) == std::string::npos)
-      console.warning(fmt::format("{}: {}", flags.output.string(), finding));
+  for (const std::string& finding : findings_beside_message(result))
+    console.warning(fmt::format("{}: {}", flags.output.string(), finding));
   if (!whole)
     console.warning(fmt::format("{}: not written: {}", flags.covariance.string(),
                                 result.decisions.empty() ? "" : result.decisions.back()));

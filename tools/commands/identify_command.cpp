@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
-#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -69,15 +68,8 @@ bool is_complete(const std::filesystem::path& log, const ExperimentConfig& confi
                  const ExperimentPlan& plan) {
   if (!std::filesystem::exists(log)) return false;
   const std::unique_ptr<LogReader> reader = open_log(log, false);
-  if (measurement_id_of(reader->info()) != config.measurement_id) return false;
-  for (const RunId run : plan.runs()) {
-    bool found = false;
-    for (const LogRun& recorded : reader->runs())
-      found = found || (recorded.complete && recorded.realization == run.realization &&
-                        recorded.experiment == run.experiment);
-    if (!found) return false;
-  }
-  return true;
+  return measurement_id_of(reader->info()) == config.measurement_id &&
+         plan.runs_without(complete_runs(*reader)).empty();
 }
 
 constexpr std::array kResults = {"excitation.h5", "run.slog",   "frf.h5",   "frf_validation.h5",
@@ -121,6 +113,9 @@ class Identification {
   void print_summary() const;
   nlohmann::ordered_json summary() const;
   void finish_step(const char* name, double seconds, std::string note);
+  void add_notes(const std::vector<std::string>& more) {
+    notes_.insert(notes_.end(), more.begin(), more.end());
+  }
   std::vector<int> fitted_realizations() const;
 
   struct Step {
@@ -250,10 +245,8 @@ FrfEstimate Identification::estimate_into(const char* name, const std::vector<in
 void Identification::estimate() {
   frf_ = estimate_into("frf.h5", fitted_realizations());
   health_ = health_of(frf_->provenance_json);
-  const std::vector<std::string> found = health_notes(health_);
-  notes_.insert(notes_.end(), found.begin(), found.end());
-  const std::vector<std::string> dropped = dropped_lines(*frf_);
-  notes_.insert(notes_.end(), dropped.begin(), dropped.end());
+  add_notes(health_notes(health_));
+  add_notes(dropped_lines(*frf_));
   if (config_.validation_realization >= 0)
     validation_frf_ = estimate_into("frf_validation.h5", {config_.validation_realization});
 }
@@ -267,7 +260,7 @@ void Identification::pick() {
   if (modes.empty()) modes = pick_modes(setup_->frf);
   write_modes(path("modes.json"), modes);
   chosen_modes_ = std::move(modes);
-  notes_.insert(notes_.end(), setup_->warnings.begin(), setup_->warnings.end());
+  add_notes(setup_->warnings);
   finish_step("modes", seconds_since(start), fmt::format("{} candidates", chosen_modes_.size()));
 }
 
@@ -292,11 +285,7 @@ void Identification::fit() {
   FitStep step = fit_with_progress(*setup_, "frf.h5", fingerprint, console_);
   model_ = step.result.model;
   model_variance_ = std::move(step.result.response_variance);
-  std::copy_if(step.result.findings.begin(), step.result.findings.end(), std::back_inserter(notes_),
-               [&](const std::string& finding) {
-                 return step.result.trustworthy() ||
-                        step.result.message.find(finding) == std::string::npos;
-               });
+  add_notes(findings_beside_message(step.result));
   write_model(path("model.json"), model_);
   if (step.result.status == FitStatus::interrupted) {
     exit_code_ = kInterrupted;

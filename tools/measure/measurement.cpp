@@ -26,8 +26,7 @@ namespace stageid {
 namespace {
 
 /// The complete runs of a log, after checking that it belongs to this experiment.
-std::vector<RunId> complete_runs(const ExperimentConfig& config,
-                                 const std::filesystem::path& file) {
+std::vector<RunId> runs_to_skip(const ExperimentConfig& config, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   const std::string id = measurement_id_of(log->info());
   if (!id.empty() && id != config.measurement_id)
@@ -35,14 +34,7 @@ std::vector<RunId> complete_runs(const ExperimentConfig& config,
         fmt::format("{}: belongs to another experiment (stage, excitation or seed differ from {}); "
                     "choose another name with -o",
                     file.string(), config.file.string()));
-  std::vector<RunId> runs;
-  for (const LogRun& run : log->runs())
-    if (run.complete) runs.push_back({run.realization, run.experiment});
-  return runs;
-}
-
-SlogWriter open_writer(const MeasurementRequest& request, const LogInfo& info, bool exists) {
-  return exists ? SlogWriter::resume(request.log, info) : SlogWriter::create(request.log, info);
+  return complete_runs(*log);
 }
 
 int exit_code_of(const ExperimentResult& result) {
@@ -84,18 +76,14 @@ void conclude(const MeasuredStage& stage, const RunExperimentOptions& options,
 }
 
 /// The plant around the stage, operated and monitored during the lifetime of this object.
-class SupervisedPlant {
- public:
+struct SupervisedPlant {
   /// @throws StageError if it does not start.
   SupervisedPlant(const SupervisorConfig& config, bool reset_fault)
-      : supervisor_(config.link.address, config.link.timing, config.options),
-        watch_(supervisor_, config.conditions, reset_fault) {}
-  const PlantWatch& watch() const noexcept { return watch_; }
-  PlantSnapshot snapshot() const { return supervisor_.snapshot(); }
+      : supervisor(config.link.address, config.link.timing, config.options),
+        watch(supervisor, config.conditions, reset_fault) {}
 
- private:
-  ModbusSupervisor supervisor_;
-  PlantWatch watch_;
+  ModbusSupervisor supervisor;
+  PlantWatch watch;
 };
 
 /// Starts the plant around the stage, if the stage file describes one, and lets it end the experiment. In a replay
@@ -106,8 +94,8 @@ std::unique_ptr<SupervisedPlant> supervise(const ExperimentConfig& config,
   const std::optional<SupervisorConfig>& supervisor = config.stage.supervisor;
   if (!supervisor || request.backend == Backend::replay) return nullptr;
   auto plant = std::make_unique<SupervisedPlant>(*supervisor, request.reset_fault);
-  options.plant_tripped = &plant->watch().tripped();
-  options.plant_reason = [&watch = plant->watch()] { return watch.reason(); };
+  options.plant_tripped = &plant->watch.tripped();
+  options.plant_reason = [&watch = plant->watch] { return watch.reason(); };
   return plant;
 }
 
@@ -152,11 +140,6 @@ void limit_jitter(const ExperimentConfig& config, const ExperimentPlan& plan, do
   if (options.jitter_s > 0.0) return;
   options.jitter_s = 0.5 / sample_rate_hz;
   options.jitter_rms_s = tolerable_jitter_s(plan.grid().frequency_hz().maxCoeff());
-}
-
-void warn_of_until(const ExperimentPlan& plan, const FrfOptions& options, const Console& console) {
-  if (const std::string why = never_enough(plan.spec(), options); !why.empty())
-    console.warning("--until: " + why);
 }
 
 void tell_begin(EventLog& events, const ExperimentConfig& config, const StageInfo& stage,
@@ -215,6 +198,13 @@ void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
 
 }  // namespace
 
+std::vector<RunId> complete_runs(const LogReader& log) {
+  std::vector<RunId> runs;
+  for (const LogRun& run : log.runs())
+    if (run.complete) runs.push_back({run.realization, run.experiment});
+  return runs;
+}
+
 std::string advice_behind(const MeasurementResult& result) {
   if (result.exit_code == kInterrupted || result.exit_code == kWorldFailed)
     return "; continue with --resume";
@@ -235,7 +225,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
                           const MeasurementRequest& request, const Console& console) {
   const bool exists = check_log(request);
   RunExperimentOptions options;
-  if (exists) options.skip = complete_runs(config, request.log);
+  if (exists) options.skip = runs_to_skip(config, request.log);
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
@@ -250,15 +240,17 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   // A recorded run ends with the run.
   if (request.backend != Backend::replay) options.between_runs = config.stage.between_runs;
   if (info.clock == Clock::wall) warn_of_real_time(options.real_time, console);
-  if (request.until) warn_of_until(plan, config.frf, console);
+  if (const std::string why = never_enough(plan.spec(), config.frf); request.until && !why.empty())
+    console.warning("--until: " + why);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
   std::optional<EventLog> events;  // must outlive the dashboard, whose watchers write to it
   const std::unique_ptr<Dashboard> dashboard =
       make_dashboard(config, plan, request, info, result.runs_before, console);
-  if (dashboard && plant) dashboard->watch([&plant] { return plant->snapshot(); });
-  SlogWriter log = open_writer(
-      request, experiment_log_info(plan, info, run_metadata(config, request.backend, info)),
-      exists);
+  if (dashboard && plant) dashboard->watch([&plant] { return plant->supervisor.snapshot(); });
+  const LogInfo log_info =
+      experiment_log_info(plan, info, run_metadata(config, request.backend, info));
+  SlogWriter log = exists ? SlogWriter::resume(request.log, log_info)
+                          : SlogWriter::create(request.log, log_info);
   events.emplace(event_log_of(request.log));
   tell_begin(*events, config, info, result);
 

@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "acquisition/loop/run_experiment.hpp"
+#include "acquisition/record/log_reader.hpp"
 #include "tools/dashboard/dashboard_address.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/terminal/console.hpp"
@@ -41,6 +43,9 @@ struct MeasurementResult {
 /// FileError, FormatError, StageError
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console);
+
+/// The runs of a log that were recorded to their end.
+std::vector<RunId> complete_runs(const LogReader& log);
 
 /// Remedy for a measurement that ended early, to be appended to its message. Resuming helps after a lost link or an
 /// interrupt, but not if the same run would reach the same limit.

@@ -115,6 +115,15 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   return step;
 }
 
+std::vector<std::string> findings_beside_message(const FitResult& result) {
+  std::vector<std::string> findings = result.findings;
+  if (!result.trustworthy())
+    std::erase_if(findings, [&](const std::string& finding) {
+      return result.message.find(finding) != std::string::npos;
+    });
+  return findings;
+}
+
 Distortion distortion_of(const AdditiveModel& model) {
   const Json json = parse_json<Json>(model.provenance_json);
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();

@@ -22,6 +22,9 @@ struct FitStep {
 FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
                           const std::string& frf_fingerprint, const Console& console);
 
+/// The findings that the message of a fit does not tell already.
+std::vector<std::string> findings_beside_message(const FitResult& result);
+
 /// Identifies a request for a fit, see frf_request_id().
 std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerprint);
 
