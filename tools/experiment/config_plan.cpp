@@ -8,19 +8,20 @@
 
 namespace stageid {
 
+FrequencyGrid grid_of(const ExperimentConfig& config) {
+  return FrequencyGrid::band(config.stage.spec.info.sample_rate_hz, config.samples_per_period,
+                             config.lines);
+}
+
 ExperimentPlan make_plan(const ExperimentConfig& config) {
   if (config.limits) return make_limited_plan(config).design.plan;
-  return ExperimentPlan(FrequencyGrid::band(config.stage.spec.info.sample_rate_hz,
-                                            config.samples_per_period, config.lines),
-                        config.experiment);
+  return ExperimentPlan(grid_of(config), config.experiment);
 }
 
 ExperimentPlan outline_plan(const ExperimentConfig& config) {
   ExperimentSpec experiment = config.experiment;
   if (config.limits) experiment.crest_iterations = 0;
-  return ExperimentPlan(FrequencyGrid::band(config.stage.spec.info.sample_rate_hz,
-                                            config.samples_per_period, config.lines),
-                        std::move(experiment));
+  return ExperimentPlan(grid_of(config), std::move(experiment));
 }
 
 ExperimentPlan read_plan_of(const ExperimentConfig& config, const std::filesystem::path& file) {

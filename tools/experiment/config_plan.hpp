@@ -7,6 +7,9 @@
 
 namespace stageid {
 
+/// The excited lines.
+FrequencyGrid grid_of(const ExperimentConfig& config);
+
 /// Creates the plan. Takes a second if crest factors are reduced, and minutes if the multisines are designed within
 /// limits. @throws as make_limited_plan()
 ExperimentPlan make_plan(const ExperimentConfig& config);

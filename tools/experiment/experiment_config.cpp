@@ -295,8 +295,7 @@ void complete(ExperimentFile& file, const YamlDocument& document) {
   config.experiment.scaling = is_set(file.peak_n) ? AmplitudeScaling::peak : AmplitudeScaling::rms;
   // Errors of the excitation library get the position of the corresponding section.
   try {
-    const auto grid =
-        FrequencyGrid::band(info.sample_rate_hz, config.samples_per_period, config.lines);
+    const FrequencyGrid grid = grid_of(config);
     config.experiment.axes = excitation_axes(file, grid);
     outline_plan(config);
     require_zippered_lines(config.experiment, grid);

@@ -42,26 +42,24 @@ std::string poor_margin(double sensitivity, double frequency_hz) {
       sensitivity, frequency_hz, kPoorSensitivity, kPoorSensitivity / (kPoorSensitivity - 1.0));
 }
 
-/// The loop gain of a prior, by rising frequency.
+/// The loop gain of a prior, followed by rising frequency.
 class PriorLoop {
  public:
-  explicit PriorLoop(const ExperimentConfig& config) : controller_(config.stage.spec.controller) {
-    if (!controller_.acts()) return;
-    const ExperimentPlan outline = outline_plan(config);
-    const VectorXd band_hz = outline.grid().frequency_hz();
+  explicit PriorLoop(const ExperimentConfig& config) {
+    const MotionController controller(config.stage.spec.controller);
+    if (!controller.acts()) return;
+    const VectorXd band_hz = outline_plan(config).grid().frequency_hz();
     const VectorXd below_hz = frequencies_below(band_hz[0], config.stage.spec);
     const PlantPrior prior =
         read_plant_prior(config.limits->prior, config.stage.spec.info, band_hz, below_hz);
-    frequency_hz_.resize(below_hz.size() + band_hz.size());
-    frequency_hz_ << below_hz, band_hz;
-    plant_ = prior.below_band;
-    plant_.insert(plant_.end(), prior.response.begin(), prior.response.end());
+    for (std::size_t k = 0; k < prior.below_band.size(); ++k)
+      follow(prior.below_band[k], controller, below_hz[static_cast<Index>(k)]);
+    for (std::size_t k = 0; k < prior.response.size(); ++k)
+      follow(prior.response[k], controller, band_hz[static_cast<Index>(k)]);
   }
 
   LoopCheck check() const {
     LoopCheck out;
-    if (!controller_.acts()) return out;
-    follow();
     if (signs_ > 0 || (turns() > 0 && certain()))
       out.problem = fmt::format(
           "the controller does not stabilize the plant of the prior: {}. {}",
@@ -73,8 +71,8 @@ class PriorLoop {
           "stability of the loop cannot be determined from the prior: {}. Measure a pilot on a "
           "wider band or with finer lines",
           last_gain_ > kNegligibleGain
-              ? fmt::format("the loop gain at its last line, {:.4g} Hz, is still {:.2g}",
-                            frequency_hz_[frequency_hz_.size() - 1], last_gain_)
+              ? fmt::format("the loop gain at its last line, {:.4g} Hz, is still {:.2g}", last_hz_,
+                            last_gain_)
               : fmt::format(
                     "the phase of the loop gain changes too much between two lines near {:.4g} Hz",
                     largest_turn_hz_));
@@ -106,36 +104,33 @@ class PriorLoop {
   /// Accumulates the angle of det(I + L) from low to high frequencies. All poles of plant and controller must be
   /// inside the unit circle or at 1, where a free mass contributes -pi and the controller its own phase. The angle
   /// then ends at -pi per unstable pole of the closed loop (argument principle on the upper half of the unit circle).
-  void follow() const {
-    std::complex<double> last = 0.0;
-    for (Index k = 0; k < frequency_hz_.size(); ++k) {
-      const double f = frequency_hz_[k];
-      const MatrixXcd L = -plant_[static_cast<std::size_t>(k)] * controller_.response(f);
-      const std::complex<double> value =
-          (MatrixXcd::Identity(L.rows(), L.rows()) + L).partialPivLu().determinant();
-      if (k == 0) {
-        angle_ = start_angle(L, value);
-      } else {
-        const double turn = std::arg(value / last);
-        angle_ += turn;
-        if (std::abs(turn) > largest_turn_) {
-          largest_turn_ = std::abs(turn);
-          largest_turn_hz_ = f;
-        }
+  void follow(const MatrixXcd& plant, const MotionController& controller, double frequency_hz) {
+    const MatrixXcd L = -plant * controller.response(frequency_hz);
+    const std::complex<double> value =
+        (MatrixXcd::Identity(L.rows(), L.rows()) + L).partialPivLu().determinant();
+    if (last_hz_ == 0.0) {
+      angle_ = start_angle(L, value);
+    } else {
+      const double turn = std::arg(value / last_);
+      angle_ += turn;
+      if (std::abs(turn) > largest_turn_) {
+        largest_turn_ = std::abs(turn);
+        largest_turn_hz_ = frequency_hz;
       }
-      last = value;
-      last_gain_ = L.norm();
-      const double size = largest_sensitivity(L);
-      if (size > sensitivity_) {
-        sensitivity_ = size;
-        sensitivity_hz_ = f;
-      }
+    }
+    last_ = value;
+    last_hz_ = frequency_hz;
+    last_gain_ = L.norm();
+    const double size = largest_sensitivity(L);
+    if (size > sensitivity_) {
+      sensitivity_ = size;
+      sensitivity_hz_ = frequency_hz;
     }
   }
 
   /// Where the loop gain is large, every closed axis is an eigenvalue of it: a free mass, which is negative above its
   /// suspension, times PI and lead, which are positive.
-  double start_angle(const MatrixXcd& loop_gain, std::complex<double> value) const {
+  double start_angle(const MatrixXcd& loop_gain, std::complex<double> value) {
     double expected = 0.0;
     for (const std::complex<double>& locus : eigenvalues(loop_gain)) {
       if (std::abs(locus) < kNegligibleGain) continue;
@@ -150,17 +145,16 @@ class PriorLoop {
   int turns() const { return static_cast<int>(std::lround(std::abs(angle_) / (2.0 * kPi))); }
   bool certain() const { return last_gain_ <= kNegligibleGain && largest_turn_ <= kLargestTurn; }
 
-  MotionController controller_;
-  VectorXd frequency_hz_;
-  std::vector<MatrixXcd> plant_;
-  mutable int closed_ = 0;
-  mutable int signs_ = 0;
-  mutable double angle_ = 0.0;
-  mutable double largest_turn_ = 0.0;
-  mutable double largest_turn_hz_ = 0.0;
-  mutable double last_gain_ = 0.0;
-  mutable double sensitivity_ = 0.0;
-  mutable double sensitivity_hz_ = 0.0;
+  int closed_ = 0;
+  int signs_ = 0;
+  double angle_ = 0.0;
+  double largest_turn_ = 0.0;
+  double largest_turn_hz_ = 0.0;
+  std::complex<double> last_ = 0.0;
+  double last_hz_ = 0.0;
+  double last_gain_ = 0.0;
+  double sensitivity_ = 0.0;
+  double sensitivity_hz_ = 0.0;
 };
 
 /// Why nothing is known about the loop of a stage file; empty if it can be tested.
