@@ -122,7 +122,7 @@ void list_log(const LogFlags& flags, Console& console) {
   for (const std::string& line : timing_lines(*log)) console.result(line);
   Json json = info_json(*log);
   if (flags.health) {
-    const std::vector<Finding> findings = examine_logs({flags.file}, {}, flags.stage, console);
+    const std::vector<Finding> findings = examine_log(*log, flags.stage, console);
     for (const std::string& line : health_lines(findings)) console.result(line);
     json["health"] = health_json(findings);
     if (any_fault(findings)) console.exit_code = kNotTrustworthy;

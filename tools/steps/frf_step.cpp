@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -12,11 +13,11 @@
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
+#include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/health/data_health.hpp"
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
-#include "tools/steps/open_logs.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -75,7 +76,11 @@ std::string request_id_of(const std::string& provenance_json) {
 
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const HealthRequest& health, const Console& console) {
-  return estimate_frf(OpenLogs(files).logs(), options, health, console);
+  std::vector<std::unique_ptr<LogReader>> readers;
+  std::vector<const LogReader*> logs;
+  for (const std::filesystem::path& file : files)
+    logs.push_back(readers.emplace_back(open_log(file)).get());
+  return estimate_frf(logs, options, health, console);
 }
 
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
@@ -83,7 +88,7 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
   FrfStep step;
   std::optional<NominalStage> nominal;  // before the long work, because a stage file may be invalid
   if (health.wanted) nominal = nominal_stage_of(logs.front()->info(), health.stage_file);
-  Progress progress(console, "frf", "MB", 1.0 / kBytesPerMegabyte);
+  Progress progress(console, "frf", "MB", kMegabytesPerByte);
   options.progress = [&](double done, double total) {
     throw_if_interrupted();
     step.bytes = done;

@@ -10,6 +10,9 @@
 
 namespace stageid {
 
+/// Progress of reading logs is shown in megabytes.
+inline constexpr double kMegabytesPerByte = 1.0 / 1e6;
+
 struct FrfStep {
   FrfEstimate frf;
   double seconds = 0.0;

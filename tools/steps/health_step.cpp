@@ -10,10 +10,9 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
-#include "acquisition/record/log_reader.hpp"
 #include "frf/health/estimate_check.hpp"
 #include "tools/config/stage_expectation.hpp"
-#include "tools/steps/open_logs.hpp"
+#include "tools/steps/frf_step.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -40,24 +39,23 @@ bool has(const std::vector<Finding>& findings, Cause cause) {
 
 }  // namespace
 
-std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
-                                  FrfOptions options, const std::filesystem::path& stage_file,
-                                  const Console& console) {
-  const OpenLogs opened(files);
-  const auto nominal = nominal_stage_of(opened.logs().front()->info(), stage_file);
-  Progress progress(console, "health", "MB", 1.0 / kBytesPerMegabyte);
+std::vector<Finding> examine_log(const LogReader& log, const std::filesystem::path& stage_file,
+                                 const Console& console) {
+  const auto nominal = nominal_stage_of(log.info(), stage_file);
+  Progress progress(console, "health", "MB", kMegabytesPerByte);
+  FrfOptions options;
   options.progress = [&](double done, double total) {
     throw_if_interrupted();
     progress.update(done, total);
   };
   std::optional<FrfAndHealth> both;
   try {
-    both = estimate_plant_frf_and_health(opened.logs(), options);
+    both = estimate_plant_frf_and_health({&log}, options);
   } catch (const FormatError&) {
     // Data without an estimate can still be examined, which gives the reason.
   } catch (const std::invalid_argument&) {
   }
-  if (!both) return check_health(read_health_record(opened.logs(), options), nominal);
+  if (!both) return check_health(read_health_record({&log}, options), nominal);
   return keep_health(both->frf, examine(both->frf, std::move(both->health), nominal));
 }
 

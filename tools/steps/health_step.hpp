@@ -6,20 +6,18 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/formats/open_log.hpp"
+#include "acquisition/record/log_reader.hpp"
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
-#include "frf/response/frf_options.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
 
-/// Reads logs and examines them. Controller and rigid body are those of `stage_file`, or of the stage file in the log.
+/// Reads a log and examines it. Controller and rigid body are those of `stage_file`, or of the stage file in the log.
 /// Shows progress.
-/// @throws as open_log(), read_health_record() and nominal_stage_of(); Interrupted
-std::vector<Finding> examine_logs(const std::vector<std::filesystem::path>& files,
-                                  FrfOptions options, const std::filesystem::path& stage_file,
-                                  const Console& console);
+/// @throws as read_health_record() and nominal_stage_of(); Interrupted
+std::vector<Finding> examine_log(const LogReader& log, const std::filesystem::path& stage_file,
+                                 const Console& console);
 
 /// Findings from the record of the logs and the response estimated from them.
 std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
