@@ -1,7 +1,6 @@
 #include "tools/manual/command_tree.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <regex>
 
 namespace stageid {
@@ -61,29 +60,6 @@ CommandTree command_tree(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
     tree.commands.push_back(command_tree(*command));
   return tree;
-}
-
-void for_each_command(const CommandTree& program,
-                      const std::function<void(const std::string&, const CommandTree&)>& visit) {
-  const auto walk = [&visit](const auto& self, const std::string& path,
-                             const CommandTree& command) -> void {
-    visit(path, command);
-    for (const CommandTree& sub : command.commands) self(self, path_below(path, sub), sub);
-  };
-  walk(walk, "", program);
-}
-
-std::string path_below(const std::string& path, const CommandTree& sub) {
-  return path.empty() ? sub.name : path + " " + sub.name;
-}
-
-std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
-  std::vector<CommandOption> options = command.options;
-  if (&command == &program) return options;
-  std::ranges::copy_if(program.options, std::back_inserter(options), [](const auto& option) {
-    return option.flags.back() != "--help" && option.flags.back() != "--version";
-  });
-  return options;
 }
 
 std::vector<std::string> flags_of(const std::vector<CommandOption>& options) {

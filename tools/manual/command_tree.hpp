@@ -1,7 +1,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,18 +29,6 @@ struct CommandTree {
 };
 
 CommandTree command_tree(const CLI::App& app);
-
-/// The options accepted after a command: its own, and the program's --json and --verbosity, which are accepted before
-/// and after it.
-std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program);
-
-/// The words that lead to a command of the command at `path`.
-std::string path_below(const std::string& path, const CommandTree& sub);
-
-/// Visits the program, then its commands, each before its own.
-/// @param visit takes the words that lead to the command ("", "log", "log info") and the command
-void for_each_command(const CommandTree& program,
-                      const std::function<void(const std::string&, const CommandTree&)>& visit);
 
 /// All flags of the options, "-o", "--output", ...
 std::vector<std::string> flags_of(const std::vector<CommandOption>& options);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <functional>
+#include <iterator>
 #include <vector>
 
 namespace stageid {
@@ -21,6 +23,17 @@ std::string described(const std::string& name, const std::string& help) {
   std::string entry;
   for (const char c : name) entry += c == ':' ? std::string("\\:") : std::string(1, c);
   return quoted(entry + ":" + help.substr(0, help.find(';')));
+}
+
+/// The options accepted after a command: its own, and the program's --json and --verbosity, which are accepted before
+/// and after it.
+std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
+  std::vector<CommandOption> options = command.options;
+  if (&command == &program) return options;
+  std::ranges::copy_if(program.options, std::back_inserter(options), [](const auto& option) {
+    return option.flags.back() != "--help" && option.flags.back() != "--version";
+  });
+  return options;
 }
 
 /// The parts of a script that depend on the commands.
@@ -44,13 +57,18 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
               fmt::format("    {}{}) {} ;;\n", path, quoted(" " + flag),
                           fmt::format(fmt::runtime(assign_values), fmt::join(option.words, " ")));
   };
-  for_each_command(program, [&](const std::string& path, const CommandTree& command) {
+  // `path`: the words that lead to the command: "", "log", "log info".
+  const auto visit = [&](const auto& self, const std::string& path,
+                         const CommandTree& command) -> void {
     cases.words += fmt::format("    {}) {} ;;\n", quoted(path), assign_words(command));
     if (!path.empty()) add_values(quoted(path), command);
+    const std::string prefix = path.empty() ? "" : path + " ";
     for (const CommandTree& sub : command.commands)
       cases.paths += fmt::format("      {}) {}={} ;;\n", quoted(path + " " + sub.name),
-                                 path_variable, quoted(path_below(path, sub)));
-  });
+                                 path_variable, quoted(prefix + sub.name));
+    for (const CommandTree& sub : command.commands) self(self, prefix + sub.name, sub);
+  };
+  visit(visit, "", program);
   add_values("*", program);
   return cases;
 }
