@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <stdexcept>
 
 #include "acquisition/formats/open_log.hpp"
@@ -113,43 +114,35 @@ std::unique_ptr<Stage> make_can_stage(const StageConfig& config, const CanLayout
 class ReplayLog final : public ReplaySource {
  public:
   /// @throws std::invalid_argument if the log lacks a complete run of the list.
-  ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& runs);
+  ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& runs) : log_(std::move(log)) {
+    std::map<RunId, std::size_t> complete;  // of several, the last one is used, as in the estimate
+    for (std::size_t i = 0; i < log_->runs().size(); ++i)
+      if (const LogRun& run = log_->runs()[i]; run.complete)
+        complete[{run.realization, run.experiment}] = i;
+    for (const RunId wanted : runs) {
+      if (!complete.contains(wanted))
+        throw std::invalid_argument(
+            fmt::format("{}: no complete run of realization {}, experiment {}; replay the log of "
+                        "the same experiment",
+                        log_->path().string(), wanted.realization + 1, wanted.experiment + 1));
+      order_.push_back(complete[wanted]);
+    }
+  }
 
   int runs() const override { return static_cast<int>(order_.size()); }
-  void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override;
+  void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override {
+    const std::size_t index = order_.at(static_cast<std::size_t>(run));
+    LogSamples samples;
+    log_->read(index, 0, log_->runs()[index].samples, samples);
+    u = samples.actuators.transpose();
+    y = samples.sensors.transpose();
+    marked = samples.marked.cast<int>();
+  }
 
  private:
   std::unique_ptr<LogReader> log_;
   std::vector<std::size_t> order_;
 };
-
-ReplayLog::ReplayLog(std::unique_ptr<LogReader> log, const std::vector<RunId>& runs)
-    : log_(std::move(log)) {
-  const std::vector<LogRun>& recorded = log_->runs();
-  for (const RunId wanted : runs) {
-    // Of several complete runs the last one is used, as in the estimate.
-    std::size_t found = recorded.size();
-    for (std::size_t i = 0; i < recorded.size(); ++i)
-      if (recorded[i].complete && recorded[i].realization == wanted.realization &&
-          recorded[i].experiment == wanted.experiment)
-        found = i;
-    if (found == recorded.size())
-      throw std::invalid_argument(
-          fmt::format("{}: no complete run of realization {}, experiment {}; replay the log of the "
-                      "same experiment",
-                      log_->path().string(), wanted.realization + 1, wanted.experiment + 1));
-    order_.push_back(found);
-  }
-}
-
-void ReplayLog::load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) {
-  const std::size_t index = order_.at(static_cast<std::size_t>(run));
-  LogSamples samples;
-  log_->read(index, 0, log_->runs()[index].samples, samples);
-  u = samples.actuators.transpose();
-  y = samples.sensors.transpose();
-  marked = samples.marked.cast<int>();
-}
 
 std::unique_ptr<CyclicStage> replayed_stage(const ExperimentConfig& config,
                                             const ExperimentPlan& plan,
