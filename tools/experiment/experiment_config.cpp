@@ -181,55 +181,51 @@ Eigen::VectorXd shape_on(const FrequencyGrid& grid,
   return shape;
 }
 
-class ExperimentChecker {
- public:
-  ExperimentChecker(const YamlDocument& document, const StageConfig& stage)
-      : document_(document), stage_(stage) {}
+/// Null if the file lacks the key.
+const YamlNode* value_of(const YamlDocument& document, std::string_view section,
+                         std::string_view key) {
+  const YamlNode* node = document.value(document.root(), section);
+  return node == nullptr ? nullptr : document.value(*node, key);
+}
 
-  int samples_per_period(double period_s) const {
-    const double samples = period_s * stage_.spec.info.sample_rate_hz;
-    const double whole = std::round(samples);
-    if (std::abs(samples - whole) > 1e-9 * samples || whole < 4.0 || whole > 1e8)
-      fail("period_s", fmt::format("period_s: {} s is {} samples at {} Hz; a period must be a "
-                                   "whole number of samples, 4 to 1e8",
-                                   period_s, samples, stage_.spec.info.sample_rate_hz));
-    return static_cast<int>(whole);
-  }
-  void check_band(const std::vector<double>& band_hz) const {
-    const double nyquist_hz = 0.5 * stage_.spec.info.sample_rate_hz;
-    if (band_hz[1] >= nyquist_hz)
-      fail("band_hz",
-           fmt::format("band_hz: {} Hz is not below half the sample rate, {} Hz; lower it",
-                       band_hz[1], nyquist_hz));
-  }
-  void check_names(const char* section, const char* key, const std::vector<std::string>& names,
-                   const std::vector<Channel>& channels, const char* kind,
-                   FormatErrorList& errors) const {
-    std::vector<std::string> known;
-    for (const Channel& channel : channels) known.push_back(channel.name);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (channel_index(channels, names[i]) >= 0) continue;
-      const YamlNode* list = find(section, key);
-      const YamlMark mark = list == nullptr ? YamlMark{} : document_.node(list->items.at(i)).mark;
-      errors.attempt([&] {
-        document_.fail(mark, fmt::format("{}: unknown {} '{}'; {}", key, kind, names[i],
-                                         suggest_key(names[i], known)));
-      });
-    }
-  }
-  [[noreturn]] void fail(const char* key, const std::string& message) const {
-    const YamlNode* node = find("experiment", key);
-    document_.fail(node == nullptr ? YamlMark{} : node->mark, message);
-  }
+[[noreturn]] void fail(const YamlDocument& document, const char* key, const std::string& message) {
+  const YamlNode* node = value_of(document, "experiment", key);
+  document.fail(node == nullptr ? YamlMark{} : node->mark, message);
+}
 
- private:
-  const YamlNode* find(std::string_view section, std::string_view key) const {
-    const YamlNode* node = document_.value(document_.root(), section);
-    return node == nullptr ? nullptr : document_.value(*node, key);
+int samples_per_period(const YamlDocument& document, double period_s, double rate_hz) {
+  const double samples = period_s * rate_hz;
+  const double whole = std::round(samples);
+  if (std::abs(samples - whole) > 1e-9 * samples || whole < 4.0 || whole > 1e8)
+    fail(document, "period_s",
+         fmt::format("period_s: {} s is {} samples at {} Hz; a period must be a whole number of "
+                     "samples, 4 to 1e8",
+                     period_s, samples, rate_hz));
+  return static_cast<int>(whole);
+}
+
+void check_band(const YamlDocument& document, double high_hz, double rate_hz) {
+  if (high_hz >= 0.5 * rate_hz)
+    fail(document, "band_hz",
+         fmt::format("band_hz: {} Hz is not below half the sample rate, {} Hz; lower it", high_hz,
+                     0.5 * rate_hz));
+}
+
+void check_names(const YamlDocument& document, const char* section, const char* key,
+                 const std::vector<std::string>& names, const std::vector<Channel>& channels,
+                 const char* kind, FormatErrorList& errors) {
+  std::vector<std::string> known;
+  for (const Channel& channel : channels) known.push_back(channel.name);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (channel_index(channels, names[i]) >= 0) continue;
+    const YamlNode* list = value_of(document, section, key);
+    const YamlMark mark = list == nullptr ? YamlMark{} : document.node(list->items.at(i)).mark;
+    errors.attempt([&] {
+      document.fail(mark, fmt::format("{}: unknown {} '{}'; {}", key, kind, names[i],
+                                      suggest_key(names[i], known)));
+    });
   }
-  const YamlDocument& document_;
-  const StageConfig& stage_;
-};
+}
 
 std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const FrequencyGrid& grid) {
   const std::vector<double> designed = {1.0};
@@ -280,14 +276,15 @@ std::string measurement_id(const ExperimentFile& f) {
 
 void complete(ExperimentFile& file, const YamlDocument& document) {
   ExperimentConfig& config = file.config;
-  const ExperimentChecker checker(document, config.stage);
   const StageInfo& info = config.stage.spec.info;
   FormatErrorList errors;
-  checker.check_names("experiment", "axes", file.axes, info.actuators, "actuator", errors);
-  checker.check_names("frf", "inputs", config.frf.inputs, info.actuators, "actuator", errors);
-  checker.check_names("frf", "outputs", config.frf.outputs, info.sensors, "sensor", errors);
-  errors.attempt([&] { checker.check_band(file.band_hz); });
-  errors.attempt([&] { config.samples_per_period = checker.samples_per_period(file.period_s); });
+  check_names(document, "experiment", "axes", file.axes, info.actuators, "actuator", errors);
+  check_names(document, "frf", "inputs", config.frf.inputs, info.actuators, "actuator", errors);
+  check_names(document, "frf", "outputs", config.frf.outputs, info.sensors, "sensor", errors);
+  errors.attempt([&] { check_band(document, file.band_hz[1], info.sample_rate_hz); });
+  errors.attempt([&] {
+    config.samples_per_period = samples_per_period(document, file.period_s, info.sample_rate_hz);
+  });
   errors.raise();
   config.lines.low_hz = file.band_hz[0];
   config.lines.high_hz = file.band_hz[1];
@@ -300,7 +297,7 @@ void complete(ExperimentFile& file, const YamlDocument& document) {
     outline_plan(config);
     require_zippered_lines(config.experiment, grid);
   } catch (const std::invalid_argument& error) {
-    checker.fail("band_hz", error.what());
+    fail(document, "band_hz", error.what());
   }
   config.measurement_id = measurement_id(file);
 }
