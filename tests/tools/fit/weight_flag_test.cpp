@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <numeric>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
@@ -19,6 +20,13 @@ namespace stageid {
 namespace test_weight_flag {
 
 using Complex = std::complex<double>;
+
+/// For two outputs and three inputs, line by line.
+void write_weights(const std::filesystem::path& path, const std::vector<double>& values) {
+  Hdf5File file = Hdf5File::create(path);
+  file.write_reals("/weights", {values.size() / 6, 2, 3}, values.data());
+  file.close();
+}
 
 class WeightFile : public testing::Test {
  protected:
@@ -50,10 +58,8 @@ class WeightFile : public testing::Test {
 
 TEST_F(WeightFile, DiagonalsAreRowsOfOutputs) {
   std::vector<double> values(4 * 6);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(i);
-  Hdf5File file = Hdf5File::create(path_);
-  file.write_reals("/weights", {4, 2, 3}, values.data());
-  file.close();
+  std::iota(values.begin(), values.end(), 0.0);
+  write_weights(path_, values);
   read_weights(path_, frf_, options_);
   EXPECT_EQ((*options_.user_weights)(1 + 2 * 2, 3), 23.0);
   EXPECT_EQ((*options_.user_weights)(0 + 2 * 1, 0), 1.0);
@@ -94,9 +100,7 @@ TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
 TEST_F(WeightFile, RefusesNegativeWeights) {
   std::vector<double> values(4 * 6, 1.0);
   values[13] = -1.0;
-  Hdf5File file = Hdf5File::create(path_);
-  file.write_reals("/weights", {4, 2, 3}, values.data());
-  file.close();
+  write_weights(path_, values);
   expect_refused<IndefiniteWeights>("line 2: -1; weights must be 0 or more");
 }
 
@@ -104,10 +108,7 @@ TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
   for (const auto& [weight, part] : {std::pair{0.0, "all weights are 0"},
                                      {1e-200, "only the ratios of weights matter"},
                                      {1e200, "only the ratios of weights matter"}}) {
-    const std::vector<double> values(4 * 6, weight);
-    Hdf5File file = Hdf5File::create(path_);
-    file.write_reals("/weights", {4, 2, 3}, values.data());
-    file.close();
+    write_weights(path_, std::vector<double>(4 * 6, weight));
     expect_refused(part);
   }
 }
@@ -119,12 +120,7 @@ TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   write_frf(name("frf.h5"), frf);
   std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
   weights[5] = -1.0;
-  Hdf5File file = Hdf5File::create(name("w.h5"));
-  file.write_reals("/weights",
-                   {static_cast<hsize_t>(frf.lines()), static_cast<hsize_t>(frf.n_outputs()),
-                    static_cast<hsize_t>(frf.n_inputs())},
-                   weights.data());
-  file.close();
+  write_weights(at("w.h5"), weights);
   fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
        "-1; weights must be 0 or more");
   EXPECT_FALSE(std::filesystem::exists(name("model.json")));

@@ -105,8 +105,16 @@ TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStands
 
 class RecordingFault : public ::testing::Test {
  protected:
-  std::vector<Finding> findings() const {
-    return check_health(read_health_record({&log_}, {}), nominal_stage(request_.configured));
+  std::vector<Finding> findings_of(const MemoryLog& log) const {
+    return check_health(read_health_record({&log}, {}), nominal_stage(request_.configured));
+  }
+  /// The one finding in the recording with this fault.
+  Finding only_finding(const test::PlantedFault& fault) const {
+    MemoryLog log = log_;
+    test::spoil_recording(fault, log);
+    const std::vector<Finding> found = findings_of(log);
+    EXPECT_EQ(health_notes(found).size(), 1U) << told(found);
+    return found.empty() ? Finding() : found.front();
   }
 
   test::FaultyLogRequest request_ = request_of(6);
@@ -118,7 +126,7 @@ TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) 
   using Kind = test::PlantedFault::Kind;
   test::spoil_recording({Kind::recorded_swap, false, 0, 1}, log_);
   test::spoil_recording({Kind::recorded_swap, false, 1, 2}, log_);
-  const std::vector<Finding> found = findings();
+  const std::vector<Finding> found = findings_of(log_);
   ASSERT_EQ(health_notes(found).size(), 2U) << told(found);
   for (int i = 0; i < 2; ++i)
     EXPECT_EQ(found[static_cast<std::size_t>(i)].cause, Cause::swapped) << told(found);
@@ -126,28 +134,19 @@ TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) 
 
 TEST_F(RecordingFault, AnActuatorThatIsOneOrTwoSamplesLateIsSkewed) {
   for (const double samples : {1.0, -1.0, 2.0}) {
-    MemoryLog log = log_;
-    test::spoil_recording({test::PlantedFault::Kind::recorded_skew, false, 4, 0,
-                           samples / log_.log_info.sample_rate_hz},
-                          log);
-    std::swap(log, log_);
-    const std::vector<Finding> found = findings();
-    std::swap(log, log_);
-    ASSERT_EQ(health_notes(found).size(), 1U) << samples << "\n" << told(found);
-    EXPECT_EQ(found.front().cause, Cause::skew) << told(found);
-    EXPECT_EQ(found.front().channel, log_.log_info.actuators.names[4]);
+    SCOPED_TRACE(samples);
+    const Finding found = only_finding({test::PlantedFault::Kind::recorded_skew, false, 4, 0,
+                                        samples / log_.log_info.sample_rate_hz});
+    EXPECT_EQ(found.cause, Cause::skew);
+    EXPECT_EQ(found.channel, log_.log_info.actuators.names[4]);
   }
 }
 
 TEST_F(RecordingFault, AFactorOfThreePercentIsFound) {
   for (const bool of_sensor : {true, false}) {
-    MemoryLog log = log_;
-    test::spoil_recording({test::PlantedFault::Kind::recorded_gain, of_sensor, 2, 0, 1.03}, log);
-    std::swap(log, log_);
-    const std::vector<Finding> found = findings();
-    std::swap(log, log_);
-    ASSERT_EQ(health_notes(found).size(), 1U) << of_sensor << "\n" << told(found);
-    EXPECT_EQ(found.front().cause, Cause::scale) << told(found);
+    SCOPED_TRACE(of_sensor);
+    EXPECT_EQ(only_finding({test::PlantedFault::Kind::recorded_gain, of_sensor, 2, 0, 1.03}).cause,
+              Cause::scale);
   }
 }
 
@@ -159,7 +158,7 @@ TEST_F(RecordingFault, ASensorThatIsClippedHardIsNotDead) {
       sorted.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(sorted.size()));
   std::nth_element(sorted.begin(), limit, sorted.end());
   test::spoil_recording({test::PlantedFault::Kind::saturation, true, 1, 0, *limit}, log_);
-  const std::vector<Finding> found = findings();
+  const std::vector<Finding> found = findings_of(log_);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found.front().cause, Cause::saturated) << told(found);
 }
