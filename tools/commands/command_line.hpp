@@ -1,17 +1,31 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "tools/exchange/matlab/mat_file.hpp"
+#include "tools/terminal/console.hpp"
 
 namespace stageid {
 
 /// A subcommand that takes --json and --verbosity on either side of its name.
-inline CLI::App* add_command(CLI::App& app, const std::string& name, const std::string& help) {
+inline CLI::App& add_command(CLI::App& app, const std::string& name, const std::string& help) {
   CLI::App* command = app.add_subcommand(name, help);
   command->fallthrough();
-  return command;
+  return *command;
+}
+
+/// The same, and the flags with which it calls `run`.
+template <typename Flags>
+std::pair<CLI::App&, Flags&> add_command(CLI::App& app, Console& console, const std::string& name,
+                                         const std::string& help,
+                                         void (*run)(const Flags&, Console&)) {
+  CLI::App& command = add_command(app, name, help);
+  const auto flags = std::make_shared<Flags>();
+  command.final_callback([=, &console] { run(*flags, console); });
+  return {command, *flags};
 }
 
 /// Rejects numbers below zero, or zero too, in words: CLI11 would print the largest double as upper bound.

@@ -122,7 +122,8 @@ void check_config(const ConfigFlags& flags, Console& console) {
 }
 
 /// A file for the users of the CAN frames: a DBC database, or a header in C.
-void write_can_file(const ConfigFlags& flags, Console& console, bool header) {
+template <bool kHeader>
+void write_can_file(const ConfigFlags& flags, Console& console) {
   const StageConfig stage = load_stage_config(flags.stage_file);
   if (!stage.can.present)
     throw std::invalid_argument(fmt::format("{}: has no group 'can'; see 'stageid config schema'",
@@ -130,7 +131,7 @@ void write_can_file(const ConfigFlags& flags, Console& console, bool header) {
   const StageInfo& info = stage.spec.info;
   const CanLayout layout = can_layout(stage.can.spec, info);
   write_text_file(flags.output,
-                  header ? can_c_header(layout, info, stage.spec.limits) : can_dbc(layout, info));
+                  kHeader ? can_c_header(layout, info, stage.spec.limits) : can_dbc(layout, info));
   console.result(fmt::format("wrote {}", flags.output.string()));
   console.result({{"file", flags.output.string()}});
 }
@@ -138,32 +139,29 @@ void write_can_file(const ConfigFlags& flags, Console& console, bool header) {
 }  // namespace
 
 void config_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ConfigFlags>();
-  CLI::App* config =
+  CLI::App& config =
       add_command(app, "config", "List the configuration keys; check configuration files");
-  config->require_subcommand(1);
-  CLI::App* schema_command =
-      add_command(*config, "schema", "List every key with type, unit, range and default");
-  schema_command->add_option("kind", flags->kind, "experiment | stage | controller; default: all")
+  config.require_subcommand(1);
+  auto [schema, schema_flags] = add_command(
+      config, console, "schema", "List every key with type, unit, range and default", print_schema);
+  schema.add_option("kind", schema_flags.kind, "experiment | stage | controller; default: all")
       ->check(CLI::IsMember({"experiment", "stage", "controller"}));
-  schema_command->final_callback([flags, &console] { print_schema(*flags, console); });
-  CLI::App* check_command = add_command(*config, "check", "Check experiment and stage files");
-  check_command->add_option("files", flags->files, "YAML files")->required();
-  check_command->final_callback([flags, &console] { check_config(*flags, console); });
+  auto [check, check_flags] =
+      add_command(config, console, "check", "Check experiment and stage files", check_config);
+  check.add_option("files", check_flags.files, "YAML files")->required();
   const auto add_can_file = [&](const char* name, const char* help, const char* output,
-                                bool header) {
-    CLI::App* command = add_command(*config, name, help);
-    command->add_option("stage", flags->stage_file, "stage file with a group 'can'")->required();
-    command->add_option("-o,--output", flags->output, output)->required();
-    command->final_callback([flags, &console, header] { write_can_file(*flags, console, header); });
+                                void (*write)(const ConfigFlags&, Console&)) {
+    auto [command, flags] = add_command(config, console, name, help, write);
+    command.add_option("stage", flags.stage_file, "stage file with a group 'can'")->required();
+    command.add_option("-o,--output", flags.output, output)->required();
   };
   add_can_file("dbc",
                "Write the CAN frames of a stage file as a DBC database (can-utils, SavvyCAN)",
-               "file to write (.dbc)", false);
+               "file to write (.dbc)", write_can_file<false>);
   add_can_file(
       "header",
       "Write the messages of a stage file as C structures for its node (firmware, Simulink)",
-      "file to write (.h)", true);
+      "file to write (.h)", write_can_file<true>);
 }
 
 }  // namespace stageid

@@ -148,19 +148,17 @@ void design(const DesignFlags& flags, Console& console) {
 }  // namespace
 
 void design_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<DesignFlags>();
-  CLI::App* command = add_command(
-      app, "design",
-      "Design the multisines; check the predicted forces and motions against the limits");
-  command->add_option("config", flags->config, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", flags->output, "HDF5 file to write")->required();
+  auto [command, flags] = add_command(
+      app, console, "design",
+      "Design the multisines; check the predicted forces and motions against the limits", design);
+  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
+  command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
   command
-      ->add_option("--accuracy", flags->accuracy,
-                   "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
-                   "the measuring time that it needs")
+      .add_option("--accuracy", flags.accuracy,
+                  "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
+                  "the measuring time that it needs")
       ->check(kPositive);
-  command->add_flag("--force", flags->force, "write even if a limit would be exceeded");
-  command->final_callback([flags, &console] { design(*flags, console); });
+  command.add_flag("--force", flags.force, "write even if a limit would be exceeded");
 }
 
 }  // namespace stageid

@@ -95,26 +95,26 @@ void export_file(const ExportFlags& flags, Console& console) {
 }  // namespace
 
 void export_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ExportFlags>();
-  CLI::App* command = add_command(app, "export",
-                                  "Export a model or a frequency response to other programs: state "
-                                  "space, mode shapes, response");
-  command->add_option("input", flags->input, "model.json or frf.h5")->required();
+  auto [command, flags] =
+      add_command(app, console, "export",
+                  "Export a model or a frequency response to other programs: state "
+                  "space, mode shapes, response",
+                  export_file);
+  command.add_option("input", flags.input, "model.json or frf.h5")->required();
   command
-      ->add_option("-o,--output", flags->output,
-                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
-                   "a model also .json, .py, .m")
+      .add_option("-o,--output", flags.output,
+                  "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
+                  "a model also .json, .py, .m")
       ->required();
-  command->add_option(
-      "--frf", flags->frf,
+  command.add_option(
+      "--frf", flags.frf,
       "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
   command
-      ->add_option("--driving-point", flags->driving_point,
-                   "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
-                   "adds the modal mass of each mode there")
+      .add_option("--driving-point", flags.driving_point,
+                  "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
+                  "adds the modal mass of each mode there")
       ->expected(2);
-  add_mat_version(*command, flags->mat_version);
-  command->final_callback([flags, &console] { export_file(*flags, console); });
+  add_mat_version(command, flags.mat_version);
 }
 
 }  // namespace stageid

@@ -102,68 +102,64 @@ void fit(const FitCommandFlags& flags, Console& console) {
 }  // namespace
 
 void fit_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<FitCommandFlags>();
-  CLI::App* command = add_command(app, "fit", "Fit a modal model to an FRF");
-  command->add_option("frf", flags->frf, "frf.h5")->required();
-  command->add_option("-o,--output", flags->output, "model.json to write")->required();
-  command->add_option("--covariance", flags->covariance,
-                      "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
-                      "radius of the model response");
-  command->add_option("--band", flags->band_hz, "LOW HIGH, Hz; default: all lines")->expected(2);
-  command->add_option("--modes", flags->words.modes,
-                      "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
-                      "auto, or none with --submodel");
-  command->add_option(
-      "--weighting", flags->words.weighting,
+  auto [command, flags] = add_command(app, console, "fit", "Fit a modal model to an FRF", fit);
+  command.add_option("frf", flags.frf, "frf.h5")->required();
+  command.add_option("-o,--output", flags.output, "model.json to write")->required();
+  command.add_option("--covariance", flags.covariance,
+                     "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
+                     "radius of the model response");
+  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz; default: all lines")->expected(2);
+  command.add_option("--modes", flags.words.modes,
+                     "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
+                     "auto, or none with --submodel");
+  command.add_option(
+      "--weighting", flags.words.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "
       "FILE.h5 with /weights or /weight_matrices; default: from the variances in the FRF");
-  command->add_option("--hold", flags->words.hold,
-                      "none | phase: half a sample of delay | sinc: phase and magnitude | exact: "
-                      "hold, delay and sampler, including aliasing. Default: from the FRF");
-  command->add_option(
-      "--delay", flags->words.delay,
+  command.add_option("--hold", flags.words.hold,
+                     "none | phase: half a sample of delay | sinc: phase and magnitude | exact: "
+                     "hold, delay and sampler, including aliasing. Default: from the FRF");
+  command.add_option(
+      "--delay", flags.words.delay,
       "SECONDS | estimate | per_channel. Default for an FRF without a hold: none; for a "
       "compensated one: its known delay; else estimate (per_channel if the data require it)");
-  command->add_option("--rigid-body", flags->words.rigid_body,
-                      "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
-                      "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
-                      "known frequencies in Hz | auto: chosen from the data. Default: auto, or "
-                      "none with --submodel or if the outputs are accelerations");
-  command->add_option("--direct-term", flags->words.direct_term,
-                      "none | full: a constant, the compliance of modes above the band. Default: "
-                      "chosen from the data; full if the outputs are accelerations");
+  command.add_option("--rigid-body", flags.words.rigid_body,
+                     "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
+                     "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
+                     "known frequencies in Hz | auto: chosen from the data. Default: auto, or "
+                     "none with --submodel or if the outputs are accelerations");
+  command.add_option("--direct-term", flags.words.direct_term,
+                     "none | full: a constant, the compliance of modes above the band. Default: "
+                     "chosen from the data; full if the outputs are accelerations");
   command
-      ->add_option(
-          "--residue-rank", flags->words.residue_rank,
-          "full | 1: residues phi psi^T, one pair of mode shapes each, of mechanical modes")
+      .add_option("--residue-rank", flags.words.residue_rank,
+                  "full | 1: residues phi psi^T, one pair of mode shapes each, of mechanical modes")
       ->capture_default_str();
   command
-      ->add_option("--submodel", flags->words.submodels,
-                   "adds the term (B_0 + ... + B_m s^m) / (s^l A), A a polynomial of order n, such "
-                   "as n=4,m=3,f=120:180,zeta=0.01; repeatable. l: integrators, default 0. m: "
-                   "default n + l - 1. f: starting frequencies in Hz, one per pole pair, then the "
-                   "real pole of an odd n; default: by a search. zeta: starting damping ratio. "
-                   "n=auto: one denominator for all modes that a search finds")
+      .add_option("--submodel", flags.words.submodels,
+                  "adds the term (B_0 + ... + B_m s^m) / (s^l A), A a polynomial of order n, such "
+                  "as n=4,m=3,f=120:180,zeta=0.01; repeatable. l: integrators, default 0. m: "
+                  "default n + l - 1. f: starting frequencies in Hz, one per pole pair, then the "
+                  "real pole of an odd n; default: by a search. zeta: starting damping ratio. "
+                  "n=auto: one denominator for all modes that a search finds")
       ->allow_extra_args(false);
-  command->add_option("--damping", flags->words.damping,
-                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
-                      "the data; general if the outputs are accelerations");
+  command.add_option("--damping", flags.words.damping,
+                     "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
+                     "the data; general if the outputs are accelerations");
   command
-      ->add_option(
-          "--method", flags->words.method,
-          "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
+      .add_option("--method", flags.words.method,
+                  "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
       ->capture_default_str();
-  command->add_option("--max-iterations", flags->request.max_iterations, "iterations per fit")
+  command.add_option("--max-iterations", flags.request.max_iterations, "iterations per fit")
       ->capture_default_str();
   command
-      ->add_option("--search-seconds", flags->request.search_seconds,
-                   "limit of the search: work, in seconds of a typical core, so that the result "
-                   "does not depend on the machine. At the limit, the best model so far is written "
-                   "and the exit code is 3. 0: unlimited")
+      .add_option("--search-seconds", flags.request.search_seconds,
+                  "limit of the search: work, in seconds of a typical core, so that the result "
+                  "does not depend on the machine. At the limit, the best model so far is written "
+                  "and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)
       ->capture_default_str();
-  add_threads(*command, flags->request.threads);
-  command->final_callback([flags, &console] { fit(*flags, console); });
+  add_threads(command, flags.request.threads);
 }
 
 }  // namespace stageid

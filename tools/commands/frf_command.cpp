@@ -131,52 +131,50 @@ void estimate_response(const FrfFlags& flags, Console& console) {
 }  // namespace
 
 void frf_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<FrfFlags>();
-  CLI::App* command = add_command(app, "frf", "Estimate the plant's FRF from closed-loop logs");
-  command->add_option("logs", flags->logs, "logs (.slog or .h5)")->required();
-  command->add_option("-o,--output", flags->output, "HDF5 file to write")->required();
+  auto [command, flags] = add_command(
+      app, console, "frf", "Estimate the plant's FRF from closed-loop logs", estimate_response);
+  command.add_option("logs", flags.logs, "logs (.slog or .h5)")->required();
+  command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
   command
-      ->add_option("--inputs", flags->options.inputs,
-                   "actuators A,B,...; default: the excited ones")
+      .add_option("--inputs", flags.options.inputs, "actuators A,B,...; default: the excited ones")
       ->delimiter(',');
-  command->add_option("--outputs", flags->options.outputs, "sensors C,D,...; default: all")
+  command.add_option("--outputs", flags.options.outputs, "sensors C,D,...; default: all")
       ->delimiter(',');
   command
-      ->add_option("--realizations", flags->realizations,
-                   "counted from 1; default: all complete ones")
+      .add_option("--realizations", flags.realizations,
+                  "counted from 1; default: all complete ones")
       ->delimiter(',');
-  command->add_option(
-      "--transient-periods", flags->options.transient_periods,
+  command.add_option(
+      "--transient-periods", flags.options.transient_periods,
       "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
-  add_choice(*command, "--method", flags->options.method,
+  add_choice(command, "--method", flags.options.method,
              "periodic: means over periods | lpm: whole records, transient modelled");
-  add_choice(*command, "--periods", flags->options.periods,
+  add_choice(command, "--periods", flags.options.periods,
              "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
              "discard periods with glitches) | unmarked: use all periods without marked samples");
   command
-      ->add_option("--smooth-covariance", flags->options.covariance_lines,
-                   "odd number of neighbouring lines over which the noise covariance is averaged; "
-                   "more lines give it more degrees of freedom")
+      .add_option("--smooth-covariance", flags.options.covariance_lines,
+                  "odd number of neighbouring lines over which the noise covariance is averaged; "
+                  "more lines give it more degrees of freedom")
       ->type_name("LINES")
       ->check(kPositive)
       ->capture_default_str();
-  add_choice(*command, "--covariance", flags->options.covariance,
+  add_choice(command, "--covariance", flags.options.covariance,
              "diagonal: variances | full: also the covariances between channels");
-  add_choice(*command, "--compensate", flags->compensate,
+  add_choice(command, "--compensate", flags.compensate,
              "remove from the response: none | delay | hold: hold and delay");
-  command->add_option("--delay", flags->delay_s,
-                      "delay to remove with --compensate, in s, without the half sample of the "
-                      "hold; default: as declared in the log");
-  command->add_option(
-      "--stage", flags->stage,
+  command.add_option("--delay", flags.delay_s,
+                     "delay to remove with --compensate, in s, without the half sample of the "
+                     "hold; default: as declared in the log");
+  command.add_option(
+      "--stage", flags.stage,
       "stage or controller file for the health checks; default: the one stored in the log");
-  command->add_flag("--no-health", flags->no_health, "skip the health checks of the data");
+  command.add_flag("--no-health", flags.no_health, "skip the health checks of the data");
   command
-      ->add_option("--fft-wisdom", flags->fft_wisdom,
-                   "store FFT plans found by timing in FILE and reuse those already there")
+      .add_option("--fft-wisdom", flags.fft_wisdom,
+                  "store FFT plans found by timing in FILE and reuse those already there")
       ->type_name("FILE");
-  add_threads(*command, flags->options.threads);
-  command->final_callback([flags, &console] { estimate_response(*flags, console); });
+  add_threads(command, flags.options.threads);
 }
 
 }  // namespace stageid

@@ -387,19 +387,19 @@ void identify(const IdentifyFlags& flags, Console& console) {
 }  // namespace
 
 void identify_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<IdentifyFlags>();
-  CLI::App* command = add_command(app, "identify",
-                                  "Perform the complete identification: design, run, frf, modes, "
-                                  "fit, validate, export, report");
-  command->add_option("config", flags->config, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", flags->output, "directory for all results")->required();
-  command->add_flag("--resume", flags->resume,
-                    "continue an interrupted identification; steps that are up to date are kept");
-  command->add_flag(
-      "--force", flags->force,
+  auto [command, flags] =
+      add_command(app, console, "identify",
+                  "Perform the complete identification: design, run, frf, modes, "
+                  "fit, validate, export, report",
+                  identify);
+  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
+  command.add_option("-o,--output", flags.output, "directory for all results")->required();
+  command.add_flag("--resume", flags.resume,
+                   "continue an interrupted identification; steps that are up to date are kept");
+  command.add_flag(
+      "--force", flags.force,
       "measure even if the design predicts that a limit is exceeded; limits still stop the run");
-  add_threads(*command, flags->threads);
-  command->final_callback([flags, &console] { identify(*flags, console); });
+  add_threads(command, flags.threads);
 }
 
 }  // namespace stageid

@@ -126,21 +126,20 @@ void import_file(const ImportFlags& flags, Console& console) {
 }  // namespace
 
 void import_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ImportFlags>();
-  CLI::App* command =
-      add_command(app, "import", "Import a frequency response or a log written by another program");
-  command->add_option("file", flags->input,
-                      "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); for a "
-                      "log also a pattern such as 'run_{realization}_{experiment}.mat'");
-  command->add_option(
-      "-o,--output", flags->output,
+  auto [command, flags] =
+      add_command(app, console, "import",
+                  "Import a frequency response or a log written by another program", import_file);
+  command.add_option("file", flags.input,
+                     "foreign file: .unv, .uff, .mat, .csv, .h5, .npz, .sNp (Touchstone); for a "
+                     "log also a pattern such as 'run_{realization}_{experiment}.mat'");
+  command.add_option(
+      "-o,--output", flags.output,
       "file to write: frf.h5; run.slog or run.h5 for a log; modes.json for the mode shapes of a "
       "universal file. Default: list the arrays of the file, to help you write a map");
-  command->add_option(
-      "--map", flags->map,
+  command.add_option(
+      "--map", flags.map,
       "YAML file that assigns the arrays (docs/exchange.md); needed for a foreign .mat, .npz, .csv "
       "or .h5");
-  command->final_callback([flags, &console] { import_file(*flags, console); });
 }
 
 }  // namespace stageid

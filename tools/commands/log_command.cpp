@@ -130,7 +130,7 @@ void list_log(const LogFlags& flags, Console& console) {
   console.result(json);
 }
 
-void verify(const LogFlags& flags, Console& console) {
+void verify_file(const LogFlags& flags, Console& console) {
   const VerifyReport report = verify_log(flags.file);
   throw_if_interrupted();
   console.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
@@ -164,7 +164,7 @@ void verify(const LogFlags& flags, Console& console) {
                                 what, flags.file.string()));
 }
 
-void recover(const LogFlags& flags, Console& console) {
+void recover_file(const LogFlags& flags, Console& console) {
   if (std::filesystem::exists(flags.output))
     throw std::invalid_argument(
         fmt::format("{}: already exists; choose another name with -o", flags.output.string()));
@@ -186,7 +186,7 @@ void recover(const LogFlags& flags, Console& console) {
                   {"damage", damage_json(report.damage)}});
 }
 
-void convert(const LogFlags& flags, Console& console) {
+void convert_file(const LogFlags& flags, Console& console) {
   require_no_input(flags.output, {flags.file});
   const std::unique_ptr<LogReader> log = open_log(flags.file);
   Progress progress(console, "convert", "rows");
@@ -209,37 +209,35 @@ void convert(const LogFlags& flags, Console& console) {
 }  // namespace
 
 void log_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<LogFlags>();
-  CLI::App* log = add_command(app, "log", "Inspect, verify, recover or convert a log");
-  log->require_subcommand(1);
-  CLI::App* info_command = add_command(*log, "info", "List the contents of a log, run by run");
-  info_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
-  info_command->add_flag("--health", flags->health, "read all samples and report health findings");
-  info_command->add_option(
-      "--stage", flags->stage,
+  CLI::App& log = add_command(app, "log", "Inspect, verify, recover or convert a log");
+  log.require_subcommand(1);
+  auto [info, info_flags] =
+      add_command(log, console, "info", "List the contents of a log, run by run", list_log);
+  info.add_option("file", info_flags.file, "log (.slog or .h5)")->required();
+  info.add_flag("--health", info_flags.health, "read all samples and report health findings");
+  info.add_option(
+      "--stage", info_flags.stage,
       "with --health: stage or controller file for the checks; default: the one stored in the log");
-  info_command->final_callback([flags, &console] { list_log(*flags, console); });
 
-  CLI::App* verify_command =
-      add_command(*log, "verify", "Read every byte and verify the checksums");
-  verify_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
-  verify_command->final_callback([flags, &console] { verify(*flags, console); });
+  auto [verify, verify_flags] =
+      add_command(log, console, "verify", "Read every byte and verify the checksums", verify_file);
+  verify.add_option("file", verify_flags.file, "log (.slog or .h5)")->required();
 
-  CLI::App* recover_command = add_command(*log, "recover", "Save the intact part of a damaged log");
-  recover_command->add_option("file", flags->file, "damaged log (.slog)")->required();
-  recover_command->add_option("-o,--output", flags->output, "new log to write (.slog)")->required();
-  recover_command->final_callback([flags, &console] { recover(*flags, console); });
+  auto [recover, recover_flags] =
+      add_command(log, console, "recover", "Save the intact part of a damaged log", recover_file);
+  recover.add_option("file", recover_flags.file, "damaged log (.slog)")->required();
+  recover.add_option("-o,--output", recover_flags.output, "new log to write (.slog)")->required();
 
-  CLI::App* convert_command =
-      add_command(*log, "convert", "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog");
-  convert_command->add_option("file", flags->file, "log (.slog or .h5)")->required();
-  convert_command
-      ->add_option("-o,--output", flags->output,
-                   "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
+  auto [convert, convert_flags] =
+      add_command(log, console, "convert",
+                  "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog", convert_file);
+  convert.add_option("file", convert_flags.file, "log (.slog or .h5)")->required();
+  convert
+      .add_option("-o,--output", convert_flags.output,
+                  "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
       ->required();
-  convert_command->add_flag("--complete-only", flags->complete_only, "skip incomplete runs");
-  add_mat_version(*convert_command, flags->mat_version);
-  convert_command->final_callback([flags, &console] { convert(*flags, console); });
+  convert.add_flag("--complete-only", convert_flags.complete_only, "skip incomplete runs");
+  add_mat_version(convert, convert_flags.mat_version);
 }
 
 }  // namespace stageid

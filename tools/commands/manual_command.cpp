@@ -43,14 +43,14 @@ void write_manual(const CLI::App& app, const std::filesystem::path& output, Cons
 
 void manual_command(CLI::App& app, Console& console) {
   const auto output = std::make_shared<std::filesystem::path>();
-  CLI::App* command =
+  CLI::App& command =
       add_command(app, "manual", "Write man pages and completions for bash and zsh");
   command
-      ->add_option("-o,--output", *output,
-                   "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
-                   "bash-completion/completions and zsh/vendor-completions in it")
+      .add_option("-o,--output", *output,
+                  "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
+                  "bash-completion/completions and zsh/vendor-completions in it")
       ->required();
-  command->final_callback([output, &app, &console] { write_manual(app, *output, console); });
+  command.final_callback([output, &app, &console] { write_manual(app, *output, console); });
 }
 
 }  // namespace stageid

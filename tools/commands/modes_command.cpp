@@ -60,18 +60,17 @@ void find_modes(const ModesFlags& flags, Console& console) {
 }  // namespace
 
 void modes_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ModesFlags>();
-  CLI::App* command =
-      add_command(app, "modes", "Find candidate modes of an FRF with a mode indicator function");
-  command->add_option("frf", flags->frf, "frf.h5")->required();
-  command->add_option("-o,--output", flags->output, "modes.json to write");
-  command->add_option("--band", flags->band_hz, "LOW HIGH, Hz")->expected(2);
-  add_choice(*command, "--kind", flags->kind,
+  auto [command, flags] =
+      add_command(app, console, "modes",
+                  "Find candidate modes of an FRF with a mode indicator function", find_modes);
+  command.add_option("frf", flags.frf, "frf.h5")->required();
+  command.add_option("-o,--output", flags.output, "modes.json to write");
+  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz")->expected(2);
+  add_choice(command, "--kind", flags.kind,
              "response: G | accelerance: omega^2 G | whitened: G over its standard deviations");
-  command->add_option("--prominence", flags->prominence_db, "minimum prominence of a peak, dB")
+  command.add_option("--prominence", flags.prominence_db, "minimum prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();
-  command->final_callback([flags, &console] { find_modes(*flags, console); });
 }
 
 }  // namespace stageid

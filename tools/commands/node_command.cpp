@@ -297,43 +297,42 @@ void serve(const NodeFlags& flags, Console& console) {
 }  // namespace
 
 void node_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<NodeFlags>();
-  CLI::App* command = add_command(
-      app, "node",
-      "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM");
-  command->add_option("config", flags->config, "stage file (.yaml)")->required();
+  auto [command, flags] = add_command(
+      app, console, "node",
+      "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM",
+      serve);
+  command.add_option("config", flags.config, "stage file (.yaml)")->required();
   command
-      ->add_option(
-          "--can", flags->can_interfaces,
+      .add_option(
+          "--can", flags.can_interfaces,
           "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
       ->delimiter(',');
   command
-      ->add_option("--can-fault", flags->can_faults,
-                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
-                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
-                   "lost@100x3,late@500:0.004")
+      .add_option("--can-fault", flags.can_faults,
+                  "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
+                  "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
+                  "lost@100x3,late@500:0.004")
       ->delimiter(',');
   command
-      ->add_option("--pace", flags->pace,
-                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
+      .add_option("--pace", flags.pace,
+                  "speed of resident experiments. 0: as fast as possible; 1: wall clock")
       ->check(kNotNegative)
       ->capture_default_str();
   command
-      ->add_option(
-          "--hold", flags->hold_s,
+      .add_option(
+          "--hold", flags.hold_s,
           "after a quick stop or a fault: seconds in the node's own loop before it cuts the forces")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
-  add_modbus_options(*command, flags->modbus);
+  add_modbus_options(command, flags.modbus);
   command
-      ->add_option(
-          "--watchdog", flags->watchdog_s,
+      .add_option(
+          "--watchdog", flags.watchdog_s,
           "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
           "'watchdog_s' of the group 'can'; over Modbus, the longest time in which the host "
           "repeats "
           "a lost request, plus one sample")
       ->check(CLI::Range(0.0, 3600.0));
-  command->final_callback([flags, &console] { serve(*flags, console); });
 }
 
 }  // namespace stageid

@@ -104,32 +104,30 @@ void plot(const PlotFlags& flags, Console& console) {
 }  // namespace
 
 void plot_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<PlotFlags>();
-  CLI::App* command =
-      add_command(app, "plot", "Draw one figure of a response for print (needs gnuplot)");
+  auto [command, flags] = add_command(
+      app, console, "plot", "Draw one figure of a response for print (needs gnuplot)", plot);
   command
-      ->add_option("figure", flags->figure,
-                   "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
-                   "entry: one element with residual and standard deviation")
+      .add_option("figure", flags.figure,
+                  "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
+                  "entry: one element with residual and standard deviation")
       ->required();
   command
-      ->add_option("inputs", flags->inputs,
-                   "output directory of 'stageid identify', or files: FRF, model, modes "
-                   "(candidates in cmif)")
+      .add_option("inputs", flags.inputs,
+                  "output directory of 'stageid identify', or files: FRF, model, modes "
+                  "(candidates in cmif)")
       ->required();
   command
-      ->add_option("--output-channel", flags->output_channels,
-                   "entry: the output; bode: outputs A,B,... (default: all)")
+      .add_option("--output-channel", flags.output_channels,
+                  "entry: the output; bode: outputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
-      ->add_option("--input-channel", flags->input_channels,
-                   "entry: the input; bode: inputs A,B,... (default: all)")
+      .add_option("--input-channel", flags.input_channels,
+                  "entry: the input; bode: inputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("-o,--output", flags->output, "picture to write: .pdf, .svg or .png")
+  command.add_option("-o,--output", flags.output, "picture to write: .pdf, .svg or .png")
       ->required();
-  command->final_callback([flags, &console] { plot(*flags, console); });
 }
 
 }  // namespace stageid

@@ -51,18 +51,17 @@ void report(const ReportFlags& flags, Console& console) {
 }  // namespace
 
 void report_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ReportFlags>();
-  CLI::App* command = add_command(app, "report", "Write a self-contained interactive HTML page");
+  auto [command, flags] =
+      add_command(app, console, "report", "Write a self-contained interactive HTML page", report);
   command
-      ->add_option("inputs", flags->inputs,
-                   "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
-                   "modes, log, stage file (channel positions)")
+      .add_option("inputs", flags.inputs,
+                  "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
+                  "modes, log, stage file (channel positions)")
       ->required();
-  command->add_option("--compare", flags->compare,
-                      "results to compare with: another output directory of 'stageid identify', or "
-                      "its FRF and model");
-  command->add_option("-o,--output", flags->output, "page to write (.html)")->required();
-  command->final_callback([flags, &console] { report(*flags, console); });
+  command.add_option("--compare", flags.compare,
+                     "results to compare with: another output directory of 'stageid identify', or "
+                     "its FRF and model");
+  command.add_option("-o,--output", flags.output, "page to write (.html)")->required();
 }
 
 }  // namespace stageid

@@ -86,38 +86,37 @@ void measure_and_log(const RunFlags& flags, Console& console) {
 }  // namespace
 
 void run_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<RunFlags>();
-  CLI::App* command = add_command(app, "run", "Perform the experiment and log every sample");
-  command->add_option("config", flags->config, "experiment file (.yaml)")->required();
-  command->add_option("-o,--output", flags->request.log, "log to write (.slog)")->required();
-  command->add_option("--backend", flags->backend,
-                      "sim | can | modbus | plugin | replay; default: from the stage file");
-  command->add_option("--replay", flags->request.replay, "log to replay with --backend replay");
+  auto [command, flags] = add_command(
+      app, console, "run", "Perform the experiment and log every sample", measure_and_log);
+  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
+  command.add_option("-o,--output", flags.request.log, "log to write (.slog)")->required();
+  command.add_option("--backend", flags.backend,
+                     "sim | can | modbus | plugin | replay; default: from the stage file");
+  command.add_option("--replay", flags.request.replay, "log to replay with --backend replay");
   command
-      ->add_option("--replay-tolerance", flags->request.replay_tolerance_n,
-                   "largest allowed difference between a command and the replayed one, in the unit "
-                   "of the actuator")
+      .add_option("--replay-tolerance", flags.request.replay_tolerance_n,
+                  "largest allowed difference between a command and the replayed one, in the unit "
+                  "of the actuator")
       ->capture_default_str();
   command
-      ->add_option("--pace", flags->request.pace,
-                   "0: as fast as possible; 1: wall clock; default: from the stage file")
+      .add_option("--pace", flags.request.pace,
+                  "0: as fast as possible; 1: wall clock; default: from the stage file")
       ->check(kNotNegative);
-  command->add_option("--excitation", flags->excitation,
-                      "play this result of 'stageid design' instead of designing again");
+  command.add_option("--excitation", flags.excitation,
+                     "play this result of 'stageid design' instead of designing again");
   command
-      ->add_option("--until", flags->request.until,
-                   "VARIANCE: stop after the realization that lowers the mean relative variance of "
-                   "the response to this value, e.g. 1e-6 for 0.1 %")
+      .add_option("--until", flags.request.until,
+                  "VARIANCE: stop after the realization that lowers the mean relative variance of "
+                  "the response to this value, e.g. 1e-6 for 0.1 %")
       ->check(kPositive);
-  command->add_flag("--resume", flags->request.resume,
-                    "continue an interrupted log; complete runs are not repeated");
-  command->add_option("--dashboard", flags->dashboard,
-                      "live view in a browser. PORT: on this machine (0: any free port) | "
-                      "HOST:PORT: also on others. The printed address contains the token that "
-                      "other machines and the stop button need");
-  command->add_flag("--reset-fault", flags->request.reset_fault,
-                    "clear a fault of the node or plant before the first run");
-  command->final_callback([flags, &console] { measure_and_log(*flags, console); });
+  command.add_flag("--resume", flags.request.resume,
+                   "continue an interrupted log; complete runs are not repeated");
+  command.add_option("--dashboard", flags.dashboard,
+                     "live view in a browser. PORT: on this machine (0: any free port) | "
+                     "HOST:PORT: also on others. The printed address contains the token that "
+                     "other machines and the stop button need");
+  command.add_flag("--reset-fault", flags.request.reset_fault,
+                   "clear a fault of the node or plant before the first run");
 }
 
 }  // namespace stageid

@@ -138,21 +138,20 @@ void validate_model(const ValidateFlags& flags, Console& console) {
 }  // namespace
 
 void validate_command(CLI::App& app, Console& console) {
-  const auto flags = std::make_shared<ValidateFlags>();
-  CLI::App* command =
-      add_command(app, "validate", "Validate a model on data that it was not fitted to");
-  command->add_option("model", flags->model, "model.json")->required();
+  auto [command, flags] =
+      add_command(app, console, "validate", "Validate a model on data that it was not fitted to",
+                  validate_model);
+  command.add_option("model", flags.model, "model.json")->required();
   command
-      ->add_option("data", flags->data,
-                   "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
+      .add_option("data", flags.data,
+                  "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
       ->required();
-  command->add_option("--band", flags->band_hz, "LOW HIGH, Hz; default: the band of the fit")
+  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz; default: the band of the fit")
       ->expected(2);
-  command->add_option(
-      "--stage", flags->stage,
+  command.add_option(
+      "--stage", flags.stage,
       "stage or controller file for the health checks of a log; default: the one stored in it");
-  add_threads(*command, flags->threads);
-  command->final_callback([flags, &console] { validate_model(*flags, console); });
+  add_threads(command, flags.threads);
 }
 
 }  // namespace stageid
