@@ -17,6 +17,7 @@ import unittest
 
 from example_firmware import CAN, MODBUS, ExampleFirmware
 from peers import ModbusClient, number, words
+from processes import ProcessTest
 
 PROGRAM, SOURCE, WORK = sys.argv[1], *map(pathlib.Path, sys.argv[2:4])
 WATCHDOG_S = 2.6
@@ -27,10 +28,6 @@ BEGIN, END = 1, 2
 DISABLED, ENABLED, MEASURING, FAULT = 1, 4, 5, 8
 LIMIT = 2
 BUSY = "exception 6"
-
-
-def run(*words):
-    return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=50)
 
 
 class NodeHere(ModbusClient):
@@ -53,7 +50,9 @@ class NodeHere(ModbusClient):
         return reply.raw[:size]
 
 
-class Firmware(unittest.TestCase):
+class Firmware(ProcessTest):
+    program = PROGRAM
+
     @classmethod
     def setUpClass(cls):
         cls.work = WORK
@@ -64,28 +63,9 @@ class Firmware(unittest.TestCase):
         cls.example.build("drifting_node", MODBUS, plant=drifting)
         cls.example.build("node.so", MODBUS[1:], "-shared", "-fPIC", plant=drifting)
 
-    def setUp(self):
-        self.nodes = []
-        self.clients = []
-
-    def tearDown(self):
-        for client in self.clients:
-            client.close()
-        for node in self.nodes:
-            node.kill()
-            node.wait()
-            node.stdout.close()
-
-    def succeed(self, *words):
-        done = run(*words)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done
-
     def start(self, *command):
         """A node whose first lines contain its port."""
-        node = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                text=True)
-        self.nodes.append(node)
+        node = self.spawn(*command, stderr=subprocess.STDOUT)
         for line in node.stdout:
             found = re.search(r"(?:port |127\.0\.0\.1:)(\d+)", line)
             if found:
@@ -103,14 +83,14 @@ class Firmware(unittest.TestCase):
         return node, port
 
     def client(self, port):
-        self.clients.append(ModbusClient(port))
-        return self.clients[-1]
+        client = ModbusClient(port)
+        self.addCleanup(client.close)
+        return client
 
     def identify(self, name, *options, between=lambda process: None):
         """Frequencies of the modes, in Hz."""
         log, frf, model = (self.work / f"{name}.{kind}" for kind in ("slog", "h5", "json"))
-        process = subprocess.Popen([PROGRAM, "run", str(self.work / "experiment.yaml"), "-o", str(log), *options],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = self.spawn_run(self.work / "experiment.yaml", "-o", log, *options)
         between(process)
         _, errors = process.communicate(timeout=50)
         self.assertEqual(process.returncode, 0, errors)
@@ -157,8 +137,7 @@ class Firmware(unittest.TestCase):
     def test_a_killed_host_leaves_the_stage_without_forces(self):
         node, port = self.firmware()
         client = self.client(port)
-        slow = [PROGRAM, "run", self.work / "experiment.yaml", "-o", self.work / "killed.slog", "--pace", "0.1"]
-        host = subprocess.Popen(slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        host = self.spawn_run(self.work / "experiment.yaml", "-o", self.work / "killed.slog", "--pace", 0.1)
         self.wait_for(client, MEASURING, 10)
         while number(client.read(302, 2)) < 10 or not any(client.read(28, 4)):
             time.sleep(0.005)
@@ -169,7 +148,7 @@ class Firmware(unittest.TestCase):
         self.assertLess(time.monotonic() - killed, WATCHDOG_S + DELAY_S)
         self.assertEqual(number(client.read(210, 2)), 1)
         self.check_forces_are_zero(node, FAULT, 1)
-        done = run("run", self.work / "experiment.yaml", "-o", self.work / "refused.slog")
+        done = self.call("run", self.work / "experiment.yaml", "-o", self.work / "refused.slog")
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("--reset-fault", done.stderr)
         self.identify("after", "--reset-fault")
@@ -218,8 +197,7 @@ class Firmware(unittest.TestCase):
         owner = self.client(port)
         self.assertEqual(owner.command(ENABLE), 1)
         key = number(owner.run_command(BEGIN, 5), 4)
-        second = subprocess.Popen([PROGRAM, "run", self.work / "experiment.yaml", "-o", self.work / "second.slog"],
-                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        second = self.spawn_run(self.work / "experiment.yaml", "-o", self.work / "second.slog")
         n = 0
         while second.poll() is None:
             n += 1

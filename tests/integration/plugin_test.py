@@ -15,16 +15,16 @@ import sys
 import time
 import unittest
 
+from processes import ProcessTest
+
 PROGRAM, PEER, SOURCE, WORK = sys.argv[1:5]
 STAGE = pathlib.Path(SOURCE) / "configs/stage/small_stage.yaml"
 EXPERIMENT = pathlib.Path(SOURCE) / "configs/experiment/small_stage.yaml"
 
 
-def run(*words):
-    return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, timeout=250)
+class Plugin(ProcessTest):
+    program = PROGRAM
 
-
-class Plugin(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.work = pathlib.Path(WORK)
@@ -35,24 +35,10 @@ class Plugin(unittest.TestCase):
         subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", "udp_stage.so",
                         "udp_stage.c"], cwd=cls.work, check=True)
 
-    def setUp(self):
-        self.peers = []
-
-    def tearDown(self):
-        for peer in self.peers:
-            peer.kill()
-            peer.wait()
-            peer.stdout.close()
-
-    def succeed(self, *words):
-        done = run(*words)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done
-
     def peer(self, *options, stage=STAGE):
-        peer = subprocess.Popen([PEER, stage, *map(str, options)], stdout=subprocess.PIPE, text=True)
-        self.peers.append(peer)
-        return int(peer.stdout.readline())
+        """The port of a device in another process."""
+        self.device = self.spawn(PEER, stage, *options)
+        return int(self.device.stdout.readline())
 
     def experiment(self, name, plugin):
         stage = STAGE.read_text().replace("backend: sim", f"backend: plugin\nplugin: {plugin}")
@@ -83,10 +69,9 @@ class Plugin(unittest.TestCase):
         log = self.work / "silent.slog"
         port = self.peer(4000)
         experiment = self.udp("silent", port)
-        done = run("run", experiment, "-o", log)
+        done = self.call("run", experiment, "-o", log)
         self.assertEqual(done.returncode, 1, done.stderr)
-        self.peers[0].kill()
-        self.peers[0].wait()
+        self.end(self.device)
         self.peer(0, port)
         self.succeed("run", experiment, "-o", log, "--resume")
 
@@ -127,12 +112,11 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         stage.write_text(self.AXIS.replace(
             "backend: sim", f"backend: plugin\nplugin: {{library: ./udp_stage.so, keys: {{port: {port}}}}}"))
         file.write_text(self.AXIS_EXPERIMENT)
-        host = subprocess.Popen([PROGRAM, "run", file, "-o", log], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        return host, log
+        return self.spawn_run(file, "-o", log), log
 
     def device_rests(self):
         """The device has stopped by itself, within two windows."""
-        said = self.peers[-1].stdout.readline()
+        said = self.device.stdout.readline()
         print(said, end="", file=sys.stderr)
         found = re.match(r"the host stopped sending.*: (\d+) um, (\d+) N, (\d+) ms, (\S+) mm/s$", said)
         self.assertTrue(found, said)
@@ -145,9 +129,14 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
         while not log.exists() or log.stat().st_size < 100_000:
             time.sleep(0.01)
 
+    def check_link_down(self, host):
+        _, said = host.communicate(timeout=60)
+        self.assertEqual(host.returncode, 1, said)
+        self.assertRegex(said, "link down")
+
     def check_log(self, log, marked):
         self.succeed("log", "verify", log)
-        done = run("log", "info", log, "--json")
+        done = self.call("log", "info", log, "--json")
         self.assertEqual([r["health"]["marked"] for r in json.loads(done.stdout)["runs"]], [marked])
 
     def test_a_device_whose_host_is_killed_stops(self):
@@ -160,9 +149,7 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
 
     def test_a_cut_wire_ends_the_run_and_the_device_stops(self):
         host, log = self.axis(cycles=20_000)
-        _, said = host.communicate(timeout=60)
-        self.assertEqual(host.returncode, 1, said)
-        self.assertRegex(said, "link down")
+        self.check_link_down(host)
         told = re.search(r"^\| wire lost \| - \| (\d+) um, (\d+) N, (\d+) ms, 1, 1 \|",
                          (pathlib.Path(SOURCE) / "docs/stops.md").read_text(), re.M)
         for here, there in zip(self.device_rests(), told.groups()):
@@ -172,10 +159,8 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
     def test_a_killed_device_ends_the_run(self):
         host, log = self.axis()
         self.wait_for_samples(log)
-        self.peers[-1].kill()
-        _, said = host.communicate(timeout=60)
-        self.assertEqual(host.returncode, 1, said)
-        self.assertRegex(said, "link down")
+        self.device.kill()
+        self.check_link_down(host)
         self.check_log(log, 1)
 
     def without_plant(self, name, port, **changes):
@@ -218,7 +203,7 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
             "level: {rms_n: 1.0}", "level: {limits: {prior: real.h5}}\n  crest_iterations: 20"))
         done = self.succeed("design", designed, "-o", self.work / "designed.h5")
         self.assertNotIn("not tested", done.stderr)
-        done = run("run", file, "-o", self.work / "sim.slog", "--backend", "sim")
+        done = self.call("run", file, "-o", self.work / "sim.slog", "--backend", "sim")
         self.assertEqual(done.returncode, 2)
         self.assertIn("has no group 'plant', which is the simulated stage", done.stderr)
         self.succeed("identify", file, "-o", self.work / "all")
@@ -227,9 +212,7 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
     def test_is_supervised_and_shown_like_any_other(self):
         plant = (self.work / "plant.yaml")
         plant.write_text(STAGE.read_text())
-        node = subprocess.Popen([PROGRAM, "node", plant, "--modbus-tcp", "0", "--modbus-fault", "interlock@12"],
-                                stdout=subprocess.PIPE, text=True)
-        self.peers.append(node)
+        node = self.spawn(PROGRAM, "node", plant, "--modbus-tcp", 0, "--modbus-fault", "interlock@12")
         door = re.search(r"127\.0\.0\.1:(\d+)", node.stdout.readline())[1]
         file = self.udp("supervised", self.peer())
         stage = self.work / "supervised_stage.yaml"
@@ -237,14 +220,14 @@ experiment: {axes: [f], level: {rms_n: 10}, lines: all, band_hz: [10, 1000], per
                          "  temperature_k: [285, 325]}\n")
         file.write_text(re.sub(r"realizations: \d+", "realizations: 60", file.read_text()))
         log = self.work / "supervised.slog"
-        done = run("run", file, "-o", log, "--dashboard", "0")
+        done = self.call("run", file, "-o", log, "--dashboard", "0")
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("the interlock is open", done.stderr)
         self.assertRegex(done.stderr, r"dashboard: http://127\.0\.0\.1:\d+/\?token=")
-        self.assertIn(run("log", "verify", log).returncode, (0, 3))
+        self.assertIn(self.call("log", "verify", log).returncode, (0, 3))
 
     def refused(self, name, plugin, *words):
-        done = run("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")
+        done = self.call("run", self.experiment(name, plugin), "-o", self.work / f"{name}.slog")
         self.assertEqual(done.returncode, 1, done.stderr)
         for word in words:
             self.assertIn(word, done.stderr)

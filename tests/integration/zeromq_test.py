@@ -25,6 +25,7 @@ import unittest
 from example_firmware import CAN, ExampleFirmware
 from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
                    can_command, resident_bytes, sealed)
+from processes import ProcessTest
 
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 UPLOAD_CHUNK = 0x300
@@ -59,7 +60,9 @@ class Peer(ZeroMqPeer):
                 return got[8 + 10], struct.unpack_from("<I", got, 8 + 20)[0]
 
 
-class ZeroMq(unittest.TestCase):
+class ZeroMq(ProcessTest):
+    program, folder = PROGRAM, WORK
+
     @classmethod
     def setUpClass(cls):
         cls.example = ExampleFirmware(SOURCE, WORK)
@@ -76,7 +79,6 @@ class ZeroMq(unittest.TestCase):
 
     def setUp(self):
         self.port = free_port()
-        self.nodes = []
         stage = (WORK / "stage_zeromq.yaml").read_text().replace("5555", str(self.port))
         (WORK / "stage.yaml").write_text(stage)
         for file in ("run.slog", "run.csv"):
@@ -88,15 +90,8 @@ class ZeroMq(unittest.TestCase):
             short = short.replace(old, new)
         (WORK / "short.yaml").write_text(short)
 
-    def tearDown(self):
-        for node in self.nodes:
-            node.kill()
-            node.wait()
-            node.stdout.close()
-
     def node(self, name="node"):
-        node = subprocess.Popen([WORK / name, f"tcp://127.0.0.1:{self.port}"], cwd=WORK, stdout=subprocess.PIPE, text=True)
-        self.nodes.append(node)
+        node = self.spawn(WORK / name, f"tcp://127.0.0.1:{self.port}")
         self.wait_for(node, "state 1,")
         return node
 
@@ -106,8 +101,14 @@ class ZeroMq(unittest.TestCase):
         return line
 
     def start(self, experiment="short", log="run.slog", *options):
-        return subprocess.Popen([PROGRAM, "run", f"{experiment}.yaml", "-o", log, *options], cwd=WORK,
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return self.spawn_run(f"{experiment}.yaml", "-o", log, *options)
+
+    def measuring(self, experiment="short"):
+        """A node and a host that measures with it."""
+        node = self.node("slow_node")
+        host = self.start(experiment)
+        self.wait_for(node, MEASURING)
+        return node, host
 
     def ends(self, process, code, text="", warnings=0):
         _, err = process.communicate(timeout=120)
@@ -118,14 +119,6 @@ class ZeroMq(unittest.TestCase):
         self.assertEqual(len(said), int(code != 0) + warnings, err)
         if (WORK / "run.slog").exists():
             self.succeed("log", "verify", "run.slog")
-
-    def call(self, *words):
-        return subprocess.run([PROGRAM, *words], cwd=WORK, capture_output=True, text=True, timeout=120)
-
-    def succeed(self, *words):
-        done = self.call(*words)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done
 
     def test_the_modes_are_those_of_the_stage(self):
         self.node()
@@ -154,16 +147,12 @@ class ZeroMq(unittest.TestCase):
         self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
 
     def test_a_killed_node(self):
-        node = self.node("slow_node")
-        host = self.start()
-        self.wait_for(node, MEASURING)
+        node, host = self.measuring()
         node.kill()
         self.ends(host, 1, f"127.0.0.1:{self.port}: no node answered")
 
     def test_a_node_that_was_started_again(self):
-        node = self.node("slow_node")
-        host = self.start()
-        self.wait_for(node, MEASURING)
+        node, host = self.measuring()
         node.kill()
         node.wait()
         self.node("slow_node")
@@ -172,9 +161,7 @@ class ZeroMq(unittest.TestCase):
         self.ends(self.start(), 0)
 
     def test_a_killed_host_leaves_the_stage_without_forces(self):
-        node = self.node("slow_node")
-        host = self.start()
-        self.wait_for(node, MEASURING)
+        node, host = self.measuring()
         host.kill()
         host.communicate()
         killed = time.monotonic()
@@ -185,17 +172,13 @@ class ZeroMq(unittest.TestCase):
         self.ends(self.start("short", "run.slog", "--reset-fault"), 0)
 
     def test_ctrl_c_stops_the_stage(self):
-        node = self.node("slow_node")
-        host = self.start()
-        self.wait_for(node, MEASURING)
+        node, host = self.measuring()
         host.send_signal(2)
         self.ends(host, 130, "interrupted; the measured data are kept")
         self.wait_for(node, "state 1,")
 
     def test_a_second_host_is_refused_and_the_first_one_completes(self):
-        node = self.node("slow_node")
-        first = self.start()
-        self.wait_for(node, MEASURING)
+        _, first = self.measuring()
         second = self.start("short", "second.slog")
         _, err = second.communicate(timeout=60)
         self.assertEqual(second.returncode, 1, err)
@@ -205,12 +188,12 @@ class ZeroMq(unittest.TestCase):
     # 10 000 commands and 20 000 chunks that are sealed but forged, 100 000 random messages, 20 connections of no ZeroMQ.
     def test_forged_and_random_messages_change_nothing(self):
         (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
-        self.node()
+        quiet = self.node()
         self.ends(self.start("long"), 0)
         self.succeed("log", "convert", "run.slog", "-o", "quiet.csv")
-        node = self.node_again("slow_node")
-        host = self.start("long")
-        self.wait_for(node, MEASURING)
+        self.end(quiet)
+        (WORK / "run.slog").unlink()
+        node, host = self.measuring("long")
         dice, sizes = random.Random(5), (0, 1, 8, 71, 72, 72, 73, 300)
         peer = Peer(self.port)
         before = peer.state_after(command(HELLO, 1))[1]
@@ -257,36 +240,30 @@ class ZeroMq(unittest.TestCase):
             self.ends(self.start(), 0)
             self.assertLess(resident_bytes(node.pid) - before, 64 << 20)
 
-    def node_again(self, name):
-        self.nodes[-1].kill()
-        self.nodes[-1].wait()
-        (WORK / "run.slog").unlink(missing_ok=True)
-        return self.node(name)
-
     @contextlib.contextmanager
     def behind_a_hub(self, nodes, name="node"):
-        """Nodes, a run of a host, and the hub between them."""
+        """The last of the nodes, a run of a host, and the hub between them."""
         ports = []
         hub_port = self.port
         for _ in range(nodes):
             self.port = free_port()
             ports.append(self.port)
-            self.node(name)
+            node = self.node(name)
         with socket.create_server(("127.0.0.1", hub_port)) as server:
             server.settimeout(10)
             host = self.start()
             with contextlib.closing(ZeroMqHub(server, ports)) as hub:
-                yield host, hub
+                yield node, host, hub
 
     def test_two_nodes_behind_one_address_are_refused(self):
-        with self.behind_a_hub(2) as (host, _):
+        with self.behind_a_hub(2) as (_, host, _):
             self.ends(host, 1, "two nodes answer")
         self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
 
     def end_under_a_flood(self, code, text, number=None):
-        with self.behind_a_hub(1, "slow_node") as (host, hub):
-            self.wait_for(self.nodes[0], MEASURING)
-            self.nodes[0].send_signal(signal.SIGSTOP)
+        with self.behind_a_hub(1, "slow_node") as (node, host, hub):
+            self.wait_for(node, MEASURING)
+            node.send_signal(signal.SIGSTOP)
             if number:
                 host.send_signal(number)
             hub.flooded.set()
