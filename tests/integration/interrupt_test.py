@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 from frf_file import write_frf  # noqa: E402
+from processes import ProcessTest  # noqa: E402
 
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SMALL = "configs/experiment/small_stage.yaml"
@@ -48,15 +49,14 @@ with open(sys.argv[1], "w") as pipe:
 """
 
 
-def run(*words, interrupt_after_s=None, by=signal.SIGINT, start=None):
+def run(*words, interrupt_after_s, by=signal.SIGINT, start=None):
     """(exit code, stderr); the signal once after so long. `start` is called in the process before the program."""
     process = subprocess.Popen([PROGRAM, *words], cwd=WORK, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                preexec_fn=start)
-    if interrupt_after_s is not None:
-        try:
-            process.wait(interrupt_after_s)
-        except subprocess.TimeoutExpired:
-            process.send_signal(by)
+    try:
+        process.wait(interrupt_after_s)
+    except subprocess.TimeoutExpired:
+        process.send_signal(by)
     _, error = process.communicate(timeout=120)
     return process.returncode, error
 
@@ -65,7 +65,9 @@ def files():
     return {path.relative_to(WORK) for path in WORK.rglob("*") if path.is_file()}
 
 
-class InterruptTest(unittest.TestCase):
+class InterruptTest(ProcessTest):
+    program, folder = PROGRAM, WORK
+
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
@@ -75,8 +77,8 @@ class InterruptTest(unittest.TestCase):
         stage.write_text(stage.read_text() + "\nrealtime: {misses_allowed: 1000000}\n")
         for words in (["run", SMALL, "-o", "run.slog"],
                       *([*words, "-o", output] for output, words in COMMANDS.items())):
-            code, error = run(*words)
-            assert code == 0, (words, error)
+            done = cls.call(*words)
+            assert done.returncode == 0, (words, done.stderr)
 
     def check_end(self, code, error):
         # Before main() there is no signal handler yet.
@@ -84,6 +86,12 @@ class InterruptTest(unittest.TestCase):
         if code == 130:
             last = error.strip().splitlines()[-1]
             self.assertRegex(last, "^stageid: ")
+
+    def check_best_model(self, file):
+        model = json.loads(file.read_text())
+        self.assertEqual(model["fit"]["status"], "interrupted")
+        self.assertTrue(model["submodels"])
+        self.assertTrue(model["provenance"]["decisions"])
 
     def test_an_output_is_whole_or_not_there(self):
         ends = set()
@@ -104,10 +112,7 @@ class InterruptTest(unittest.TestCase):
                         continue
                     same = (WORK / new).read_bytes() == whole
                     if code == 130 and words[0] == "fit" and not same:  # the best model so far
-                        model = json.loads((WORK / new).read_text())
-                        self.assertEqual(model["fit"]["status"], "interrupted")
-                        self.assertTrue(model["submodels"])
-                        self.assertTrue(model["provenance"]["decisions"])
+                        self.check_best_model(WORK / new)
                     else:
                         self.assertTrue(same, "another file than without Ctrl-C")
                     (WORK / new).unlink()
@@ -169,10 +174,7 @@ class InterruptTest(unittest.TestCase):
                 code, error = run("fit", "dense.h5", "-o", "best.json", "--search-seconds", "0", interrupt_after_s=4.0,
                                   by=by)
                 self.assertEqual(code, 130, error)
-                model = json.loads((WORK / "best.json").read_text())
-                self.assertEqual(model["fit"]["status"], "interrupted")
-                self.assertTrue(model["submodels"])
-                self.assertTrue(model["provenance"]["decisions"])
+                self.check_best_model(WORK / "best.json")
                 (WORK / "best.json").unlink()
 
     def cut_and_resume(self, delay_s):
@@ -181,10 +183,9 @@ class InterruptTest(unittest.TestCase):
         code, error = run("run", SMALL, "-o", "cut.slog", "--pace", "0.1", interrupt_after_s=delay_s)
         self.check_end(code, error)
         if (WORK / "cut.slog").exists():
-            self.assertEqual(run("log", "verify", "cut.slog")[0], 0)
-            resumed, error = run("run", SMALL, "-o", "cut.slog", "--resume", "--pace", "0")
-            self.assertEqual(resumed, 0, error)
-            self.assertEqual(run("frf", "cut.slog", "--realizations", "1,2", "-o", "cut.h5")[0], 0)
+            self.succeed("log", "verify", "cut.slog")
+            self.succeed("run", SMALL, "-o", "cut.slog", "--resume", "--pace", 0)
+            self.succeed("frf", "cut.slog", "--realizations", "1,2", "-o", "cut.h5")
         return code
 
     def test_an_interrupted_run_goes_on(self):
@@ -200,8 +201,7 @@ class InterruptTest(unittest.TestCase):
 
     def test_two_signals_in_a_row_are_one_controlled_stop(self):
         log = WORK / "twice.slog"
-        process = subprocess.Popen([PROGRAM, "run", SMALL, "-o", log.name, "--pace", "0.1"], cwd=WORK,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = self.spawn_run(SMALL, "-o", log.name, "--pace", 0.1)
         self.wait_for_samples(log)
         process.send_signal(signal.SIGINT)
         time.sleep(0.03)
@@ -210,10 +210,8 @@ class InterruptTest(unittest.TestCase):
         self.assertEqual(process.returncode, 130, error)
         self.assertIn("the measured data are kept", error)  # the loop's own message: it ended normally
         # The ramp is in the log: 0.1 s of stage time, marked.
-        code, error = run("log", "verify", log.name)
-        self.assertEqual(code, 0, error)
-        marked = subprocess.run([PROGRAM, "log", "info", log.name, "--json"], cwd=WORK, text=True,
-                                stdout=subprocess.PIPE, check=True).stdout
+        self.succeed("log", "verify", log.name)
+        marked = self.succeed("log", "info", log.name, "--json").stdout
         self.assertGreaterEqual(sum(r["health"]["marked"] for r in json.loads(marked)["runs"]), 200, marked)
 
     def test_a_closed_terminal_ends_a_run_as_ctrl_c_does(self):
@@ -226,9 +224,8 @@ class InterruptTest(unittest.TestCase):
             if code != -signal.SIGHUP and (WORK / "hung.slog").exists():
                 break
         self.assertEqual(code, 130, error)
-        self.assertEqual(run("log", "verify", "hung.slog")[0], 0)
-        resumed, error = run("run", SMALL, "-o", "hung.slog", "--resume", "--pace", "0")
-        self.assertEqual(resumed, 0, error)
+        self.succeed("log", "verify", "hung.slog")
+        self.succeed("run", SMALL, "-o", "hung.slog", "--resume", "--pace", 0)
 
     def test_a_run_ends_so_when_nobody_takes_its_messages_any_more(self):
         process, terminal = pty.fork()
@@ -238,7 +235,7 @@ class InterruptTest(unittest.TestCase):
         self.wait_for_samples(WORK / "alone.slog")
         os.close(terminal)
         self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), 130)
-        self.assertEqual(run("log", "verify", "alone.slog")[0], 0)
+        self.succeed("log", "verify", "alone.slog")
 
     def wait_for_samples(self, log):
         for _ in range(600):
@@ -256,8 +253,7 @@ class InterruptTest(unittest.TestCase):
         (WORK / "slow.yaml").write_text(experiment.replace("../stage/small_stage_modbus.yaml", "slow_stage.yaml"))
         folder = WORK / "removed"
         folder.mkdir()
-        process = subprocess.Popen([PROGRAM, "run", "slow.yaml", "-o", "removed/slow.slog", "--pace", "1"], cwd=WORK,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = self.spawn_run("slow.yaml", "-o", "removed/slow.slog", "--pace", 1)
         time.sleep(2.0)
         shutil.rmtree(folder)
         removed = time.monotonic()

@@ -6,9 +6,9 @@ import unittest
 class ProcessTest(unittest.TestCase):
     program = folder = None  # the tested program, and where it runs
 
-    def call(self, *words):
-        return subprocess.run([self.program, *map(str, words)], cwd=self.folder, capture_output=True, text=True,
-                              timeout=250)
+    @classmethod
+    def call(cls, *words):
+        return subprocess.run([cls.program, *map(str, words)], cwd=cls.folder, capture_output=True, text=True, timeout=300)
 
     def succeed(self, *words):
         done = self.call(*words)

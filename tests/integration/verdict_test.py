@@ -9,20 +9,17 @@ The data are logs and FRFs of the simulated small stage, spoilt with numpy.
 import json
 import pathlib
 import shutil
-import subprocess
 import sys
 import unittest
 
 import h5py
 import numpy as np
 
+from processes import ProcessTest
+
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 SMALL = "configs/experiment/small_stage.yaml"
 STAGE = "configs/stage/small_stage.yaml"
-
-
-def program(*words):
-    return subprocess.run([PROGRAM, *map(str, words)], cwd=WORK, capture_output=True, text=True, timeout=300)
 
 
 def spoilt(source, name, operate):
@@ -43,17 +40,19 @@ def each_run(change):
     return operate
 
 
-class VerdictTest(unittest.TestCase):
+class VerdictTest(ProcessTest):
+    program, folder = PROGRAM, WORK
+
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
         shutil.copytree(CONFIGS, WORK / "configs")
         for words in (["identify", SMALL, "-o", "all"], ["log", "convert", "all/run.slog", "-o", "run.h5"]):
-            done = program(*words)
+            done = cls.call(*words)
             assert done.returncode == 0, done.stderr
 
     def ends(self, code, *words):
-        done = program(*words)
+        done = self.call(*words)
         self.assertEqual(done.returncode, code, f"{words}\n{done.stdout}{done.stderr}")
         return done
 
@@ -150,16 +149,16 @@ class VerdictTest(unittest.TestCase):
         def disturb(t, sensors, actuators):
             sensors += (20.0 * sensors.std() * np.sin(2.0 * np.pi * 0.43 * t + 1.0))[:, None]
         log = spoilt("run.h5", "slow.h5", each_run(disturb))
-        measured = json.loads(program("frf", log, "-o", "slow_frf.h5", "--json").stdout)
+        measured = json.loads(self.call("frf", log, "-o", "slow_frf.h5", "--json").stdout)
         self.assertIn("unsettled", {finding["cause"] for finding in measured["health"]})
-        validated = program("validate", "all/model.json", "slow_frf.h5", "--json")
+        validated = self.call("validate", "all/model.json", "slow_frf.h5", "--json")
         told = json.loads(validated.stdout)
         self.assertEqual(told["trustworthy"], validated.returncode == 0)
         # The model is right, but the scatter of three realizations has two degrees of freedom, common to all lines.
         figures = told["frequency_domain"]
         self.assertTrue(validated.returncode == 3 or
                         figures["chi_square_per_dof"] < 5.0 * figures["expected_chi_square"], figures)
-        self.assertIn("the records are not settled", program("validate", "all/model.json", "slow_frf.h5").stdout)
+        self.assertIn("the records are not settled", self.call("validate", "all/model.json", "slow_frf.h5").stdout)
 
     # -- models that leave too much ------------------------------------------------------------------------------------
 
@@ -188,14 +187,14 @@ class VerdictTest(unittest.TestCase):
         return f"{name}.yaml"
 
     def test_a_strong_cubic_spring_still_gets_its_report(self):
-        done = program("identify", self.cubic("strong", "3e15"), "-o", "strong")
+        done = self.call("identify", self.cubic("strong", "3e15"), "-o", "strong")
         self.assertIn(done.returncode, (0, 3), done.stderr)
         self.assertTrue((WORK / "strong/report.html").exists())
-        again = program("report", "strong", "-o", "again.html")
+        again = self.call("report", "strong", "-o", "again.html")
         self.assertEqual(again.returncode, done.returncode, again.stderr)
 
     def test_the_nonlinearity_is_named_before_the_modes_that_it_causes(self):
-        done = program("identify", self.cubic("many", "1e15", ("fit:\n", "fit:\n  modes: 12\n")), "-o", "many")
+        done = self.call("identify", self.cubic("many", "1e15", ("fit:\n", "fit:\n  modes: 12\n")), "-o", "many")
         summary = json.loads((WORK / "many/summary.json").read_text())
         self.assertRegex(summary["reasons"][0], "^the plant is nonlinear", done.stderr)
         page = (WORK / "many/report.html").read_text()
