@@ -14,7 +14,6 @@ import random
 import re
 import resource
 import signal
-import shutil
 import socket
 import struct
 import subprocess

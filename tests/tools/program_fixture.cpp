@@ -70,7 +70,7 @@ ProgramResult ProgramTest::ends(const std::vector<std::string>& arguments, int e
 }
 
 nlohmann::json ProgramTest::log_info(const std::string& log) const {
-  return nlohmann::json::parse(succeed({"log", "info", name(log), "--json"}).out);
+  return nlohmann::json::parse(succeed({"log", "info", log, "--json"}).out);
 }
 
 void ProgramTest::fail(const std::vector<std::string>& arguments, int exit_code,
@@ -104,20 +104,19 @@ std::string ProgramTest::stage(const std::string& file, const std::string& from,
 }
 
 void ProgramTest::make_log() const {
-  if (!std::filesystem::exists(at("run.slog"))) succeed({"run", config_, "-o", name("run.slog")});
+  if (!std::filesystem::exists(at("run.slog"))) succeed({"run", config_, "-o", "run.slog"});
 }
 
 void ProgramTest::make_frf() const {
   make_log();
   if (!std::filesystem::exists(at("frf.h5")))
-    succeed({"frf", name("run.slog"), "-o", name("frf.h5"), "--realizations", "1,2"});
+    succeed({"frf", "run.slog", "-o", "frf.h5", "--realizations", "1,2"});
 }
 
 void ProgramTest::make_model() const {
   make_frf();
   if (!std::filesystem::exists(at("model.json")))
-    succeed({"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800",
-             "--direct-term", "full"});
+    succeed({"fit", "frf.h5", "-o", "model.json", "--band", "120", "800", "--direct-term", "full"});
 }
 
 }  // namespace stageid::test

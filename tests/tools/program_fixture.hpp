@@ -30,6 +30,7 @@ class ProgramTest : public testing::Test {
 
   std::filesystem::path at(const std::string& name) const { return directory_ / name; }
   std::string name(const std::string& file) const { return at(file).string(); }
+  /// In the directory, so that names of files in it need no path.
   ProgramResult run(const std::vector<std::string>& arguments, ProgramOptions options = {}) const;
   /// Runs and expects exit code 0.
   ProgramResult succeed(const std::vector<std::string>& arguments) const;

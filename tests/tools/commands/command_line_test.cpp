@@ -27,14 +27,14 @@ TEST_F(CommandLine, Usage) {
   fail({"frf", "a.slog", "-o", "b.h5", "--jsn"}, 2, "did you mean '--json'? See 'stageid frf");
   fail({"manual", "-o", config_}, 1, "cannot create the directory");
   fail({"import", "x.csv", "--map", "m.yaml"}, 2, "--map: needs an output file");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "simulator"}, 2, "--backend");
+  fail({"run", config_, "-o", "x.slog", "--backend", "simulator"}, 2, "--backend");
 }
 
 TEST_F(CommandLine, WhatIsNotInThisVersionSaysSo) {
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "can"}, 2, "has no group 'can'");
-  fail({"run", config_, "-o", name("x.slog"), "--dashboard", "http://a"}, 2, "--dashboard");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "replay"}, 2, "--replay LOG");
-  fail({"export", "model.json", "-o", name("m.step")}, 2, ".json, .h5, .hdf5, .csv, .mat");
+  fail({"run", config_, "-o", "x.slog", "--backend", "can"}, 2, "has no group 'can'");
+  fail({"run", config_, "-o", "x.slog", "--dashboard", "http://a"}, 2, "--dashboard");
+  fail({"run", config_, "-o", "x.slog", "--backend", "replay"}, 2, "--replay LOG");
+  fail({"export", "model.json", "-o", "m.step"}, 2, ".json, .h5, .hdf5, .csv, .mat");
 }
 
 TEST_F(CommandLine, HelpIsThatOfTheCommand) {

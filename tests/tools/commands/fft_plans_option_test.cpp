@@ -16,7 +16,7 @@ using testing::HasSubstr;
 class FftWisdomOption : public ProgramTest {
  protected:
   std::vector<std::string> frf(const std::string& output) const {
-    return {"frf", name("run.slog"), "-o", name(output), "--fft-wisdom", name("plans")};
+    return {"frf", "run.slog", "-o", output, "--fft-wisdom", "plans"};
   }
 };
 
@@ -30,7 +30,7 @@ TEST_F(FftWisdomOption, TheSecondRunReadsThePlansAndWritesTheSameBytes) {
   const FrfEstimate timed = read_frf(at("one.h5"));
   const std::string digest = plans.substr(plans.find('\n') - 32, 32);
   EXPECT_THAT(timed.provenance_json, HasSubstr("\"fft_plans\":\"" + digest + "\""));
-  succeed({"frf", name("run.slog"), "-o", name("rule.h5")});
+  succeed({"frf", "run.slog", "-o", "rule.h5"});
   const FrfEstimate rule = read_frf(at("rule.h5"));
   EXPECT_THAT(rule.provenance_json, testing::Not(HasSubstr("fft_plans")));
   EXPECT_LT((timed.response - rule.response).norm(), 1e-9 * rule.response.norm());
@@ -39,9 +39,8 @@ TEST_F(FftWisdomOption, TheSecondRunReadsThePlansAndWritesTheSameBytes) {
 TEST_F(FftWisdomOption, WhatCannotBeUsedIsToldAndNothingWritten) {
   make_log();
   write_bytes(at("plans"), "(fftw-3.3.10 fftw_wisdom #x0 #x0 #x0 #x0\n)\n");
-  fail(frf("one.h5"), 2, name("plans") + ": is not a file of FFT plans; remove it");
-  fail({"frf", name("run.slog"), "-o", name("one.h5"), "--fft-wisdom", name("no/plans")}, 1,
-       name("no/plans"));
+  fail(frf("one.h5"), 2, "plans: is not a file of FFT plans; remove it");
+  fail({"frf", "run.slog", "-o", "one.h5", "--fft-wisdom", "no/plans"}, 1, "no/plans");
 }
 
 TEST_F(FftWisdomOption, TwoProgramsAtOnceLeaveAWholeFile) {

@@ -41,14 +41,13 @@ class Units : public ProgramTest {
 };
 
 TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
-  const ProgramResult checked = succeed({"config", "check", name("units.yaml")});
+  const ProgramResult checked = succeed({"config", "check", "units.yaml"});
   EXPECT_EQ(checked.err, "");
-  const ProgramResult designed =
-      succeed({"design", name("units.yaml"), "-o", name("excitation.h5")});
+  const ProgramResult designed = succeed({"design", "units.yaml", "-o", "excitation.h5"});
   EXPECT_THAT(designed.out, testing::ContainsRegex("a1 +A "));
   EXPECT_THAT(designed.out, testing::ContainsRegex("b1 +m/s\\^2 "));
 
-  succeed({"identify", name("units.yaml"), "-o", name("all")});
+  succeed({"identify", "units.yaml", "-o", "all"});
   const FrfEstimate frf = read_frf(at("all/frf.h5"));
   EXPECT_EQ(frf.inputs.units, (std::vector<std::string>{"A", "A", "A"}));
   EXPECT_EQ(frf.outputs.units, (std::vector<std::string>{"m/s^2", "m/s^2"}));
@@ -76,9 +75,9 @@ TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
 TEST_F(Units, StandInTheMessagesOfALimit) {
   const std::string plan = replaced(read_bytes(at("units.yaml")), "rms: 0.08", "rms: 3");
   write_bytes(at("strong.yaml"), plan);
-  const ProgramResult refused = ends({"design", name("strong.yaml"), "-o", name("e.h5")}, 2);
+  const ProgramResult refused = ends({"design", "strong.yaml", "-o", "e.h5"}, 2);
   EXPECT_THAT(refused.err, testing::ContainsRegex("would be [0-9.]+ A, limit 3.5 A"));
-  const ProgramResult stopped = ends({"run", name("strong.yaml"), "-o", name("strong.slog")}, 4);
+  const ProgramResult stopped = ends({"run", "strong.yaml", "-o", "strong.slog"}, 4);
   EXPECT_THAT(stopped.err, testing::ContainsRegex("[0-9.]+ (A|m/s\\^2|A/s), limit "));
 }
 
@@ -86,7 +85,7 @@ TEST_F(Units, AKeyWithAUnitIsForThatUnitOnly) {
   const std::string stage = read_bytes(at("currents.yaml"));
   const auto error_of = [&](const std::string& from, const std::string& to) {
     write_bytes(at("wrong.yaml"), replaced(stage, from, to));
-    return run({"config", "check", name("wrong.yaml")}).err;
+    return run({"config", "check", "wrong.yaml"}).err;
   };
   EXPECT_THAT(error_of("limit: 3.5", "limit_n: 3.5"),
               HasSubstr("the unit of this channel is A; write 'limit: NUMBER' in this unit"));

@@ -31,8 +31,7 @@ class Workflow : public ProgramTest {
                       const std::string& keys = "") const {
     const std::string config =
         stage(file + ".yaml", "noise:", keys + "faults: [{" + fault + "}]\nnoise:");
-    EXPECT_THAT(ends({"run", config, "-o", name(file + ".slog")}, exit_code, cause).err,
-                HasSubstr(more));
+    EXPECT_THAT(ends({"run", config, "-o", file + ".slog"}, exit_code, cause).err, HasSubstr(more));
     return log_info(file + ".slog");
   }
 };
@@ -67,7 +66,7 @@ TEST_F(Workflow, HelpAndVersionAreTold) {
 }
 
 TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
-  const ProgramResult result = succeed({"identify", config_, "-o", name("all")});
+  const ProgramResult result = succeed({"identify", config_, "-o", "all"});
   for (const char* output : kOutputs)
     EXPECT_TRUE(std::filesystem::exists(at("all") / output)) << output;
   EXPECT_THAT(result.out, HasSubstr("report: " + name("all/report.html")));
@@ -82,10 +81,9 @@ TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
 }
 
 TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
-  succeed({"identify", config_, "-o", name("all")});
+  succeed({"identify", config_, "-o", "all"});
   const std::vector<std::string> fit = {
-      "fit",          name("all/frf.h5"),  "-o", name("few.json"), "--modes", "1",
-      "--rigid-body", "suspension:0.4:0.5"};
+      "fit", "all/frf.h5", "-o", "few.json", "--modes", "1", "--rigid-body", "suspension:0.4:0.5"};
   const ProgramResult fitted = ends(fit, 3, "not to be trusted: the residual is ");
   EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
   std::vector<std::string> as_json = fit;
@@ -94,16 +92,13 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
   EXPECT_EQ(told["trustworthy"], false);
   EXPECT_EQ(told["status"], "unexplained");
 
-  const ProgramResult validated =
-      ends({"validate", name("few.json"), name("all/frf_validation.h5")}, 3);
+  const ProgramResult validated = ends({"validate", "few.json", "all/frf_validation.h5"}, 3);
   EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
-  ends({"report", name("few.json"), name("all/frf.h5"), name("all/frf_validation.h5"), "-o",
-        name("few.html")},
-       3, "not to be trusted: the residual is ");
+  ends({"report", "few.json", "all/frf.h5", "all/frf_validation.h5", "-o", "few.html"}, 3,
+       "not to be trusted: the residual is ");
   EXPECT_TRUE(std::filesystem::exists(at("few.html")));
-  succeed({"report", name("all"), "-o", name("all.html")});
-  const ProgramResult sound =
-      succeed({"validate", name("all/model.json"), name("all/frf_validation.h5")});
+  succeed({"report", "all", "-o", "all.html"});
+  const ProgramResult sound = succeed({"validate", "all/model.json", "all/frf_validation.h5"});
   EXPECT_THAT(sound.out, HasSubstr("verdict: trustworthy; noise and known distortion explain"));
 }
 
@@ -111,8 +106,7 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
 TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
   const std::string config =
       stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1e15\n  plate:");
-  ends({"identify", config, "-o", name("cubic")}, 0,
-       "weighting: total_variance; the plant is nonlinear");
+  ends({"identify", config, "-o", "cubic"}, 0, "weighting: total_variance; the plant is nonlinear");
   const json summary = summary_of(at("cubic"));
   EXPECT_EQ(summary["fit"]["weighting"], "total_variance");
   expect_true_modes(summary);
@@ -122,7 +116,7 @@ TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
 TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) {
   const std::string config =
       stage("coarse.yaml", "force_n: 1e-4,", "force_n: 1e-4, actuator_quantum_n: 0.1,");
-  succeed({"identify", config, "-o", name("result")});
+  succeed({"identify", config, "-o", "result"});
   const json summary = summary_of(at("result"));
   std::string steps;
   for (const json& finding : summary["health"])
@@ -134,18 +128,18 @@ TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) 
 }
 
 TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
-  succeed({"identify", config_, "-o", name("one"), "--threads", "1"});
-  succeed({"identify", config_, "-o", name("two"), "--threads", "2"});
+  succeed({"identify", config_, "-o", "one", "--threads", "1"});
+  succeed({"identify", config_, "-o", "two", "--threads", "2"});
   for (const char* file : {"excitation.h5", "frf.h5", "frf_validation.h5", "modes.json",
                            "model.json", "model.h5", "model.csv"})
     EXPECT_TRUE(same_bytes(read_bytes(at("one") / file), read_bytes(at("two") / file))) << file;
 }
 
 TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
-  succeed({"identify", config_, "-o", name("all")});
+  succeed({"identify", config_, "-o", "all"});
   const auto before = snapshot(at("all"));
-  ends({"identify", config_, "-o", name("all")}, 2);
-  const ProgramResult again = succeed({"identify", config_, "-o", name("all"), "--resume"});
+  ends({"identify", config_, "-o", "all"}, 2);
+  const ProgramResult again = succeed({"identify", config_, "-o", "all", "--resume"});
   for (const char* step : {"design", "run", "frf", "fit"})
     EXPECT_THAT(again.err, testing::ContainsRegex(std::string(step) + " .*up to date"));
   const auto after = snapshot(at("all"));
@@ -153,7 +147,7 @@ TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
     EXPECT_TRUE(same_bytes(before.at(name("all/") + file), after.at(name("all/") + file))) << file;
   // Another fit: the measurement stays, the model does not.
   write_bytes(config_, replaced(read_bytes(config_), "direct_term: full", "direct_term: none"));
-  const ProgramResult refit = run({"identify", config_, "-o", name("all"), "--resume"});
+  const ProgramResult refit = run({"identify", config_, "-o", "all", "--resume"});
   EXPECT_THAT(refit.err, testing::ContainsRegex("run .*up to date"));
   EXPECT_THAT(refit.err, testing::Not(testing::ContainsRegex("fit .*up to date")));
   EXPECT_FALSE(same_bytes(before.at(name("all/model.json")), read_bytes(at("all/model.json"))));
@@ -169,16 +163,16 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
   ProgramOptions interrupt;
   interrupt.interrupt_after_file = at("cut.slog");
   interrupt.interrupt_after_s = 0.5;
-  ends({"run", config, "-o", name("cut.slog"), "--pace", "0.1"}, 130, "continue with --resume",
+  ends({"run", config, "-o", "cut.slog", "--pace", "0.1"}, 130, "continue with --resume",
        interrupt);
   ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
-  succeed({"log", "verify", name("cut.slog")});
+  succeed({"log", "verify", "cut.slog"});
   const json info = log_info("cut.slog");
   for (const json& cut : info["runs"]) EXPECT_FALSE(cut["complete"]);
-  succeed({"run", config, "-o", name("cut.slog"), "--resume"});
-  succeed({"run", config, "-o", name("whole.slog")});
-  succeed({"frf", name("cut.slog"), "-o", name("cut.h5")});
-  succeed({"frf", name("whole.slog"), "-o", name("whole.h5")});
+  succeed({"run", config, "-o", "cut.slog", "--resume"});
+  succeed({"run", config, "-o", "whole.slog"});
+  succeed({"frf", "cut.slog", "-o", "cut.h5"});
+  succeed({"frf", "whole.slog", "-o", "whole.h5"});
   const FrfEstimate cut = read_frf(at("cut.h5"));
   const FrfEstimate whole = read_frf(at("whole.h5"));
   EXPECT_EQ(cut.response, whole.response);
@@ -187,7 +181,7 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
 
 TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
-  ends({"run", loud, "-o", name("loud.slog")}, 4, "|u|");
+  ends({"run", loud, "-o", "loud.slog"}, 4, "|u|");
   const json info = log_info("loud.slog");
   ASSERT_EQ(info["runs"].size(), 1U);
   EXPECT_FALSE(info["runs"][0]["complete"]);
@@ -250,18 +244,17 @@ TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
   run_with_fault("miss", "kind: missed_cycle, from_cycle: 1700, run: 2", 3,
                  "1 cycle is missing, 2 samples are marked as invalid: 'stageid log info'");
-  succeed({"frf", name("miss.slog"), "-o", name("f.h5")});
+  succeed({"frf", "miss.slog", "-o", "f.h5"});
 }
 
 TEST_F(Workflow, ReplayGivesTheSameLogAndNoticesADifference) {
   make_log();
-  succeed({"run", config_, "-o", name("again.slog"), "--backend", "replay", "--replay",
-           name("run.slog")});
-  succeed({"frf", name("run.slog"), "-o", name("a.h5")});
-  succeed({"frf", name("again.slog"), "-o", name("b.h5")});
+  succeed({"run", config_, "-o", "again.slog", "--backend", "replay", "--replay", "run.slog"});
+  succeed({"frf", "run.slog", "-o", "a.h5"});
+  succeed({"frf", "again.slog", "-o", "b.h5"});
   EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
   const std::string other = experiment("other.yaml", "rms_n: 1.0", "rms_n: 1.001");
-  ends({"run", other, "-o", name("c.slog"), "--backend", "replay", "--replay", name("run.slog")}, 3,
+  ends({"run", other, "-o", "c.slog", "--backend", "replay", "--replay", "run.slog"}, 3,
        "differ from the recorded ones");
 }
 
@@ -296,33 +289,32 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
 
 TEST_F(Workflow, AReportComparesWithAnotherDay) {
   make_frf();
-  succeed({"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"});
-  succeed({"report", name("frf.h5"), name("model.json"), "--compare", name("frf.h5"),
-           name("model.json"), "-o", name("r.html")});
+  succeed({"fit", "frf.h5", "-o", "model.json", "--band", "120", "800"});
+  succeed({"report", "frf.h5", "model.json", "--compare", "frf.h5", "model.json", "-o", "r.html"});
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("identical response"));
-  fail({"report", name("frf.h5"), "--compare", name("run.slog"), "-o", name("no.html")}, 2,
+  fail({"report", "frf.h5", "--compare", "run.slog", "-o", "no.html"}, 2,
        "run.slog: contains neither an FRF nor a model");
 }
 
 TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
   make_frf();
   const std::vector<std::vector<std::string>> commands = {
-      {"design", config_, "-o", name("e.h5")},
-      {"run", config_, "-o", name("r.slog")},
-      {"log", "info", name("run.slog")},
-      {"log", "verify", name("run.slog")},
-      {"log", "convert", name("run.slog"), "-o", name("r.csv")},
-      {"frf", name("run.slog"), "-o", name("f.h5")},
-      {"modes", name("frf.h5"), "-o", name("modes.json")},
-      {"fit", name("frf.h5"), "-o", name("model.json"), "--band", "120", "800"},
-      {"validate", name("model.json"), name("frf.h5")},
-      {"validate", name("model.json"), name("run.slog")},
-      {"export", name("model.json"), "-o", name("m.csv")},
-      {"report", name("frf.h5"), name("model.json"), name("run.slog"), "-o", name("r.html")},
+      {"design", config_, "-o", "e.h5"},
+      {"run", config_, "-o", "r.slog"},
+      {"log", "info", "run.slog"},
+      {"log", "verify", "run.slog"},
+      {"log", "convert", "run.slog", "-o", "r.csv"},
+      {"frf", "run.slog", "-o", "f.h5"},
+      {"modes", "frf.h5", "-o", "modes.json"},
+      {"fit", "frf.h5", "-o", "model.json", "--band", "120", "800"},
+      {"validate", "model.json", "frf.h5"},
+      {"validate", "model.json", "run.slog"},
+      {"export", "model.json", "-o", "m.csv"},
+      {"report", "frf.h5", "model.json", "run.slog", "-o", "r.html"},
       {"config", "schema"},
-      {"config", "check", config_, name("small_stage.yaml")},
-      {"identify", config_, "-o", name("all")}};
+      {"config", "check", config_, "small_stage.yaml"},
+      {"identify", config_, "-o", "all"}};
   for (std::vector<std::string> command : commands) {
     SCOPED_TRACE(command[0]);
     command.insert(command.begin(), "--json");
@@ -333,8 +325,7 @@ TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
 
 TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   make_model();
-  const json figures =
-      json::parse(succeed({"validate", name("model.json"), name("run.slog"), "--json"}).out);
+  const json figures = json::parse(succeed({"validate", "model.json", "run.slog", "--json"}).out);
   // Small relative to the motion itself; the remainder is transient and noise.
   EXPECT_LT(figures["time_domain"]["normalized"].get<double>(), 0.05);
   EXPECT_EQ(figures["time_domain"]["runs"], 9);
@@ -343,8 +334,7 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   for (Submodel& s : model.submodels)
     for (Eigen::MatrixXd& B : s.numerator) B *= 1.5;
   write_model(at("wrong.json"), model);
-  const json wrong =
-      json::parse(run({"validate", name("wrong.json"), name("run.slog"), "--json"}).out);
+  const json wrong = json::parse(run({"validate", "wrong.json", "run.slog", "--json"}).out);
   EXPECT_EQ(wrong["trustworthy"], false);
   EXPECT_NEAR(wrong["time_domain"]["normalized"].get<double>(), 0.5, 0.05);
 }
@@ -352,10 +342,9 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
 TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
   make_log();
   const auto first_flexible_mode = [&](const std::string& compensate) {
-    succeed({"frf", name("run.slog"), "-o", name(compensate + ".h5"), "--compensate", compensate});
-    const ProgramResult fit =
-        run({"fit", name(compensate + ".h5"), "-o", name(compensate + ".json"), "--direct-term",
-             "full", "--modes", "3", "--json"});
+    succeed({"frf", "run.slog", "-o", compensate + ".h5", "--compensate", compensate});
+    const ProgramResult fit = run({"fit", compensate + ".h5", "-o", compensate + ".json",
+                                   "--direct-term", "full", "--modes", "3", "--json"});
     const json modes = json::parse(fit.out)["modes"];
     const auto flexible = std::find_if(modes.begin(), modes.end(), [](const json& mode) {
       return mode["natural_frequency_hz"].get<double>() > 16.0;

@@ -17,55 +17,54 @@ TEST_F(BadRequest, WhatAModelHasNot) {
   model.outputs = {{"z1", "z2"}, {"m", "m"}};
   model.submodels = {{0, {1.0, 2e-3, 1e-6}, {Eigen::MatrixXd::Ones(2, 1)}, {}, {}}};
   write_model(at("model.json"), model);
-  const std::string file = name("model.json");
-  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z3", "a1"}, 2,
+  const std::string file = "model.json";
+  fail({"export", file, "-o", "m.h5", "--driving-point", "z3", "a1"}, 2,
        "--driving-point: 'z3' is not an output of the model; use one of z1, z2");
-  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1", "z1"}, 2,
-       "'z1' is not an input");
-  fail({"export", file, "-o", name("m.h5"), "--driving-point", "z1"}, 2, "--driving-point");
-  fail({"export", file, "-o", name("m.h5")}, 2, "submodel 0: its poles");
+  fail({"export", file, "-o", "m.h5", "--driving-point", "z1", "z1"}, 2, "'z1' is not an input");
+  fail({"export", file, "-o", "m.h5", "--driving-point", "z1"}, 2, "--driving-point");
+  fail({"export", file, "-o", "m.h5"}, 2, "submodel 0: its poles");
 }
 
 TEST_F(BadRequest, SubmodelsThatAreNone) {
-  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "2,0,0"}, 2,
+  fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "2,0,0"}, 2,
        "--submodel: '2,0,0': expected key=value, got '2'; for example n=4,m=3");
-  fail({"fit", "frf.h5", "-o", name("m.json"), "--submodel", "n=2,m=3"}, 2, "give at most 2");
+  fail({"fit", "frf.h5", "-o", "m.json", "--submodel", "n=2,m=3"}, 2, "give at most 2");
 }
 
 TEST_F(BadRequest, TheWrongKindOfFileSaysWhatComesFirst) {
   make_log();
-  fail({"frf", config_, "-o", name("x.h5")}, 2,
+  fail({"frf", config_, "-o", "x.h5"}, 2,
        "is an experiment file, not a log; use it with 'stageid identify'");
-  succeed({"log", "convert", name("run.slog"), "-o", name("run.h5")});
-  fail({"fit", name("run.h5"), "-o", name("m.json")}, 2, "run.h5:/: is a log in HDF5");
-  const std::string log = name("run.slog");
-  fail({"export", log, "-o", name("m.mat")}, 2, "run.slog: is a native log, not a model (.json);");
-  fail({"validate", log, name("frf.h5")}, 2, "run.slog: is a native log, not a model (.json);");
-  fail({"run", log, "-o", name("x.slog")}, 2, "run.slog: is a native log, not a YAML file;");
-  fail({"export", config_, "-o", name("m.mat")}, 2, "is an experiment file, not a model (.json);");
+  succeed({"log", "convert", "run.slog", "-o", "run.h5"});
+  fail({"fit", "run.h5", "-o", "m.json"}, 2, "run.h5:/: is a log in HDF5");
+  const std::string log = "run.slog";
+  fail({"export", log, "-o", "m.mat"}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"validate", log, "frf.h5"}, 2, "run.slog: is a native log, not a model (.json);");
+  fail({"run", log, "-o", "x.slog"}, 2, "run.slog: is a native log, not a YAML file;");
+  fail({"export", config_, "-o", "m.mat"}, 2, "is an experiment file, not a model (.json);");
 }
 
 TEST_F(BadRequest, MissingFiles) {
-  fail({"validate", name("none.json"), name("none.h5")}, 1, "none.json");
-  fail({"report", name("none"), "-o", name("r.html")}, 1, "does not exist");
-  fail({"log", "info", name("none.slog")}, 1, "none.slog");
-  fail({"import", name("none.csv")}, 1, "none.csv: cannot be read: No such file or directory;");
-  fail({"import", name(".")}, 1, "cannot be read: Is a directory; give the name of a file");
+  fail({"validate", "none.json", "none.h5"}, 1, "none.json");
+  fail({"report", "none", "-o", "r.html"}, 1, "does not exist");
+  fail({"log", "info", "none.slog"}, 1, "none.slog");
+  fail({"import", "none.csv"}, 1, "none.csv: cannot be read: No such file or directory;");
+  fail({"import", "."}, 1, "cannot be read: Is a directory; give the name of a file");
 }
 
 TEST_F(BadRequest, WhatIsNoTableAndNoReport) {
   write_bytes(at("empty.csv"), "");
-  fail({"import", name("empty.csv")}, 2, "empty.csv: contains no table;");
+  fail({"import", "empty.csv"}, 2, "empty.csv: contains no table;");
   write_bytes(at("head.csv"), "u,y\n");
-  fail({"import", name("head.csv")}, 2, "head.csv: contains column names but no row of numbers;");
-  fail({"report", name("head.csv"), "-o", name("r.html")}, 2, "cannot be shown in a report");
+  fail({"import", "head.csv"}, 2, "head.csv: contains column names but no row of numbers;");
+  fail({"report", "head.csv", "-o", "r.html"}, 2, "cannot be shown in a report");
   fail({"import", config_}, 2, "is an experiment file, not a file of another program;");
-  fail({"run", config_, "-o", name("x.txt")}, 2, "x.txt: a log is written as .slog;");
+  fail({"run", config_, "-o", "x.txt"}, 2, "x.txt: a log is written as .slog;");
 }
 
 TEST_F(BadRequest, Configurations) {
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
-    fail({"design", experiment("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+    fail({"design", experiment("bad.yaml", from, to), "-o", "e.h5"}, 2, text);
   };
   wrong("axes: [a1, a2, a3]", "axes: [a1, a1]", "duplicate entry 'a1'");
   wrong("direct_term: full", "hold: perfect", "expected one of none, phase, sinc, exact, by_frf");
@@ -76,19 +75,18 @@ TEST_F(BadRequest, Configurations) {
   wrong("direct_term: full", "submodels: [{n: 2, damping_ratio: [2]}]", "damping_ratio");
   wrong("suspension_hz: [0.4, 0.5]", "suspension_hz: [0.4, -1]", "suspension_hz");
   write_bytes(at("cut.yaml"), read_bytes(config_).substr(0, 320));
-  fail({"design", name("cut.yaml"), "-o", name("e.h5")}, 2, "cut.yaml:");
+  fail({"design", "cut.yaml", "-o", "e.h5"}, 2, "cut.yaml:");
   write_bytes(at("binary.yaml"), std::string("\x7F"
                                              "ELF\x02\x01\x01\x00",
                                              8));
-  fail({"design", name("binary.yaml"), "-o", name("e.h5")}, 2,
-       "binary.yaml:1:1: byte 0x7F is not text");
+  fail({"design", "binary.yaml", "-o", "e.h5"}, 2, "binary.yaml:1:1: byte 0x7F is not text");
   write_bytes(at("deep.yaml"), std::string(500000, '['));
-  fail({"design", name("deep.yaml"), "-o", name("e.h5")}, 2, "deep.yaml:1:");
+  fail({"design", "deep.yaml", "-o", "e.h5"}, 2, "deep.yaml:1:");
 }
 
 TEST_F(BadRequest, StageFiles) {
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
-    fail({"design", stage("bad.yaml", from, to), "-o", name("e.h5")}, 2, text);
+    fail({"design", stage("bad.yaml", from, to), "-o", "e.h5"}, 2, text);
   };
   wrong("backend: sim", "backend: cann", "did you mean 'can'?");
   wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor observes Rx
@@ -100,7 +98,7 @@ TEST_F(BadRequest, StageFiles) {
 
 TEST_F(BadRequest, Modbus) {
   const auto wrong = [&](const std::string& group, const std::string& text) {
-    fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", name("e.h5")}, 2, text);
+    fail({"design", stage("bad.yaml", "noise:", group + "\nnoise:"), "-o", "e.h5"}, 2, text);
   };
   wrong("modbus: {unit: 1}", "modbus: write exactly one of tcp and rtu");
   wrong("modbus: {tcp: {port: 1}, rtu: {device: x}}", "modbus: write exactly one of tcp and rtu");
@@ -118,13 +116,13 @@ TEST_F(BadRequest, Modbus) {
       "modbus: {rtu: {device: x}}\nsupervisor: {modbus: {rtu: {device: x}}, temperature_k: [1, 2], "
       "gravity_compensator_n: [1, 2]}",
       "uses the same serial line");
-  fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", name("e.h5")}, 2,
+  fail({"design", stage("bad.yaml", "backend: sim", "backend: modbus"), "-o", "e.h5"}, 2,
        "backend: modbus needs the group 'modbus'");
-  fail({"run", config_, "-o", name("x.slog"), "--backend", "modbus"}, 2, "has no group 'modbus'");
+  fail({"run", config_, "-o", "x.slog", "--backend", "modbus"}, 2, "has no group 'modbus'");
 }
 
 TEST_F(BadRequest, NodesThatCannotBeServed) {
-  fail({"node", name("small_stage.yaml"), "--can", "can0"}, 2, "has no group 'can'");
+  fail({"node", "small_stage.yaml", "--can", "can0"}, 2, "has no group 'can'");
   const std::string file = std::string(STAGEID_SOURCE_DIR) + "/configs/stage/small_stage.yaml";
   fail({"node", file, "--modbus-tcp", "0", "--modbus-fault", "late"}, 2,
        "--modbus-fault: fault 'late'");
@@ -135,8 +133,8 @@ TEST_F(BadRequest, NodesThatCannotBeServed) {
 
 TEST_F(BadRequest, BackEndsOfTheStageFile) {
   const std::string can = stage("can.yaml", "backend: sim", "backend: can");
-  fail({"run", can, "-o", name("x.slog")}, 2, "has no group 'can'");
-  fail({"identify", can, "-o", name("dir")}, 2, "has no group 'can'");
+  fail({"run", can, "-o", "x.slog"}, 2, "has no group 'can'");
+  fail({"identify", can, "-o", "dir"}, 2, "has no group 'can'");
 }
 
 TEST_F(BadRequest, WhatACanBusCannotCarry) {
@@ -144,14 +142,13 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
     return stage("can.yaml", "backend: sim", "backend: can\ncan: {" + group + "}");
   };
   // Frames of 20 and 16 bytes at 1 and 0.5 Mbit/s: (34 + 476) + (34 + 386) us; heartbeats: 1.07 %.
-  fail({"run", behind_can("buses: [{interface: can0, data_bit_rate_hz: 500e3}]"), "-o",
-        name("x.slog")},
+  fail({"run", behind_can("buses: [{interface: can0, data_bit_rate_hz: 500e3}]"), "-o", "x.slog"},
        2,
        "can: can0 would have a load of 187 % at 2000 Hz (930 us per cycle); the limit is 80 %. Use "
        "at most "
        "849 Hz");
   const auto wrong = [&](const std::string& group, const std::string& text) {
-    fail({"run", behind_can(group), "-o", name("x.slog")}, 2, text);
+    fail({"run", behind_can(group), "-o", "x.slog"}, 2, text);
   };
   wrong("mode: resident", "'buses'");
   wrong("buses: []", "buses");
@@ -170,41 +167,41 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
 
 TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
-  fail({"identify", loud, "-o", name("dir")}, 2, "|u| would be");
-  const ProgramResult design = ends({"design", loud, "-o", name("e.h5")}, 2);
+  fail({"identify", loud, "-o", "dir"}, 2, "|u| would be");
+  const ProgramResult design = ends({"design", loud, "-o", "e.h5"}, 2);
   EXPECT_THAT(design.out, testing::HasSubstr("EXCEEDED"));
   EXPECT_FALSE(std::filesystem::exists(at("e.h5")));
-  succeed({"design", loud, "-o", name("e.h5"), "--force"});
+  succeed({"design", loud, "-o", "e.h5", "--force"});
   EXPECT_TRUE(std::filesystem::exists(at("e.h5")));
 }
 
 TEST_F(BadRequest, AnExistingLogIsNotOverwritten) {
   make_log();
-  fail({"run", config_, "-o", name("run.slog")}, 2, "already exists; continue it with --resume");
+  fail({"run", config_, "-o", "run.slog"}, 2, "already exists; continue it with --resume");
   const std::string other = experiment("other.yaml", "seed: 7", "seed: 8");
-  fail({"run", other, "-o", name("run.slog"), "--resume"}, 2, "belongs to another experiment");
+  fail({"run", other, "-o", "run.slog", "--resume"}, 2, "belongs to another experiment");
 }
 
 TEST_F(BadRequest, Outputs) {
   make_model();
   std::filesystem::create_directory(at("folder"));
   const std::vector<std::vector<std::string>> commands = {
-      {"design", config_},        {"run", config_},
-      {"frf", name("run.slog")},  {"modes", name("frf.h5")},
-      {"fit", name("frf.h5")},    {"export", name("model.json")},
-      {"report", name("frf.h5")}, {"log", "convert", name("run.slog")}};
+      {"design", config_},  {"run", config_},
+      {"frf", "run.slog"},  {"modes", "frf.h5"},
+      {"fit", "frf.h5"},    {"export", "model.json"},
+      {"report", "frf.h5"}, {"log", "convert", "run.slog"}};
   for (std::vector<std::string> command : commands) {
     command.insert(command.end(), {"-o", ""});
     for (std::string place : {"nowhere/x.h5", "experiment.yaml/x.h5"}) {
       if (command[0] == "run") place = replaced(place, ".h5", ".slog");
-      command.back() = name(place);
+      command.back() = place;
       fail(command, 1, place);
     }
     if (command[0] == "export" || command[0] == "log" || command[0] == "run") continue;
-    command.back() = name("folder");
+    command.back() = "folder";
     fail(command, 1, "is a directory");
   }
-  fail({"identify", config_, "-o", name("experiment.yaml")}, 1, "experiment.yaml");
+  fail({"identify", config_, "-o", "experiment.yaml"}, 1, "experiment.yaml");
   fail({"identify", config_, "-o", "/proc/stageid"}, 1, "/proc/stageid");
 }
 
@@ -212,19 +209,19 @@ TEST_F(BadRequest, AFullDiskLeavesNothingBehind) {
   make_model();
   ProgramOptions full;
   full.largest_file_bytes = 2000;
-  fail({"design", config_, "-o", name("e.h5")}, 1, "e.h5", full);
-  fail({"frf", name("run.slog"), "-o", name("f.h5")}, 1, "f.h5", full);
-  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--band", "120", "800"}, 1, "m.json", full);
-  fail({"export", name("model.json"), "-o", name("m.h5")}, 1, "m.h5", full);
-  fail({"export", name("model.json"), "-o", name("m.csv")}, 1, "m.csv", full);
-  fail({"report", name("frf.h5"), "-o", name("r.html")}, 1, "r.html", full);
-  fail({"export", name("model.json"), "-o", name("m.mat")}, 1, "m.mat: cannot be written", full);
-  fail({"log", "convert", name("run.slog"), "-o", name("l.h5")}, 1, "l.h5", full);
-  fail({"log", "convert", name("run.slog"), "-o", name("l.csv")}, 1, "l.csv: cannot be wr", full);
+  fail({"design", config_, "-o", "e.h5"}, 1, "e.h5", full);
+  fail({"frf", "run.slog", "-o", "f.h5"}, 1, "f.h5", full);
+  fail({"fit", "frf.h5", "-o", "m.json", "--band", "120", "800"}, 1, "m.json", full);
+  fail({"export", "model.json", "-o", "m.h5"}, 1, "m.h5", full);
+  fail({"export", "model.json", "-o", "m.csv"}, 1, "m.csv", full);
+  fail({"report", "frf.h5", "-o", "r.html"}, 1, "r.html", full);
+  fail({"export", "model.json", "-o", "m.mat"}, 1, "m.mat: cannot be written", full);
+  fail({"log", "convert", "run.slog", "-o", "l.h5"}, 1, "l.h5", full);
+  fail({"log", "convert", "run.slog", "-o", "l.csv"}, 1, "l.csv: cannot be wr", full);
   // The part recorded before the disk was full is kept.
   full.largest_file_bytes = 200000;
-  const std::string place = name("full.slog") + ": cannot be written: File too large; raise";
-  ends({"run", config_, "-o", name("full.slog")}, 1, "stageid: " + place, full);  // named once
+  ends({"run", config_, "-o", "full.slog"}, 1,
+       "stageid: full.slog: cannot be written: File too large; raise", full);  // named once
   EXPECT_TRUE(std::filesystem::exists(at("full.slog")));
 }
 
@@ -234,22 +231,22 @@ TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
   const auto refused = [&](const std::vector<std::string>& words) {
     fail(words, 2, "is an input file and would be overwritten");
   };
-  const std::string log = name("run.slog");
-  const std::string frf = name("frf.h5");
+  const std::string log = "run.slog";
+  const std::string frf = "frf.h5";
   refused({"frf", log, "-o", log});
   refused({"fit", frf, "-o", frf});
   refused({"modes", frf, "-o", frf});
   refused({"design", config_, "-o", config_});
-  succeed({"log", "convert", log, "-o", name("log.h5")});
-  refused({"log", "convert", name("log.h5"), "-o", name("log.h5")});
-  succeed({"export", frf, "-o", name("f.uff")});
+  succeed({"log", "convert", log, "-o", "log.h5"});
+  refused({"log", "convert", "log.h5", "-o", "log.h5"});
+  succeed({"export", frf, "-o", "f.uff"});
   // Another name of the same file.
   const auto link = [&](const char* to, const char* from) {
     std::filesystem::create_symlink(to, at(from));
-    return name(from);
+    return std::string(from);
   };
   refused({"frf", log, "-o", link("run.slog", "link.h5")});
-  refused({"import", name("f.uff"), "-o", link("f.uff", "again.h5")});
+  refused({"import", "f.uff", "-o", link("f.uff", "again.h5")});
   refused({"export", frf, "-o", link("frf.h5", "export.mat")});
   refused({"report", frf, "-o", link("frf.h5", "page.html")});
   refused({"report", log, "-o", link("frf.h5", "other.html"), "--compare", frf});
@@ -258,23 +255,21 @@ TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
 
 TEST_F(BadRequest, Reports) {
   make_frf();
-  const std::string frf = name("frf.h5");
-  fail({"report", frf, frf, "-o", name("r.html")}, 2, "frf.h5: duplicate file");
+  const std::string frf = "frf.h5";
+  fail({"report", frf, frf, "-o", "r.html"}, 2, "frf.h5: duplicate file");
   write_bytes(at("cut.json"), "{\"format\": \"stageid-mo");
-  fail({"report", frf, name("cut.json"), "-o", name("r.html")}, 2,
-       "cut.json: is not JSON, or is truncated");
+  fail({"report", frf, "cut.json", "-o", "r.html"}, 2, "cut.json: is not JSON, or is truncated");
   write_bytes(at("new.json"), "{\"format\": \"stageid-model\", \"format_version\": 9}");
-  fail({"report", frf, name("new.json"), "-o", name("r.html")}, 2,
-       "format_version: is 9; must be 1");
-  fail({"report", frf, "-o", name("nowhere/r.html")}, 1,
+  fail({"report", frf, "new.json", "-o", "r.html"}, 2, "format_version: is 9; must be 1");
+  fail({"report", frf, "-o", "nowhere/r.html"}, 1,
        "No such file or directory; create the directory first");
-  fail({"report", frf, "-o", name("r.html"), "--compare", name("none")}, 1,
+  fail({"report", frf, "-o", "r.html", "--compare", "none"}, 1,
        "none: does not exist; check the path");
 }
 
 TEST_F(BadRequest, NamesThatAreNearOnes) {
   make_log();
-  fail({"frf", name("run.slog"), "-o", name("x.h5"), "--inputs", "a1,A2,a3"}, 2,
+  fail({"frf", "run.slog", "-o", "x.h5", "--inputs", "a1,A2,a3"}, 2,
        "inputs: unknown actuator 'A2'");
   fail(
       {"config", "check", experiment("e.yaml", "rigid_body: suspension", "rigid_body: suspention")},
@@ -285,17 +280,17 @@ TEST_F(BadRequest, AControllerThatDoesNotHoldThePlant) {
   write_bytes(at("small_stage.yaml"), replaced(read_bytes(at("small_stage.yaml")),
                                                "crossover_hz: 20,", "crossover_hz: 200,"));
   const std::string text = "small_stage.yaml: the controller does not stabilize the plant";
-  fail({"design", config_, "-o", name("e.h5")}, 2, text);
-  fail({"run", config_, "-o", name("r.slog")}, 2, text);
-  fail({"identify", config_, "-o", name("all")}, 2, text);
+  fail({"design", config_, "-o", "e.h5"}, 2, text);
+  fail({"run", config_, "-o", "r.slog"}, 2, text);
+  fail({"identify", config_, "-o", "all"}, 2, text);
   fail({"config", "check", config_}, 2, text);
-  fail({"config", "check", name("small_stage.yaml")}, 2, text);
+  fail({"config", "check", "small_stage.yaml"}, 2, text);
 }
 
 TEST_F(BadRequest, Fits) {
   make_frf();
   const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
-    flags.insert(flags.begin(), {"fit", name("frf.h5"), "-o", name("m.json")});
+    flags.insert(flags.begin(), {"fit", "frf.h5", "-o", "m.json"});
     fail(flags, 2, text);
   };
   wrong({"--rigid-body", "suspention"}, "or suspension:F1:F2 (Hz) (did you mean 'suspension'?)");
@@ -303,7 +298,7 @@ TEST_F(BadRequest, Fits) {
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with general damping");
   wrong({"--modes", "500"}, "modes: 500 is too many; 197 lines support at most 65;");
   wrong({"--modes", "12,x"}, "--modes");
-  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", "many"}, 1,
+  fail({"fit", "frf.h5", "-o", "m.json", "--modes", "many"}, 1,
        "--modes: 'many': no such file; use auto");
   wrong({"--hold", "exakt"}, "did you mean 'exact'?");
   wrong({"--delay", "soon"}, "--delay");
@@ -311,8 +306,8 @@ TEST_F(BadRequest, Fits) {
   wrong({"--damping", "viscous"}, "--damping");
   wrong({"--method", "sgd"}, "--method");
   wrong({"--max-iterations", "0"}, "max_iterations");
-  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--weighting", name("none.h5")}, 1, "none.h5");
-  fail({"modes", name("frf.h5"), "--band", "900", "950"}, 2, "contains no lines");
+  fail({"fit", "frf.h5", "-o", "m.json", "--weighting", "none.h5"}, 1, "none.h5");
+  fail({"modes", "frf.h5", "--band", "900", "950"}, 2, "contains no lines");
 }
 
 }  // namespace test_bad_request

@@ -117,13 +117,13 @@ class WeightsOfTheProgram : public test::ProgramTest {};
 
 TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   const FrfEstimate frf = test::numbered_frf();
-  write_frf(name("frf.h5"), frf);
+  write_frf(at("frf.h5"), frf);
   std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
   weights[5] = -1.0;
   write_weights(at("w.h5"), weights);
-  fail({"fit", name("frf.h5"), "-o", name("model.json"), "--weighting", name("w.h5")}, 3,
+  fail({"fit", "frf.h5", "-o", "model.json", "--weighting", "w.h5"}, 3,
        "-1; weights must be 0 or more");
-  EXPECT_FALSE(std::filesystem::exists(name("model.json")));
+  EXPECT_FALSE(std::filesystem::exists(at("model.json")));
 }
 
 }  // namespace test_weight_flag

@@ -19,7 +19,7 @@ class DamagedData : public ProgramTest {
  protected:
   void make_hdf5_log() const {
     make_log();
-    succeed({"log", "convert", name("run.slog"), "-o", name("whole.h5")});
+    succeed({"log", "convert", "run.slog", "-o", "whole.h5"});
   }
   /// A copy of `whole` after an operation.
   std::string spoilt(const std::string& whole, const Operation& operate) const {
@@ -27,7 +27,7 @@ class DamagedData : public ProgramTest {
                                std::filesystem::copy_options::overwrite_existing);
     Hdf5Surgery surgery(at("spoilt.h5"));
     operate(surgery);
-    return name("spoilt.h5");
+    return "spoilt.h5";
   }
 };
 
@@ -36,7 +36,7 @@ TEST_F(DamagedData, NativeLogs) {
   const std::string whole = read_bytes(at("run.slog"));
   const auto frf = [&](const std::string& bytes, const std::string& text) {
     write_bytes(at("bad.slog"), bytes);
-    fail({"frf", name("bad.slog"), "-o", name("f.h5")}, 2, text);
+    fail({"frf", "bad.slog", "-o", "f.h5"}, 2, text);
   };
   frf(whole.substr(0, whole.size() * 2 / 3), "stageid log recover");
   frf(whole.substr(0, 10), "bad.slog");
@@ -46,9 +46,9 @@ TEST_F(DamagedData, NativeLogs) {
     std::string flipped = whole;
     flipped[static_cast<std::size_t>(place * static_cast<double>(whole.size()))] ^= 0x10;
     frf(flipped, "bad.slog");
-    ends({"log", "verify", name("bad.slog")}, 2, "stageid log recover");
+    ends({"log", "verify", "bad.slog"}, 2, "stageid log recover");
   }
-  EXPECT_THAT(succeed({"log", "verify", name("run.slog")}).out, testing::HasSubstr("intact"));
+  EXPECT_THAT(succeed({"log", "verify", "run.slog"}).out, testing::HasSubstr("intact"));
 }
 
 TEST_F(DamagedData, RecoverSavesWhatIsLeft) {
@@ -56,17 +56,17 @@ TEST_F(DamagedData, RecoverSavesWhatIsLeft) {
   const std::string whole = read_bytes(at("run.slog"));
   write_bytes(at("cut.slog"), whole.substr(0, whole.size() * 2 / 3));
   const ProgramResult recover =
-      succeed({"log", "recover", name("cut.slog"), "-o", name("saved.slog"), "--json"});
+      succeed({"log", "recover", "cut.slog", "-o", "saved.slog", "--json"});
   EXPECT_THAT(recover.out, testing::HasSubstr("\"complete_runs\": 5"));
-  fail({"log", "recover", name("cut.slog"), "-o", name("saved.slog")}, 2, "already exists");
-  succeed({"log", "verify", name("saved.slog")});
-  succeed({"frf", name("saved.slog"), "-o", name("f.h5"), "--realizations", "1"});
+  fail({"log", "recover", "cut.slog", "-o", "saved.slog"}, 2, "already exists");
+  succeed({"log", "verify", "saved.slog"});
+  succeed({"frf", "saved.slog", "-o", "f.h5", "--realizations", "1"});
 }
 
 TEST_F(DamagedData, Hdf5Logs) {
   make_hdf5_log();
   const auto wrong = [&](const Operation& operate, const std::string& text) {
-    fail({"frf", spoilt("whole.h5", operate), "-o", name("f.h5")}, 2, text);
+    fail({"frf", spoilt("whole.h5", operate), "-o", "f.h5"}, 2, text);
   };
   const double nan = std::nan("");
   const double infinity = std::numeric_limits<double>::infinity();
@@ -89,7 +89,7 @@ TEST_F(DamagedData, ExperimentsThatDoNotSuffice) {
   const std::string fewer = spoilt("whole.h5", [](auto& h) {
     for (const char* run : {"/runs/0002", "/runs/0005", "/runs/0008"}) h.remove(run);
   });
-  fail({"frf", fewer, "-o", name("f.h5"), "--inputs", "a1,a2,a3"}, 2, "experiments");
+  fail({"frf", fewer, "-o", "f.h5", "--inputs", "a1,a2,a3"}, 2, "experiments");
 }
 
 /// Of every three experiments, the second repeats the first.
@@ -106,10 +106,10 @@ void repeat_first_experiment(Hdf5Surgery& log) {
 TEST_F(DamagedData, AnAxisThatIsNeverExcitedIsRefusedOrLeftOut) {
   make_hdf5_log();
   const std::string two_axes = spoilt("whole.h5", repeat_first_experiment);
-  fail({"frf", two_axes, "-o", name("f.h5"), "--inputs", "a1,a2,a3"}, 2,
+  fail({"frf", two_axes, "-o", "f.h5", "--inputs", "a1,a2,a3"}, 2,
        "3 inputs but only 2 excited axes (a1, a3)");
   // If it is not requested, it is omitted. It moves with the loop, so the response is not that of the plant.
-  const ProgramResult without = ends({"frf", two_axes, "-o", name("f.h5")}, 3);
+  const ProgramResult without = ends({"frf", two_axes, "-o", "f.h5"}, 3);
   EXPECT_THAT(without.out,
               testing::ContainsRegex("fault +a2 +is not an input of the sub-plant but moves"));
 }
@@ -118,7 +118,7 @@ TEST_F(DamagedData, ThreeExperimentsOfRankTwoAreSingular) {
   // Every axis moves in every experiment, so only the rank reveals the missing one.
   config_ = experiment("all_axes.yaml", "lines: all", "lines: all\n  scheme: orthogonal_dft");
   make_hdf5_log();
-  fail({"frf", spoilt("whole.h5", repeat_first_experiment), "-o", name("f.h5")}, 2,
+  fail({"frf", spoilt("whole.h5", repeat_first_experiment), "-o", "f.h5"}, 2,
        "singular excitation in realization 1 (counted from 1), line 4 (16 Hz)");
 }
 
@@ -128,8 +128,8 @@ TEST_F(DamagedData, Hdf5FilesCutOrFlipped) {
   for (const char* file : {"whole.h5", "frf.h5"}) {
     const std::string whole = read_bytes(at(file));
     const std::vector<std::string> command =
-        std::string(file) == "frf.h5" ? std::vector<std::string>{"modes", name("bad.h5")}
-                                      : std::vector<std::string>{"log", "info", name("bad.h5")};
+        std::string(file) == "frf.h5" ? std::vector<std::string>{"modes", "bad.h5"}
+                                      : std::vector<std::string>{"log", "info", "bad.h5"};
     for (const std::size_t size :
          {std::size_t{5}, std::size_t{100}, whole.size() / 2, whole.size() - 1}) {
       write_bytes(at("bad.h5"), whole.substr(0, size));
@@ -147,7 +147,7 @@ TEST_F(DamagedData, Hdf5FilesCutOrFlipped) {
 TEST_F(DamagedData, FrequencyResponses) {
   make_frf();
   const auto wrong = [&](const Operation& operate, const std::string& text) {
-    fail({"fit", spoilt("frf.h5", operate), "-o", name("m.json")}, 2, text);
+    fail({"fit", spoilt("frf.h5", operate), "-o", "m.json"}, 2, text);
   };
   const double nan = std::nan("");
   wrong([&](auto& h) { h.poke("/response", 17, nan); }, "/response");
@@ -166,15 +166,14 @@ TEST_F(DamagedData, FrequencyResponses) {
 
 TEST_F(DamagedData, FilesOfAnotherKind) {
   make_model();
-  fail({"fit", name("model.json"), "-o", name("m.json")}, 2, "model.json");
-  fail({"fit", name("run.slog"), "-o", name("m.json")}, 2, "run.slog");
-  fail({"frf", name("frf.h5"), "-o", name("f.h5")}, 2, "frf.h5");
-  fail({"export", name("frf.h5"), "-o", name("m.h5")}, 2, "frf.h5");
-  fail({"report", config_, "-o", name("r.html")}, 2, "experiment.yaml:");
-  fail({"fit", name("frf.h5"), "-o", name("m.json"), "--modes", name("model.json")}, 2,
-       "model.json");
+  fail({"fit", "model.json", "-o", "m.json"}, 2, "model.json");
+  fail({"fit", "run.slog", "-o", "m.json"}, 2, "run.slog");
+  fail({"frf", "frf.h5", "-o", "f.h5"}, 2, "frf.h5");
+  fail({"export", "frf.h5", "-o", "m.h5"}, 2, "frf.h5");
+  fail({"report", config_, "-o", "r.html"}, 2, "experiment.yaml:");
+  fail({"fit", "frf.h5", "-o", "m.json", "--modes", "model.json"}, 2, "model.json");
   write_bytes(at("cut.json"), read_bytes(at("model.json")).substr(0, 500));
-  fail({"export", name("cut.json"), "-o", name("m.h5")}, 2, "cut.json");
+  fail({"export", "cut.json", "-o", "m.h5"}, 2, "cut.json");
 }
 
 }  // namespace test_damaged_data
