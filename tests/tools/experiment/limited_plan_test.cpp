@@ -11,6 +11,7 @@
 #include "acquisition/record/log_reader.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/response/confidence.hpp"
+#include "tests/tools/experiment/exact_pilot.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/experiment/config_plan.hpp"
 
@@ -110,37 +111,25 @@ TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
 // Against the exact sampled plant of the stage, far below the lines that are known.
 TEST_F(LimitedPlanTest, BelowItsLinesAPriorIsARigidBodyWithCompliance) {
   const WaferStageSpec stage = load_stage_config(at("small_stage.yaml")).spec;
-  const auto exact = [&](double f_hz) {
-    return sampled_response(wafer_stage_modes(stage), stage.delay_s, stage.info.sample_rate_hz,
-                            f_hz);
+  const auto write_prior = [&](double low_hz, double high_hz) {
+    write_frf(at("prior.h5"), exact_pilot(stage, Eigen::VectorXd::LinSpaced(60, low_hz, high_hz)));
   };
-  FrfEstimate frf;
-  frf.frequency_hz = Eigen::VectorXd::LinSpaced(60, 50.0, 286.0);  // over the modes from 170 Hz on
-  frf.inputs = {{"a1", "a2", "a3"}, {"N", "N", "N"}};
-  frf.outputs = {{"s1", "s2"}, {"m", "m"}};
-  frf.response.resize(6, frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    frf.response.col(k) = exact(frf.frequency_hz[k]).reshaped();
-  frf.sample_rate_hz = stage.info.sample_rate_hz;
-  frf.hold = Hold::zoh;
-  write_frf(at("prior.h5"), frf);
+  write_prior(50.0, 286.0);  // over the modes from 170 Hz on
   const Eigen::VectorXd below{{5.0, 20.0, 40.0}};
   const Eigen::VectorXd lines{{60.0, 100.0}};
   const PlantPrior prior = read_plant_prior(at("prior.h5"), stage.info, lines, below);
   EXPECT_EQ(prior.extrapolated_below_hz, 50.0);
   EXPECT_LT(prior.extrapolation_misfit, 0.02);
+  const FrfEstimate exact = exact_pilot(stage, below);
   for (Eigen::Index b = 0; b < below.size(); ++b) {
-    const Eigen::MatrixXcd G = exact(below[b]);
+    const Eigen::MatrixXcd G = exact.response.col(b).reshaped(2, 3);
     EXPECT_LT((prior.below_band[static_cast<std::size_t>(b)] - G).norm(), 0.03 * G.norm());
   }
   const PlantPrior all = read_plant_prior(at("prior.h5"), stage.info, lines);
   EXPECT_EQ(all.extrapolated_below_hz, 0.0);
   EXPECT_TRUE(all.below_band.empty());
 
-  frf.frequency_hz = Eigen::VectorXd::LinSpaced(60, 150.0, 209.0);  // nothing of the rigid body
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    frf.response.col(k) = exact(frf.frequency_hz[k]).reshaped();
-  write_frf(at("prior.h5"), frf);
+  write_prior(150.0, 209.0);  // nothing of the rigid body
   const PlantPrior doubtful =
       read_plant_prior(at("prior.h5"), stage.info, Eigen::VectorXd{{160.0, 180.0}}, below);
   EXPECT_GT(doubtful.extrapolation_misfit, 0.05);
@@ -245,9 +234,8 @@ TEST_F(LimitedPlanTest, WithTheExactPlantThePredictionIsThatOfTheStage) {
   const ExperimentPlan plan = make_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
   PlantPrior exact;
-  for (const double f : plan.grid().frequency_hz())
-    exact.response.push_back(
-        sampled_response(wafer_stage_modes(stage), stage.delay_s, stage.info.sample_rate_hz, f));
+  for (const auto& column : exact_pilot(stage, plan.grid().frequency_hz()).response.colwise())
+    exact.response.push_back(column.reshaped(2, 3));
   exact.sensor_known.assign(2, true);
   exact.actuator_known.assign(3, true);
   const BoundedLoop loop =

@@ -5,30 +5,13 @@
 
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/loop_stability.hpp"
-#include "tests/support/logs/faulty_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
+#include "tests/tools/experiment/exact_pilot.hpp"
 
 namespace stageid {
 namespace test_loop_check {
 
 using testing::HasSubstr;
-
-/// The exact response of the stage, as a pilot of it without noise.
-FrfEstimate exact_pilot(const WaferStageSpec& stage) {
-  FrfEstimate frf;
-  frf.frequency_hz = Eigen::VectorXd::LinSpaced(474, 4.0, 950.0);
-  frf.sample_rate_hz = stage.info.sample_rate_hz;
-  frf.hold = Hold::zoh;
-  frf.inputs = test::list_of(stage.info.actuators);
-  frf.outputs = test::list_of(stage.info.sensors);
-  const std::vector<PlantMode> modes = wafer_stage_modes(stage);
-  frf.response.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    frf.response.col(k) =
-        sampled_response(modes, stage.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k])
-            .reshaped();
-  return frf;
-}
 
 WaferStageSpec with_gain(WaferStageSpec stage, double factor) {
   for (AxisController& axis : stage.controller.axes) axis.gain *= factor;
@@ -41,7 +24,8 @@ class LoopCheckTest : public testing::Test {
       : config_(load_experiment_config(std::filesystem::path(STAGEID_SOURCE_DIR) /
                                        "configs/experiment/small_stage_limits.yaml")) {
     config_.limits->prior = directory_ / "pilot.h5";
-    write_frf(config_.limits->prior, exact_pilot(config_.stage.spec));
+    write_frf(config_.limits->prior,
+              test::exact_pilot(config_.stage.spec, Eigen::VectorXd::LinSpaced(474, 4.0, 950.0)));
   }
   const test::TemporaryDirectory directory_;
   ExperimentConfig config_;
