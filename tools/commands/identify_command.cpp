@@ -97,32 +97,246 @@ class Identification {
 
   /// @returns the exit code: kDone, kNotTrustworthy, or that of the measurement.
   /// @throws FileError, FormatError, std::invalid_argument, StageError, Interrupted
-  int run();
+  int run() {
+    for (const char* name : kResults) note_own_file(path(name));
+    require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
+    say_at_interrupt("finished steps are kept; continue with --resume");
+    design();
+    const int measured = measure_all();
+    if (measured != kDone && measured != kNotTrustworthy) return measured;
+    estimate();
+    pick();
+    fit();
+    if (exit_code_ == kInterrupted) return exit_code_;
+    check_model();
+    write_outputs();
+    print_summary();
+    return exit_code_ != kDone || verdict_.trustworthy ? exit_code_
+                                                       : static_cast<int>(kNotTrustworthy);
+  }
 
  private:
-  std::filesystem::path path(const char* name) const { return flags_.output / name; }
-  void design();
-  int measure_all();
-  void estimate();
-  FrfEstimate estimate_into(const char* name, const std::vector<int>& realizations);
-  void pick();
-  void fit();
-  bool fit_is_up_to_date(const FitSetup& setup, const std::string& frf_fingerprint) const;
-  void check_model();
-  void write_outputs();
-  void print_summary() const;
-  nlohmann::ordered_json summary() const;
-  void finish_step(const char* name, double seconds, std::string note);
-  void add_notes(const std::vector<std::string>& more) {
-    notes_.insert(notes_.end(), more.begin(), more.end());
-  }
-  std::vector<int> fitted_realizations() const;
-
   struct Step {
     std::string name;
     double seconds = 0.0;
     std::string note;
   };
+
+  std::filesystem::path path(const char* name) const { return flags_.output / name; }
+  void add_notes(const std::vector<std::string>& more) {
+    notes_.insert(notes_.end(), more.begin(), more.end());
+  }
+
+  void finish_step(const char* name, double seconds, std::string note) {
+    console_.message(fmt::format("{:<9} {:6.1f} s  {}", name, seconds, note));
+    steps_.push_back({name, seconds, std::move(note)});
+  }
+
+  void design() {
+    const SteadyClock::time_point start = SteadyClock::now();
+    if (flags_.resume && std::filesystem::exists(path("excitation.h5")) &&
+        is_complete(path("run.slog"), config_, plan_)) {
+      finish_step("design", seconds_since(start), "up to date");
+      return;
+    }
+    // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
+    const DesignPrediction prediction =
+        config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
+    if (!config_.limits) warn_of_prediction(config_, console_);
+    if (!flags_.force) require_within_limits(config_, prediction);
+    require_directory(flags_.output);
+    write_experiment_plan(path("excitation.h5"), plan_);
+    for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
+    finish_step("design", seconds_since(start),
+                fmt::format("{}, {:.1f} min of stage time, {}", counted(plan_.runs().size(), "run"),
+                            plan_.duration_s() / 60.0, counted(plan_.grid().size(), "line")));
+  }
+
+  int measure_all() {
+    if (flags_.resume && is_complete(path("run.slog"), config_, plan_)) {
+      finish_step("run", 0.0, "up to date");
+      return kDone;
+    }
+    MeasurementRequest request;
+    request.log = path("run.slog");
+    request.resume = flags_.resume;
+    request.backend = config_.stage.backend;
+    const MeasurementResult result = measure(config_, plan_, request, console_);
+    exit_code_ = result.exit_code;
+    if (exit_code_ == kNotTrustworthy) notes_.push_back(result.message);
+    const double stage_s =
+        static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
+    finish_step("run", result.seconds,
+                fmt::format("{:.0f} s of stage time, {:.0f} times real-time speed, {:.0f} MB",
+                            stage_s, result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
+                            static_cast<double>(result.log_bytes) / 1e6));
+    if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
+      console_.warning(fmt::format("{}; {} of {} runs are kept{}",
+                                   named(request.log, result.message),
+                                   result.runs_before + result.experiment.runs_done,
+                                   result.runs_total, advice_behind(result)));
+    return exit_code_;
+  }
+
+  std::vector<int> fitted_realizations() const {
+    std::vector<int> realizations;
+    for (int m = 0; m < config_.experiment.realizations; ++m)
+      if (m != config_.validation_realization) realizations.push_back(m);
+    return realizations;
+  }
+
+  FrfEstimate estimate_into(const char* name, const std::vector<int>& realizations) {
+    FrfOptions options = config_.frf;
+    options.realizations = realizations;
+    options.threads = flags_.threads;
+    const std::filesystem::path log = path("run.slog");
+    if (flags_.resume && newer_than(path(name), log)) {
+      FrfEstimate frf = read_frf(path(name));
+      const std::unique_ptr<LogReader> reader = open_log(log);
+      if (request_id_of(frf.provenance_json) == frf_request_id({reader.get()}, options)) {
+        finish_step("frf", 0.0, fmt::format("{} up to date", name));
+        return frf;
+      }
+    }
+    // The fitted data are examined; the findings are stored in frf.h5.
+    const bool fitted = realizations == fitted_realizations();
+    FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
+    write_frf(path(name), step.frf);
+    finish_step("frf", step.seconds,
+                fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
+                            step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0));
+    return std::move(step.frf);
+  }
+
+  void estimate() {
+    frf_ = estimate_into("frf.h5", fitted_realizations());
+    health_ = health_of(frf_->provenance_json);
+    add_notes(health_notes(health_));
+    add_notes(dropped_lines(*frf_));
+    if (config_.validation_realization >= 0)
+      validation_frf_ = estimate_into("frf_validation.h5", {config_.validation_realization});
+  }
+
+  void pick() {
+    const SteadyClock::time_point start = SteadyClock::now();
+    FitRequest request = config_.fit;
+    request.threads = flags_.threads;
+    setup_ = make_fit_setup(request, *frf_);
+    std::vector<ModeCandidate> modes = setup_->selection.modes;
+    if (modes.empty()) modes = pick_modes(setup_->frf);
+    write_modes(path("modes.json"), modes);
+    chosen_modes_ = std::move(modes);
+    add_notes(setup_->warnings);
+    finish_step("modes", seconds_since(start), fmt::format("{} candidates", chosen_modes_.size()));
+  }
+
+  bool fit_is_up_to_date(const FitSetup& setup, const std::string& frf_fingerprint) const {
+    if (!flags_.resume || !std::filesystem::exists(path("model.json")) ||
+        !std::filesystem::exists(path("model.h5")))
+      return false;
+    const AdditiveModel model = read_model(path("model.json"));
+    return model.fit.status != to_string(FitStatus::interrupted) &&
+           request_id_of(model.provenance_json) == fit_request_id(setup, frf_fingerprint);
+  }
+
+  void fit() {
+    const std::string fingerprint = fingerprint_of_file(path("frf.h5"));
+    if (fit_is_up_to_date(*setup_, fingerprint)) {
+      model_ = read_model(path("model.json"));
+      model_variance_ = read_response_variance(path("model.h5"), setup_->frf.frequency_hz);
+      finish_step("fit", 0.0, "up to date");
+      return;
+    }
+    FitStep step = fit_with_progress(*setup_, "frf.h5", fingerprint, console_);
+    model_ = step.result.model;
+    model_variance_ = std::move(step.result.response_variance);
+    add_notes(findings_beside_message(step.result));
+    write_model(path("model.json"), model_);
+    if (step.result.status == FitStatus::interrupted) {
+      exit_code_ = kInterrupted;
+      console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
+                                   step.result.message));
+    }
+    finish_step("fit", step.seconds,
+                fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
+                            relative_error_text(model_.fit), cost_line(step.result.cost)));
+  }
+
+  void check_model() {
+    if (validation_frf_) {
+      const double low_hz = setup_->frf.frequency_hz[0];
+      const double high_hz = setup_->frf.frequency_hz[setup_->frf.lines() - 1];
+      validation_ =
+          validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
+    }
+    verdict_ = judge_model(model_, health_, validation_);
+    if (config_.stage.spec.has_plant())
+      truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
+  }
+
+  void write_outputs() {
+    const SteadyClock::time_point start = SteadyClock::now();
+    export_model(path("model.h5"), model_, {setup_->frf.frequency_hz, model_variance_});
+    export_model(path("model.csv"), model_, {});
+    finish_step("export", seconds_since(start), "model.h5, model.csv");
+    summary_ = summary();
+    write_text_file(path("summary.json"),
+                    summary_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+    ReportData report;
+    report.frf = std::move(frf_);
+    report.validation_frf = std::move(validation_frf_);
+    report.model = model_;
+    report.model_variance = std::move(model_variance_);
+    report.chosen_modes = std::move(chosen_modes_);
+    ReportInput input;
+    input.log = path("run.slog");
+    input.summary = path("summary.json");
+    complete_report(report, input, summary_);
+    report.title = config_.stage.spec.info.name;
+    write_report(path("report.html"), report);
+  }
+
+  Json summary() const {
+    Json steps = Json::array();
+    for (const Step& step : steps_)
+      steps.push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
+    Json json = {{"format", "stageid-summary"},
+                 {"stageid_version", version()},
+                 {"configuration", config_.file.filename().string()},
+                 {"configuration_fingerprint", fingerprint_of(config_.text)},
+                 {"stage_fingerprint", fingerprint_of(config_.stage.text)},
+                 {"trustworthy", verdict_.trustworthy && exit_code_ == kDone},
+                 {"reasons", verdict_.reasons},
+                 {"fit",
+                  {{"status", model_.fit.status},
+                   {"weighting", model_.fit.weighting},
+                   {"cost", model_.fit.cost},
+                   {"relative_rms_error", model_.fit.relative_rms_error},
+                   {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
+                 {"modes", modes_json(model_)}};
+    json.update(quality_json(*frf_));
+    if (validation_) json["validation"] = validation_json(*validation_);
+    if (truth_) json["truth"] = truth_json(*truth_);
+    json["health"] = health_json(health_);
+    json["notes"] = notes_;
+    json["steps"] = steps;
+    return json;
+  }
+
+  void print_summary() const {
+    if (truth_) {
+      for (const std::string& line : truth_table(*truth_)) console_.result(line);
+      console_.result(truth_error_line(*truth_));
+    }
+    if (validation_) {
+      console_.result("on the held-back realization:");
+      for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
+    }
+    for (const std::string& note : notes_) console_.warning(note);
+    console_.result(verdict_line(verdict_));
+    console_.result(fmt::format("report: {}", path("report.html").string()));
+    console_.result(summary_);
+  }
 
   const ExperimentConfig& config_;
   const IdentifyFlags& flags_;
@@ -143,235 +357,6 @@ class Identification {
   std::optional<TruthComparison> truth_;
   nlohmann::ordered_json summary_;
 };
-
-int Identification::run() {
-  for (const char* name : kResults) note_own_file(path(name));
-  require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
-  say_at_interrupt("finished steps are kept; continue with --resume");
-  design();
-  const int measured = measure_all();
-  if (measured != kDone && measured != kNotTrustworthy) return measured;
-  estimate();
-  pick();
-  fit();
-  if (exit_code_ == kInterrupted) return exit_code_;
-  check_model();
-  write_outputs();
-  print_summary();
-  return exit_code_ != kDone || verdict_.trustworthy ? exit_code_
-                                                     : static_cast<int>(kNotTrustworthy);
-}
-
-void Identification::finish_step(const char* name, double seconds, std::string note) {
-  console_.message(fmt::format("{:<9} {:6.1f} s  {}", name, seconds, note));
-  steps_.push_back({name, seconds, std::move(note)});
-}
-
-void Identification::design() {
-  const SteadyClock::time_point start = SteadyClock::now();
-  if (flags_.resume && std::filesystem::exists(path("excitation.h5")) &&
-      is_complete(path("run.slog"), config_, plan_)) {
-    finish_step("design", seconds_since(start), "up to date");
-    return;
-  }
-  // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
-  const DesignPrediction prediction =
-      config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
-  if (!config_.limits) warn_of_prediction(config_, console_);
-  if (!flags_.force) require_within_limits(config_, prediction);
-  require_directory(flags_.output);
-  write_experiment_plan(path("excitation.h5"), plan_);
-  for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
-  finish_step("design", seconds_since(start),
-              fmt::format("{}, {:.1f} min of stage time, {}", counted(plan_.runs().size(), "run"),
-                          plan_.duration_s() / 60.0, counted(plan_.grid().size(), "line")));
-}
-
-int Identification::measure_all() {
-  if (flags_.resume && is_complete(path("run.slog"), config_, plan_)) {
-    finish_step("run", 0.0, "up to date");
-    return kDone;
-  }
-  MeasurementRequest request;
-  request.log = path("run.slog");
-  request.resume = flags_.resume;
-  request.backend = config_.stage.backend;
-  const MeasurementResult result = measure(config_, plan_, request, console_);
-  exit_code_ = result.exit_code;
-  if (exit_code_ == kNotTrustworthy) notes_.push_back(result.message);
-  const double stage_s =
-      static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
-  finish_step("run", result.seconds,
-              fmt::format("{:.0f} s of stage time, {:.0f} times real-time speed, {:.0f} MB",
-                          stage_s, result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
-                          static_cast<double>(result.log_bytes) / 1e6));
-  if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
-    console_.warning(fmt::format("{}; {} of {} runs are kept{}", named(request.log, result.message),
-                                 result.runs_before + result.experiment.runs_done,
-                                 result.runs_total, advice_behind(result)));
-  return exit_code_;
-}
-
-std::vector<int> Identification::fitted_realizations() const {
-  std::vector<int> realizations;
-  for (int m = 0; m < config_.experiment.realizations; ++m)
-    if (m != config_.validation_realization) realizations.push_back(m);
-  return realizations;
-}
-
-FrfEstimate Identification::estimate_into(const char* name, const std::vector<int>& realizations) {
-  FrfOptions options = config_.frf;
-  options.realizations = realizations;
-  options.threads = flags_.threads;
-  const std::filesystem::path log = path("run.slog");
-  if (flags_.resume && newer_than(path(name), log)) {
-    FrfEstimate frf = read_frf(path(name));
-    const std::unique_ptr<LogReader> reader = open_log(log);
-    if (request_id_of(frf.provenance_json) == frf_request_id({reader.get()}, options)) {
-      finish_step("frf", 0.0, fmt::format("{} up to date", name));
-      return frf;
-    }
-  }
-  // The fitted data are examined; the findings are stored in frf.h5.
-  const bool fitted = realizations == fitted_realizations();
-  FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
-  write_frf(path(name), step.frf);
-  finish_step("frf", step.seconds,
-              fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
-                          step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0));
-  return std::move(step.frf);
-}
-
-void Identification::estimate() {
-  frf_ = estimate_into("frf.h5", fitted_realizations());
-  health_ = health_of(frf_->provenance_json);
-  add_notes(health_notes(health_));
-  add_notes(dropped_lines(*frf_));
-  if (config_.validation_realization >= 0)
-    validation_frf_ = estimate_into("frf_validation.h5", {config_.validation_realization});
-}
-
-void Identification::pick() {
-  const SteadyClock::time_point start = SteadyClock::now();
-  FitRequest request = config_.fit;
-  request.threads = flags_.threads;
-  setup_ = make_fit_setup(request, *frf_);
-  std::vector<ModeCandidate> modes = setup_->selection.modes;
-  if (modes.empty()) modes = pick_modes(setup_->frf);
-  write_modes(path("modes.json"), modes);
-  chosen_modes_ = std::move(modes);
-  add_notes(setup_->warnings);
-  finish_step("modes", seconds_since(start), fmt::format("{} candidates", chosen_modes_.size()));
-}
-
-bool Identification::fit_is_up_to_date(const FitSetup& setup,
-                                       const std::string& frf_fingerprint) const {
-  if (!flags_.resume || !std::filesystem::exists(path("model.json")) ||
-      !std::filesystem::exists(path("model.h5")))
-    return false;
-  const AdditiveModel model = read_model(path("model.json"));
-  return model.fit.status != to_string(FitStatus::interrupted) &&
-         request_id_of(model.provenance_json) == fit_request_id(setup, frf_fingerprint);
-}
-
-void Identification::fit() {
-  const std::string fingerprint = fingerprint_of_file(path("frf.h5"));
-  if (fit_is_up_to_date(*setup_, fingerprint)) {
-    model_ = read_model(path("model.json"));
-    model_variance_ = read_response_variance(path("model.h5"), setup_->frf.frequency_hz);
-    finish_step("fit", 0.0, "up to date");
-    return;
-  }
-  FitStep step = fit_with_progress(*setup_, "frf.h5", fingerprint, console_);
-  model_ = step.result.model;
-  model_variance_ = std::move(step.result.response_variance);
-  add_notes(findings_beside_message(step.result));
-  write_model(path("model.json"), model_);
-  if (step.result.status == FitStatus::interrupted) {
-    exit_code_ = kInterrupted;
-    console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
-                                 step.result.message));
-  }
-  finish_step("fit", step.seconds,
-              fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
-                          relative_error_text(model_.fit), cost_line(step.result.cost)));
-}
-
-void Identification::check_model() {
-  if (validation_frf_) {
-    const double low_hz = setup_->frf.frequency_hz[0];
-    const double high_hz = setup_->frf.frequency_hz[setup_->frf.lines() - 1];
-    validation_ =
-        validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
-  }
-  verdict_ = judge_model(model_, health_, validation_);
-  if (config_.stage.spec.has_plant())
-    truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
-}
-
-void Identification::write_outputs() {
-  const SteadyClock::time_point start = SteadyClock::now();
-  export_model(path("model.h5"), model_, {setup_->frf.frequency_hz, model_variance_});
-  export_model(path("model.csv"), model_, {});
-  finish_step("export", seconds_since(start), "model.h5, model.csv");
-  summary_ = summary();
-  write_text_file(path("summary.json"),
-                  summary_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  ReportData report;
-  report.frf = std::move(frf_);
-  report.validation_frf = std::move(validation_frf_);
-  report.model = model_;
-  report.model_variance = std::move(model_variance_);
-  report.chosen_modes = std::move(chosen_modes_);
-  ReportInput input;
-  input.log = path("run.slog");
-  input.summary = path("summary.json");
-  complete_report(report, input, summary_);
-  report.title = config_.stage.spec.info.name;
-  write_report(path("report.html"), report);
-}
-
-Json Identification::summary() const {
-  Json steps = Json::array();
-  for (const Step& step : steps_)
-    steps.push_back({{"name", step.name}, {"seconds", step.seconds}, {"note", step.note}});
-  Json json = {{"format", "stageid-summary"},
-               {"stageid_version", version()},
-               {"configuration", config_.file.filename().string()},
-               {"configuration_fingerprint", fingerprint_of(config_.text)},
-               {"stage_fingerprint", fingerprint_of(config_.stage.text)},
-               {"trustworthy", verdict_.trustworthy && exit_code_ == kDone},
-               {"reasons", verdict_.reasons},
-               {"fit",
-                {{"status", model_.fit.status},
-                 {"weighting", model_.fit.weighting},
-                 {"cost", model_.fit.cost},
-                 {"relative_rms_error", model_.fit.relative_rms_error},
-                 {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
-               {"modes", modes_json(model_)}};
-  json.update(quality_json(*frf_));
-  if (validation_) json["validation"] = validation_json(*validation_);
-  if (truth_) json["truth"] = truth_json(*truth_);
-  json["health"] = health_json(health_);
-  json["notes"] = notes_;
-  json["steps"] = steps;
-  return json;
-}
-
-void Identification::print_summary() const {
-  if (truth_) {
-    for (const std::string& line : truth_table(*truth_)) console_.result(line);
-    console_.result(truth_error_line(*truth_));
-  }
-  if (validation_) {
-    console_.result("on the held-back realization:");
-    for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
-  }
-  for (const std::string& note : notes_) console_.warning(note);
-  console_.result(verdict_line(verdict_));
-  console_.result(fmt::format("report: {}", path("report.html").string()));
-  console_.result(summary_);
-}
 
 void identify(const IdentifyFlags& flags, Console& console) {
   const ExperimentConfig config = load_experiment_config(flags.config);

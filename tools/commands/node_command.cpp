@@ -46,41 +46,6 @@ struct ModbusFlags {
   bool wanted() const noexcept { return tcp_port >= 0 || !rtu_device.empty(); }
 };
 
-/// The Modbus side of `stageid node`: one server thread per connection (TCP, RTU) to the same StageNode. Every server
-/// has its own request count and faults.
-class ModbusFront {
- public:
-  /// Opens the requested connections and serves them. `node` must outlive the front.
-  /// @throws std::invalid_argument for unknown faults or invalid values.
-  /// @throws StageError if a port or device cannot be opened.
-  ModbusFront(const ModbusFlags& flags, StageNode& node, const StageLimits& limits);
-  /// Ends the threads and closes the connections.
-  ~ModbusFront() { stop_ = true; }
-  ModbusFront(const ModbusFront&) = delete;
-  ModbusFront& operator=(const ModbusFront&) = delete;
-
-  /// One line per connection.
-  std::vector<std::string> places() const;
-
- private:
-  struct Door {
-    Door(const ModbusAddress& address, StageNode& node, const StageLimits& limits,
-         std::uint32_t boot_id, std::vector<ModbusFault> list)
-        : faults(std::move(list)),
-          registers(node, limits, boot_id, &faults),
-          server(address, registers, &faults) {}
-    ModbusFaultScript faults;
-    ModbusNode registers;
-    ModbusServer server;
-    std::jthread thread;  // ends before what it uses
-  };
-
-  ModbusFront() = default;
-
-  std::atomic<bool> stop_ = false;
-  std::vector<std::unique_ptr<Door>> doors_;
-};
-
 template <typename Parse>
 auto parsed_faults(const char* option, const std::vector<std::string>& texts, Parse parse) {
   std::vector<decltype(parse(texts.front()))> faults;
@@ -102,6 +67,67 @@ std::uint32_t fresh_boot_id() {
   return id == 0 ? 1 : id;
 }
 
+/// The Modbus side of `stageid node`: one server thread per connection (TCP, RTU) to the same StageNode. Every server
+/// has its own request count and faults.
+class ModbusFront {
+ public:
+  /// Opens the requested connections and serves them. `node` must outlive the front.
+  /// @throws std::invalid_argument for unknown faults or invalid values.
+  /// @throws StageError if a port or device cannot be opened.
+  ModbusFront(const ModbusFlags& flags, StageNode& node, const StageLimits& limits)
+      : ModbusFront() {  // from here on, the threads end after an exception too
+    const auto faults = parsed_faults("--modbus-fault", flags.faults, parse_modbus_fault);
+    ModbusAddress address;
+    address.unit = flags.unit;
+    const std::uint32_t boot_id = fresh_boot_id();
+    const auto open = [&] {
+      doors_.push_back(std::make_unique<Door>(address, node, limits, boot_id, faults));
+    };
+    if (flags.tcp_port >= 0) {
+      address.port = flags.tcp_port;
+      open();
+    }
+    if (!flags.rtu_device.empty()) {
+      address.device = flags.rtu_device;
+      address.baud = flags.baud;
+      address.parity = flags.parity.front();
+      open();
+    }
+    for (const std::unique_ptr<Door>& door : doors_)
+      door->thread = std::jthread([this, server = &door->server] { server->run(stop_); });
+  }
+  /// Ends the threads and closes the connections.
+  ~ModbusFront() { stop_ = true; }
+  ModbusFront(const ModbusFront&) = delete;
+  ModbusFront& operator=(const ModbusFront&) = delete;
+
+  /// One line per connection.
+  std::vector<std::string> places() const {
+    std::vector<std::string> places;
+    for (const std::unique_ptr<Door>& door : doors_)
+      places.push_back(to_string(door->server.address()));
+    return places;
+  }
+
+ private:
+  struct Door {
+    Door(const ModbusAddress& address, StageNode& node, const StageLimits& limits,
+         std::uint32_t boot_id, std::vector<ModbusFault> list)
+        : faults(std::move(list)),
+          registers(node, limits, boot_id, &faults),
+          server(address, registers, &faults) {}
+    ModbusFaultScript faults;
+    ModbusNode registers;
+    ModbusServer server;
+    std::jthread thread;  // ends before what it uses
+  };
+
+  ModbusFront() = default;
+
+  std::atomic<bool> stop_ = false;
+  std::vector<std::unique_ptr<Door>> doors_;
+};
+
 void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
   command
       .add_option("--modbus-tcp", flags.tcp_port,
@@ -121,36 +147,6 @@ void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
       "KIND[@REQUEST][xCOUNT][:VALUE], counted from the first request: late_reply:SECONDS, "
       "half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, interlock, "
       "temperature:KELVIN, gravity:NEWTON");
-}
-
-ModbusFront::ModbusFront(const ModbusFlags& flags, StageNode& node, const StageLimits& limits)
-    : ModbusFront() {  // from here on, the threads end after an exception too
-  const auto faults = parsed_faults("--modbus-fault", flags.faults, parse_modbus_fault);
-  ModbusAddress address;
-  address.unit = flags.unit;
-  const std::uint32_t boot_id = fresh_boot_id();
-  const auto open = [&] {
-    doors_.push_back(std::make_unique<Door>(address, node, limits, boot_id, faults));
-  };
-  if (flags.tcp_port >= 0) {
-    address.port = flags.tcp_port;
-    open();
-  }
-  if (!flags.rtu_device.empty()) {
-    address.device = flags.rtu_device;
-    address.baud = flags.baud;
-    address.parity = flags.parity.front();
-    open();
-  }
-  for (const std::unique_ptr<Door>& door : doors_)
-    door->thread = std::jthread([this, server = &door->server] { server->run(stop_); });
-}
-
-std::vector<std::string> ModbusFront::places() const {
-  std::vector<std::string> places;
-  for (const std::unique_ptr<Door>& door : doors_)
-    places.push_back(to_string(door->server.address()));
-  return places;
 }
 
 bool forces_act(NodeState state) {
