@@ -44,9 +44,9 @@ double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& varian
   return ratio.empty() ? std::numeric_limits<double>::infinity() : order_statistic(ratio, 0.5);
 }
 
-nlohmann::ordered_json frf_json(const FrfEstimate& frf, const FrfStep& step,
-                                const std::vector<std::string>& notes,
+nlohmann::ordered_json frf_json(const FrfStep& step, const std::vector<std::string>& notes,
                                 const std::filesystem::path& output) {
+  const FrfEstimate& frf = step.frf;
   nlohmann::ordered_json json = {{"output", output.string()},
                                  {"inputs", frf.inputs.names},
                                  {"outputs", frf.outputs.names},
@@ -79,15 +79,6 @@ struct FrfFlags {
   Compensation compensate = Compensation::none;
 };
 
-FrfStep estimate_with_plans(const FrfFlags& flags, Console& console, const FrfOptions& options) {
-  const HealthRequest health{!flags.no_health, flags.stage};
-  if (flags.fft_wisdom.empty()) return estimate_frf(flags.logs, options, health, console);
-  FftWisdomFile wisdom(flags.fft_wisdom);
-  FrfStep step = estimate_frf(flags.logs, options, health, console);
-  note_fft_plans(step.frf, wisdom.save());
-  return step;
-}
-
 void estimate_response(const FrfFlags& flags, Console& console) {
   FrfOptions options = flags.options;
   for (const int realization : flags.realizations) {
@@ -102,7 +93,10 @@ void estimate_response(const FrfFlags& flags, Console& console) {
         "--delay");
   require_writable(flags.output, flags.logs);
   require_frf_ending(flags.output);
-  FrfStep step = estimate_with_plans(flags, console, options);
+  std::optional<FftWisdomFile> wisdom;
+  if (!flags.fft_wisdom.empty()) wisdom.emplace(flags.fft_wisdom);
+  FrfStep step = estimate_frf(flags.logs, options, {!flags.no_health, flags.stage}, console);
+  if (wisdom) note_fft_plans(step.frf, wisdom->save());
   std::vector<std::string> notes = dropped_lines(step.frf);
   if (flags.compensate != Compensation::none) {
     const double delay_s = flags.delay_s ? *flags.delay_s : declared_delay_s(flags.logs.front());
@@ -123,7 +117,7 @@ void estimate_response(const FrfFlags& flags, Console& console) {
     for (const std::string& line : health_lines(step.findings)) console.result(line);
   if (any_fault(step.findings)) console.exit_code = kNotTrustworthy;
   for (const std::string& note : notes) console.message("note: " + note);
-  nlohmann::ordered_json json = frf_json(step.frf, step, notes, flags.output);
+  nlohmann::ordered_json json = frf_json(step, notes, flags.output);
   if (!flags.no_health) json["health"] = health_json(step.findings);
   console.result(json);
 }

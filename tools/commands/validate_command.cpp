@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -107,13 +108,10 @@ void validate_model(const ValidateFlags& flags, Console& console) {
   require_channels(flags, step.frf.outputs.names, model.outputs.names, "output");
   require_channels(flags, step.frf.inputs.names, model.inputs.names, "input");
   FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
-  const bool fitted_band = model.fit.band_hz[1] > 0.0;
-  const double low_hz = !flags.band_hz.empty() ? flags.band_hz[0]
-                        : fitted_band          ? model.fit.band_hz[0]
-                                               : frf.frequency_hz[0];
-  const double high_hz = !flags.band_hz.empty() ? flags.band_hz[1]
-                         : fitted_band          ? model.fit.band_hz[1]
-                                                : frf.frequency_hz[frf.lines() - 1];
+  std::array<double, 2> band_hz = {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]};
+  if (model.fit.band_hz[1] > 0.0) std::ranges::copy(model.fit.band_hz, band_hz.begin());
+  std::ranges::copy(flags.band_hz, band_hz.begin());  // none or two
+  const auto [low_hz, high_hz] = band_hz;
   const Validation validation =
       validate(model, select_band(std::move(frf), low_hz, high_hz), distortion_of(model));
   for (const std::string& line : validation_lines(validation)) console.result(line);

@@ -117,6 +117,12 @@ RigidBodyRequest parse_rigid_body(const std::string& text) {
   return {Kind::free, parse_rank("--rigid-body", text, kRigidBodies)};
 }
 
+/// Whether the word is the second of the two. @throws as refuse_word()
+bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two) {
+  if (word != two[0] && word != two[1]) refuse_word(flag, word, two);
+  return word == two[1];
+}
+
 }  // namespace
 
 void parse_fit_flags(const FitFlags& flags, FitRequest& request) {

@@ -23,9 +23,4 @@ void refuse_word(const char* flag, const std::string& word, const std::vector<st
   throw std::invalid_argument(wrong_word(flag, word, names));
 }
 
-bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two) {
-  if (word != two[0] && word != two[1]) refuse_word(flag, word, two);
-  return word == two[1];
-}
-
 }  // namespace stageid

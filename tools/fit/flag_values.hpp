@@ -26,7 +26,4 @@ Enum pick(const char* flag, const std::string& word) {
   return *value;
 }
 
-/// Whether the word is the second of the two. @throws as refuse_word()
-bool is_second(const char* flag, const std::string& word, const std::vector<std::string>& two);
-
 }  // namespace stageid

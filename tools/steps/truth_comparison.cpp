@@ -39,8 +39,7 @@ void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf
       const double distance = std::abs(estimated[e]->natural_frequency_hz() - f) / f;
       if (distance < kFarthest) pairs.push_back({distance, t, e});
     }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+  std::ranges::stable_sort(pairs, {}, &Pair::distance);
   std::vector<bool> taken(estimated.size(), false);
   for (const Pair& pair : pairs) {
     ModeComparison& mode = out.modes[pair.truth];
