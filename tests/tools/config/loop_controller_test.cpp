@@ -26,21 +26,15 @@ const std::filesystem::path kSmall =
     std::filesystem::path(STAGEID_SOURCE_DIR) / "configs/stage/small_stage.yaml";
 
 std::string row_by_row(const Eigen::MatrixXd& m) {
-  std::string text;
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    for (Eigen::Index j = 0; j < m.cols(); ++j)
-      text += fmt::format("{}{:.17g}", text.empty() ? "" : ", ", m(i, j));
-  return "[" + text + "]";
+  const auto values = m.reshaped<Eigen::RowMajor>();
+  return fmt::format("[{:.17g}]", fmt::join(values.begin(), values.end(), ", "));
 }
 
 NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
-  NamedArray out{
-      name, {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())}, {}};
-  std::vector<double> values;
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    for (Eigen::Index j = 0; j < m.cols(); ++j) values.push_back(m(i, j));
-  out.values = std::move(values);
-  return out;
+  const auto values = m.reshaped<Eigen::RowMajor>();
+  return {name,
+          {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())},
+          std::vector<double>(values.begin(), values.end())};
 }
 
 class LoopController : public testing::Test {

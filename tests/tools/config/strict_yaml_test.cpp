@@ -18,13 +18,6 @@ std::string error_of(const std::string& text) {
   return test::error_message<FormatError>([&] { YamlDocument::parse("f.yaml", text); });
 }
 
-const YamlNode& value_of(const YamlDocument& document, const YamlNode& map,
-                         const std::string& key) {
-  for (const YamlNode::Entry& entry : map.entries)
-    if (entry.key == key) return document.node(entry.value);
-  throw std::out_of_range(key);
-}
-
 TEST(StrictYaml, KnowsWhereEverythingStands) {
   const YamlDocument d = YamlDocument::parse("f.yaml", "a: 1\nlist:\n  - {x: 'y'}\n");
   const YamlNode& root = d.root();
@@ -32,24 +25,24 @@ TEST(StrictYaml, KnowsWhereEverythingStands) {
   ASSERT_EQ(root.entries.size(), 2U);
   EXPECT_EQ(root.entries[1].mark.line, 2);
   EXPECT_EQ(root.entries[1].mark.column, 1);
-  const YamlNode& map = d.node(value_of(d, root, "list").items.at(0));
+  const YamlNode& map = d.node(d.value(root, "list")->items.at(0));
   EXPECT_EQ(map.entries.at(0).mark.line, 3);
   EXPECT_EQ(map.entries.at(0).mark.column, 6);
   const YamlNode& y = d.node(map.entries.at(0).value);
   EXPECT_EQ(y.mark.column, 9);
   EXPECT_FALSE(y.plain);
-  EXPECT_TRUE(value_of(d, root, "a").plain);
+  EXPECT_TRUE(d.value(root, "a")->plain);
 }
 
 TEST(StrictYaml, AnchorsAliasesAndMergeKeysWork) {
   const YamlDocument d =
       YamlDocument::parse("f.yaml", "base: &b {p: 1, q: 2}\nsame: *b\nmore:\n  <<: *b\n  q: 3\n");
-  const YamlNode& same = value_of(d, d.root(), "same");
-  EXPECT_EQ(value_of(d, same, "p").text, "1");
-  const YamlNode& more = value_of(d, d.root(), "more");
+  const YamlNode& same = *d.value(d.root(), "same");
+  EXPECT_EQ(d.value(same, "p")->text, "1");
+  const YamlNode& more = *d.value(d.root(), "more");
   EXPECT_EQ(more.entries.size(), 2U);
-  EXPECT_EQ(value_of(d, more, "p").text, "1");
-  EXPECT_EQ(value_of(d, more, "q").text, "3");
+  EXPECT_EQ(d.value(more, "p")->text, "1");
+  EXPECT_EQ(d.value(more, "q")->text, "3");
 }
 
 TEST(StrictYaml, ADuplicateKeyIsAnErrorAtItsPlace) {
