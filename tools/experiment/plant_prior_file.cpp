@@ -1,7 +1,6 @@
 #include "tools/experiment/plant_prior_file.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

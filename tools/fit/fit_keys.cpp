@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +6,7 @@
 #include <type_traits>
 
 #include "estimation/request/submodel_text.hpp"
-#include "tools/config/number_range.hpp"
 #include "tools/fit/fit_flags.hpp"
-#include "tools/fit/flag_values.hpp"
 
 namespace stageid {
 

@@ -11,7 +11,6 @@
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "frf/response/nonlinearity_sentence.hpp"
-#include "tools/fit/frf_quality.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/interrupt.hpp"
 

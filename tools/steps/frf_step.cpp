@@ -1,7 +1,6 @@
 #include "tools/steps/frf_step.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <memory>
 #include <nlohmann/json.hpp>

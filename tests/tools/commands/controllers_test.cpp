@@ -17,7 +17,6 @@ namespace test_controllers {
 
 using nlohmann::json;
 using testing::HasSubstr;
-using testing::Not;
 
 NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
   const Eigen::MatrixXd rows = m.transpose();

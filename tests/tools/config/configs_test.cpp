@@ -1,12 +1,10 @@
 // Every shipped configuration loads and has the documented properties.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
-#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "hal/can/can_dbc.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 #include "tools/config/stage_config.hpp"

@@ -11,8 +11,6 @@
 namespace stageid {
 namespace test_loop_check {
 
-using testing::HasSubstr;
-
 WaferStageSpec with_gain(WaferStageSpec stage, double factor) {
   for (AxisController& axis : stage.controller.axes) axis.gain *= factor;
   return stage;
