@@ -69,8 +69,9 @@ ProgramResult ProgramTest::ends(const std::vector<std::string>& arguments, int e
   return result;
 }
 
-nlohmann::json ProgramTest::log_info(const std::string& log) const {
-  return nlohmann::json::parse(succeed({"log", "info", log, "--json"}).out);
+nlohmann::json ProgramTest::tell(std::vector<std::string> arguments, int exit_code) const {
+  arguments.emplace_back("--json");
+  return nlohmann::json::parse(ends(arguments, exit_code).out);
 }
 
 void ProgramTest::fail(const std::vector<std::string>& arguments, int exit_code,

@@ -37,8 +37,8 @@ class ProgramTest : public testing::Test {
   /// Runs and expects `exit_code`, and `text` on stderr.
   ProgramResult ends(const std::vector<std::string>& arguments, int exit_code,
                      const std::string& text = "", ProgramOptions options = {}) const;
-  /// What `stageid log info --json` tells of a log.
-  nlohmann::json log_info(const std::string& log) const;
+  /// The object that a command prints with --json.
+  nlohmann::json tell(std::vector<std::string> arguments, int exit_code = 0) const;
   /// Expects `exit_code`, one line on stderr "stageid: ..." that contains `text`, nothing on stdout,
   /// and that no file appeared or changed.
   void fail(const std::vector<std::string>& arguments, int exit_code, const std::string& text,

@@ -32,7 +32,7 @@ class Workflow : public ProgramTest {
     const std::string config =
         stage(file + ".yaml", "noise:", keys + "faults: [{" + fault + "}]\nnoise:");
     EXPECT_THAT(ends({"run", config, "-o", file + ".slog"}, exit_code, cause).err, HasSubstr(more));
-    return log_info(file + ".slog");
+    return tell({"log", "info", file + ".slog"});
   }
 };
 
@@ -86,9 +86,7 @@ TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
       "fit", "all/frf.h5", "-o", "few.json", "--modes", "1", "--rigid-body", "suspension:0.4:0.5"};
   const ProgramResult fitted = ends(fit, 3, "not to be trusted: the residual is ");
   EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
-  std::vector<std::string> as_json = fit;
-  as_json.emplace_back("--json");
-  const json told = json::parse(run(as_json).out);
+  const json told = tell(fit, 3);
   EXPECT_EQ(told["trustworthy"], false);
   EXPECT_EQ(told["status"], "unexplained");
 
@@ -167,7 +165,7 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
        interrupt);
   ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
   succeed({"log", "verify", "cut.slog"});
-  const json info = log_info("cut.slog");
+  const json info = tell({"log", "info", "cut.slog"});
   for (const json& cut : info["runs"]) EXPECT_FALSE(cut["complete"]);
   succeed({"run", config, "-o", "cut.slog", "--resume"});
   succeed({"run", config, "-o", "whole.slog"});
@@ -182,7 +180,7 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
 TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
   ends({"run", loud, "-o", "loud.slog"}, 4, "|u|");
-  const json info = log_info("loud.slog");
+  const json info = tell({"log", "info", "loud.slog"});
   ASSERT_EQ(info["runs"].size(), 1U);
   EXPECT_FALSE(info["runs"][0]["complete"]);
   EXPECT_GT(info["runs"][0]["samples"], 0);
@@ -325,7 +323,7 @@ TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
 
 TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   make_model();
-  const json figures = json::parse(succeed({"validate", "model.json", "run.slog", "--json"}).out);
+  const json figures = tell({"validate", "model.json", "run.slog"});
   // Small relative to the motion itself; the remainder is transient and noise.
   EXPECT_LT(figures["time_domain"]["normalized"].get<double>(), 0.05);
   EXPECT_EQ(figures["time_domain"]["runs"], 9);
@@ -334,7 +332,7 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   for (Submodel& s : model.submodels)
     for (Eigen::MatrixXd& B : s.numerator) B *= 1.5;
   write_model(at("wrong.json"), model);
-  const json wrong = json::parse(run({"validate", "wrong.json", "run.slog", "--json"}).out);
+  const json wrong = tell({"validate", "wrong.json", "run.slog"}, 3);
   EXPECT_EQ(wrong["trustworthy"], false);
   EXPECT_NEAR(wrong["time_domain"]["normalized"].get<double>(), 0.5, 0.05);
 }

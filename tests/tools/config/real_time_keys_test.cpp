@@ -56,7 +56,7 @@ TEST_F(RealTimeKeysTest, RequireIsRefusedBeforeAnythingIsWrittenUnlessAllIsThere
 TEST_F(RealTimeKeysTest, AWallClockRunTellsItsTimingEverywhere) {
   run({"run", with("realtime: {policy: try, misses_allowed: 1000000}"), "-o", "run.slog", "--pace",
        "4"});
-  const auto info = nlohmann::json::parse(succeed({"--json", "log", "info", "run.slog"}).out);
+  const auto info = tell({"log", "info", "run.slog"});
   ASSERT_EQ(info["runs"].size(), 9U);
   for (const auto& run : info["runs"]) {
     std::uint64_t counted = 0;

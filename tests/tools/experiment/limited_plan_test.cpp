@@ -46,8 +46,7 @@ class LimitedPlanTest : public ProgramTest {
 
 TEST_F(LimitedPlanTest, WhatIsForetoldFromThePilotHolds) {
   make_pilot();
-  const Json design =
-      Json::parse(succeed({"design", limits_, "-o", "e.h5", "--accuracy", "1e-7", "--json"}).out);
+  const Json design = tell({"design", limits_, "-o", "e.h5", "--accuracy", "1e-7"});
   double most = 0.0;
   for (const Json& signal : design["signals"]) most = std::max(most, signal["used"].get<double>());
   EXPECT_NEAR(most, 0.9, 1e-6);
@@ -88,7 +87,7 @@ TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
     write_bytes(at("small_stage_pilot.yaml"), pilot);
     write_bytes(at("small_stage.yaml"), replaced(stage, "window_m: 1e-3", "window_m: 3e-6"));
     const std::string narrow = variant("[16, 800]", "[52, 800]");
-    const Json design = Json::parse(succeed({"design", narrow, "-o", "e.h5", "--json"}).out);
+    const Json design = tell({"design", narrow, "-o", "e.h5"});
     succeed({"run", narrow, "--excitation", "e.h5", "-o", "r.slog"});  // nothing was hit
     const Eigen::VectorXd reached = largest_position(at("r.slog"));
     double most = 0.0;
@@ -139,18 +138,15 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
   make_pilot();
   const std::string log = "r.slog";
   // 9 runs of 3 realizations leave 1.0e-6: two of them are enough for 2e-6.
-  const Json first =
-      Json::parse(succeed({"run", limits_, "-o", log, "--until", "2e-6", "--json"}).out);
+  const Json first = tell({"run", limits_, "-o", log, "--until", "2e-6"});
   EXPECT_EQ(first["runs_complete"], 6);
   EXPECT_LE(first["relative_variance"].get<double>(), 2e-6);
   EXPECT_THAT(first["message"].get<std::string>(), HasSubstr("target 2e-06"));
   EXPECT_EQ(first["exit_code"], 0);
   succeed({"log", "verify", log});
-  const Json same = Json::parse(
-      succeed({"run", limits_, "-o", log, "--until", "2e-6", "--resume", "--json"}).out);
+  const Json same = tell({"run", limits_, "-o", log, "--until", "2e-6", "--resume"});
   EXPECT_EQ(same["runs_complete"], 6);
-  const Json rest = Json::parse(
-      succeed({"run", limits_, "-o", log, "--until", "1e-12", "--resume", "--json"}).out);
+  const Json rest = tell({"run", limits_, "-o", log, "--until", "1e-12", "--resume"});
   EXPECT_EQ(rest["runs_complete"], 9);
   EXPECT_THAT(rest["message"].get<std::string>(), HasSubstr("the plan ended"));
   // A measurement that was stopped and resumed equals an uninterrupted one.
