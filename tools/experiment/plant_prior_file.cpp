@@ -164,10 +164,7 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
                                    ? low->response(f_hz)
                                    : interpolated(frf.response, between(frf.frequency_hz, f_hz));
     Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(n_y, n_u);
-    for (Index j = 0; j < frf.n_inputs(); ++j)
-      for (Index i = 0; i < frf.n_outputs(); ++i)
-        whole(sensors[static_cast<std::size_t>(i)], actuators[static_cast<std::size_t>(j)]) =
-            G[i + frf.n_outputs() * j];
+    whole(sensors, actuators) = G.reshaped(frf.n_outputs(), frf.n_inputs());
     return whole;
   };
   for (const double f_hz : below_band_hz) prior.below_band.push_back(response(f_hz));
@@ -176,11 +173,9 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
   const Eigen::MatrixXd density = noise_density(frf);
   if (density.size() == 0) return prior;
   prior.noise_density.setZero(n_y, frequency_hz.size());
-  for (Index k = 0; k < frequency_hz.size(); ++k) {
-    const Eigen::VectorXd noise = interpolated(density, between(frf.frequency_hz, frequency_hz[k]));
-    for (Index i = 0; i < frf.n_outputs(); ++i)
-      prior.noise_density(sensors[static_cast<std::size_t>(i)], k) = noise[i];
-  }
+  for (Index k = 0; k < frequency_hz.size(); ++k)
+    prior.noise_density(sensors, k) =
+        interpolated(density, between(frf.frequency_hz, frequency_hz[k]));
   return prior;
 }
 
