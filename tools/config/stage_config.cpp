@@ -35,12 +35,7 @@ Eigen::VectorXd limit_vector(const std::vector<ChannelConfig>& channels,
 
 std::vector<Channel> channels_of(const std::vector<ChannelConfig>& configs) {
   std::vector<Channel> channels;
-  for (const ChannelConfig& config : configs) {
-    Channel channel = config.channel;
-    std::copy_n(config.position_m.begin(), 3, channel.position_m);
-    std::copy_n(config.direction.begin(), 3, channel.direction);
-    channels.push_back(std::move(channel));
-  }
+  for (const ChannelConfig& config : configs) channels.push_back(config.channel);
   return channels;
 }
 

@@ -38,12 +38,16 @@ void describe_channel(ConfigVisitor& v, ChannelConfig& c, const std::vector<std:
   c.channel.unit = units.at(unit);
   v.number("gain", c.channel.gain, any_number(""), kOptional, gain);
   v.require(c.channel.gain != 0.0, "gain", "gain: must not be zero");
-  v.numbers("position_m", c.position_m, any_number("m"), {3, 3}, kRequired,
+  std::vector<double> position_m = {0.0, 0.0, 0.0};
+  std::vector<double> direction = {0.0, 0.0, 1.0};
+  v.numbers("position_m", position_m, any_number("m"), {3, 3}, kRequired,
             "x, y, z from the centre of mass");
-  v.numbers("direction", c.direction, any_number(""), {3, 3}, kOptional,
+  v.numbers("direction", direction, any_number(""), {3, 3}, kOptional,
             "unit vector; for a rotation, its axis");
-  const double length =
-      c.direction.size() == 3 ? std::hypot(c.direction[0], c.direction[1], c.direction[2]) : 1.0;
+  if (position_m.size() == 3) std::ranges::copy(position_m, c.channel.position_m);
+  if (direction.size() == 3) std::ranges::copy(direction, c.channel.direction);
+  const auto& d = c.channel.direction;
+  const double length = std::hypot(d[0], d[1], d[2]);
   v.require(std::abs(length - 1.0) < 1e-6, "direction",
             fmt::format("direction: the length is {}; write a unit vector", length));
 }

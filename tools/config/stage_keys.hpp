@@ -16,8 +16,6 @@ inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 struct ChannelConfig {
   Channel channel;
-  std::vector<double> position_m = {0.0, 0.0, 0.0};
-  std::vector<double> direction = {0.0, 0.0, 1.0};
   double limit_n = kNoLimit;
   double slew_n_s = kNoLimit;
   double thermal_rms_n = kNoLimit;
