@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 #include "estimation/equations/triangles.hpp"
+#include "estimation/problem/search_limit.hpp"
 #include "estimation/products/channel_equations.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
@@ -12,14 +14,11 @@
 namespace stageid {
 namespace {
 
-/// Of columns of unit length: the part of a column that the others do not contain, if it is rounding.
-constexpr double kSingular = 1e-15;
-
 /// Real and imaginary parts of the columns stacked, times `root`.
 void stack(const SplitMatrix& columns, const Eigen::VectorXd& root,
            Eigen::Ref<Eigen::MatrixXd> out) {
   out.topRows(root.size()) = root.asDiagonal() * columns.re;
-  out.bottomRows(root.size()) = root.asDiagonal() * columns.im;
+  out.middleRows(root.size(), root.size()) = root.asDiagonal() * columns.im;
 }
 
 Eigen::VectorXd stacked_data(const FitProblem& problem, const Eigen::VectorXd& root,
@@ -30,17 +29,25 @@ Eigen::VectorXd stacked_data(const FitProblem& problem, const Eigen::VectorXd& r
   return out;
 }
 
+/// Orthogonal factors take as long as sums for sixteen times as many channels.
+void add_work(const FitProblem& problem, Eigen::Index channels, Eigen::Index columns) {
+  if (problem.limit)
+    problem.limit->add(static_cast<double>(problem.size()), 16.0 * static_cast<double>(channels),
+                       static_cast<double>(columns));
+}
+
 /// The triangle of one channel for the globals and the data.
 Eigen::MatrixXd triangle_of_channel(const FitProblem& problem, const FitParameters& beta,
                                     const BasisGroup& group, Eigen::Index c) {
   const Eigen::Index n_f = problem.functions();
   const Eigen::Index globals = problem.globals();
   const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
-  Eigen::MatrixXd A(2 * problem.size(), n_f + globals + 1);
+  const Eigen::Index columns = n_f + globals + 1;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(std::max(2 * problem.size(), columns), columns);
   stack(group.F, root, A.leftCols(n_f));
   stack(global_columns(problem, beta, group, c, {0, problem.size()}), root,
         A.middleCols(n_f, globals));
-  A.rightCols(1) = stacked_data(problem, root, c);
+  A.rightCols(1).topRows(2 * problem.size()) = stacked_data(problem, root, c);
   qr_in_place(A);
   return Eigen::MatrixXd(
       A.block(n_f, n_f, globals + 1, globals + 1).triangularView<Eigen::Upper>());
@@ -52,6 +59,7 @@ FactoredEquations::FactoredEquations(const FitProblem& problem, const FitParamet
                                      const std::vector<BasisGroup>& groups) {
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
   const Eigen::Index globals = problem.globals();
+  add_work(problem, problem.channels(), problem.functions() + globals);
   const Eigen::MatrixXd whole =
       stacked_triangle(problem.channels(), problem.threads, [&](Eigen::Index c) {
         return triangle_of_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c);
@@ -82,6 +90,7 @@ Eigen::VectorXd FactoredEquations::solve_globals(double damping,
 
 bool factored_numerators(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
                          Eigen::MatrixXd& B, double& squares) {
+  add_work(problem, block.members, problem.functions());
   B.setZero(block.members, problem.functions());
   Eigen::VectorXd of_channel = Eigen::VectorXd::Zero(block.members);
   std::atomic<bool> regular = true;
@@ -95,7 +104,10 @@ bool factored_numerators(const FitProblem& problem, const BasisGroup& group, con
     const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();
     A *= scale.asDiagonal();
     const auto factor = qr(A);
-    if (!(factor.matrixQR().diagonal().cwiseAbs().minCoeff() > kSingular)) {
+    // The part of a column that the others do not contain is rounding.
+    const double rounding =
+        std::sqrt(static_cast<double>(A.rows())) * std::numeric_limits<double>::epsilon();
+    if (!(factor.matrixQR().diagonal().cwiseAbs().minCoeff() > rounding)) {
       regular = false;
       return;
     }

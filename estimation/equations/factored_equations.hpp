@@ -8,7 +8,8 @@
 namespace stageid {
 
 /// The equations of a Gauss-Newton step by orthogonal factors. Sums of products lose half the digits; that matters once
-/// the residual is smaller than what they lose. Takes several times longer than ArrowSystem.
+/// the residual is smaller than what they lose. Takes several times longer than ArrowSystem, with many channels up to a
+/// hundred times: no products are shared between them.
 ///
 /// Per channel, sqrt(W) [F, dP/dglobals, G] = Q R. The rows of R below those of F are the equations of the globals after
 /// elimination of the numerators; those of all channels together have the triangle [R, r], and the step minimizes

@@ -1,6 +1,7 @@
 #include "estimation/equations/numerators.hpp"
 
 #include <cmath>
+#include <cstdint>
 
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/equations/factored_equations.hpp"
@@ -115,16 +116,18 @@ std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, E
   return out;
 }
 
-/// A block's numerators, members x n_f, and its sum W |E|^2; false if the sums have too few digits.
+enum class Digits : std::uint8_t { none, few, enough };
+
+/// A block's numerators, members x n_f, and its sum W |E|^2, from sums.
 ///
 /// The first solution is refined with its residual. The refinement d lowers the squares by exactly FE . d, because they
 /// are quadratic. If that is a visible part of them, the sums have lost the digits that the residual consists of.
-bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
-                 const TileRange& block, Eigen::MatrixXd& B, double& squares) {
+Digits solve_by_sums(const FitProblem& problem, const BasisGroup& group, const PairReduction& pairs,
+                     const TileRange& block, Eigen::MatrixXd& B, double& squares) {
   const NumeratorSums gram = gram_sums(problem, group, pairs, block);
   const std::vector<ScaledNormalEquations> factors = normal_equations(gram.FF, problem.functions());
   for (const ScaledNormalEquations& channel : factors)
-    if (!channel.ok()) return false;
+    if (!channel.ok()) return Digits::none;
   const auto solve = [&](const Eigen::MatrixXd& right_sides) {
     Eigen::MatrixXd out(block.members, problem.functions());
     for (Eigen::Index r = 0; r < block.members; ++r)
@@ -137,7 +140,7 @@ bool solve_block(const FitProblem& problem, const BasisGroup& group, const PairR
   B += refinement;
   const double gain = refinement.cwiseProduct(rest.FE.transpose()).sum();
   squares = rest.squares - gain;
-  return std::abs(gain) < kSlightGain * rest.squares;
+  return std::abs(gain) <= kSlightGain * rest.squares ? Digits::enough : Digits::few;
 }
 
 /// Calls visit(i, C_i^-1) for every submodel of a channel with the normal equations M. C_i is the block of M^-1 of the
@@ -189,13 +192,22 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                       Eigen::MatrixXd& B, double& cost, bool& factored) {
   B.setZero(problem.channels(), problem.functions());
+  factored = false;
   double sum = 0.0;
   Eigen::MatrixXd of_block;
+  Eigen::MatrixXd by_factors;
   const auto solve = [&](const auto& group, const auto& pairs, const auto& block) {
     double squares = 0.0;
-    if (factored || !solve_block(problem, group, pairs, block, of_block, squares)) {
-      factored = true;
-      if (!factored_numerators(problem, group, block, of_block, squares)) return false;
+    const Digits digits = solve_by_sums(problem, group, pairs, block, of_block, squares);
+    if (digits != Digits::enough) {
+      double squares_by_factors = 0.0;
+      if (factored_numerators(problem, group, block, by_factors, squares_by_factors)) {
+        factored = true;
+        of_block.swap(by_factors);
+        squares = squares_by_factors;
+      } else if (digits == Digits::none) {
+        return false;
+      }
     }
     sum += squares;
     for (Eigen::Index r = 0; r < block.members; ++r)

@@ -9,7 +9,7 @@ namespace stageid {
 /// Solves the convex problem, numerators for fixed denominators, per channel, by normal equations scaled to unit
 /// diagonal and one step of refinement; by orthogonal factors where the refinement shows that products have too few
 /// digits, as for nearly exact data or modes that cancel each other. Also returns the cost. `B` is overwritten.
-/// @param factored true: all by factors, which takes several times longer; set if some were needed
+/// @param factored whether some were computed by factors
 /// @returns false if the equations of a channel are singular to rounding.
 bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                       Eigen::MatrixXd& B, double& cost, bool& factored);

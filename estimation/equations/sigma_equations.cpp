@@ -136,8 +136,7 @@ std::vector<Eigen::Index> SigmaEquations::representative(Eigen::Index count) con
   return lines;
 }
 
-/// One triangle per share of the channels; the number of shares is fixed. Data that need this path are nearly exact,
-/// so a few times as many lines as unknowns suffice.
+/// Data that need this path are nearly exact, so a few times as many lines as unknowns suffice.
 Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
   const Eigen::Index unknowns = 2 * phi.cols() + own_.cols() + 1;
   const std::vector<Eigen::Index> lines = representative(kTimesOver * unknowns / 2);

@@ -1,6 +1,7 @@
 #include "estimation/equations/triangles.hpp"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"

@@ -88,7 +88,7 @@ class Iteration {
 
   std::optional<Trial> try_step(const Eigen::VectorXd& step) {
     if (!step.allFinite()) return std::nullopt;
-    Trial trial{stepped(problem_, beta_, step), 0.0, factored_};
+    Trial trial{stepped(problem_, beta_, step)};
     if (!bounds_.stabilize(beta_, trial.beta) || !solve(trial)) return std::nullopt;
     return trial;
   }
@@ -160,7 +160,7 @@ class Iteration {
 
   bool descent_step() {
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    return factored_ ? factored_step(groups) : summed_step(groups);
+    return factored_ || at_rounding() ? factored_step(groups) : summed_step(groups);
   }
 
   bool summed_step(const std::vector<BasisGroup>& groups) {
@@ -177,7 +177,7 @@ class Iteration {
     return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
   }
 
-  /// Without a residual, the refined-IV equations equal those of Gauss-Newton.
+  /// By Gauss-Newton: without a residual, the refined-IV equations are the same.
   bool factored_step(const std::vector<BasisGroup>& groups) {
     const FactoredEquations system(problem_, beta_, groups);
     if (!may_continue(system)) return false;
@@ -218,7 +218,7 @@ class Iteration {
   }
 
   bool fixed_point_step() {
-    if (result_.iterations == 0) best_ = Trial{beta_, cost_, factored_};
+    if (result_.iterations == 0) best_ = Trial{beta_, cost_};
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
@@ -232,7 +232,7 @@ class Iteration {
     }
     if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
     accept(std::move(*trial));
-    if (cost_ < best_.cost) best_ = Trial{beta_, cost_, factored_};
+    if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
     if (step_size_ < std::max(options_.step_tolerance, 1e-9))
       return end_at_best(
           FitStatus::step_small,

@@ -60,13 +60,14 @@ class AutomaticFit {
   /// Whether modes may be misplaced: the residual still shows one.
   bool may_exchange() const {
     return selection_.exactly > 0 && !selection_.keep_modes &&
-           best_.status != FitStatus::singular && !at_rounding() && !limit_reached() &&
-           misses_a_mode();
+           selection_.exactly < affordable_modes() && best_.status != FitStatus::singular &&
+           !at_rounding() && !limit_reached() && misses_a_mode();
   }
 
   /// @param surplus modes to grow beyond the requested number
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
+    if (surplus > 0) target_ = std::min(target_, affordable_modes());
     if (best_.status == FitStatus::singular || selection_.keep_modes) return;
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) {
@@ -294,7 +295,7 @@ class AutomaticFit {
     std::vector<StructureMove> moves =
         structure_moves(sample.data.frf, sample.data.options, sample.data.model, structure_.open);
     std::erase_if(moves, [&](const StructureMove& move) {
-      return count_modes(move.model) < selection_.exactly;
+      return count_modes(move.model) < std::min(selection_.exactly, count_modes(best_.model));
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
     // A trial of delays per channel takes longer than all others.
@@ -336,10 +337,11 @@ class AutomaticFit {
         : data(part_of_data(search.frf_, search.quick_, search.best_.model)),
           worth(data.frf, search.structure_, data.options.user_weights) {
       FitResult fit = fit_additive_model(data.frf, data.model, data.options);
-      if (worth.at_rounding(fit) && !search.at_rounding()) {  // then the part decides nothing
+      if (!data.all && worth.at_rounding(fit) && !search.at_rounding()) {
+        // Rounding decides nothing.
         data = {search.frf_, search.quick_, search.best_.model, true};
         worth = search.worth_;
-        fit = search.best_;
+        fit = fit_additive_model(data.frf, data.model, data.options);
       }
       now = worth.criterion(fit);
     }
@@ -510,6 +512,7 @@ class AutomaticFit {
             best_.model.submodels[i].natural_frequency_hz(), best_.model.fit.cost,
             without.model.fit.cost);
       adopt(std::move(without));
+      at_once *= 2;
     }
   }
 
@@ -588,7 +591,7 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
   const int most_surplus = std::max(static_cast<int>(kTried), fifth);
   for (int surplus = fifth; surplus <= most_surplus && best->may_exchange();) {
     AutomaticFit other = *best;
-    other.search(std::min(surplus, static_cast<int>(most) - selection.exactly));
+    other.search(surplus);
     if (!other.is_clearly_below(best->score())) surplus *= 2;
     if (other.score() < best->score()) best.emplace(std::move(other));
   }

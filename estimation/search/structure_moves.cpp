@@ -15,8 +15,8 @@ bool is_rigid_body(const Submodel& s) {
   return s.role == SubmodelRole::searched && s.integrators == 2 && s.denominator.size() == 1;
 }
 
-/// Or has other integrators than a rigid body.
-bool is_sprung(const Submodel& s) {
+/// A body on springs, or a given one.
+bool is_settled_body(const Submodel& s) {
   return s.role == SubmodelRole::suspension || (s.integrators > 0 && !is_rigid_body(s));
 }
 
@@ -74,7 +74,7 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
         }) > 0)
       out.push_back(std::move(direct));
   }
-  if (open.rigid_body && !has(model, is_sprung)) {
+  if (open.rigid_body && !has(model, is_settled_body)) {
     const auto below = [&](const Submodel& s) {
       return is_searched_mode(s) && s.natural_frequency_hz() < frf.frequency_hz[0];
     };

@@ -16,7 +16,7 @@ struct StructureMove {
 };
 
 /// One part more, of those that are open: numerators B_0 + B_1 s, a direct term, a rigid body, a rigid body on springs
-/// instead of a free one, a delay, delays per channel.
+/// instead of a free one or of the modes below the lines, a delay, delays per channel.
 /// @param options of the fit of `model`
 std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOptions& options,
                                              const AdditiveModel& model, const OpenStructure& open);

@@ -90,7 +90,7 @@ SampledPlant random_plant(int outputs, int inputs, std::uint64_t seed) {
     const SampledPlant plant =
         stageid::test::sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
     const Eigen::MatrixXd closed = plant.A - plant.B * plant.K * plant.C;
-    if (eigenvalues(closed).cwiseAbs().maxCoeff() < 0.995) return plant;
+    if (stageid::eigenvalues(closed).cwiseAbs().maxCoeff() < 0.995) return plant;
   }
 }
 

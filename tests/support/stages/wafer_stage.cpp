@@ -1,5 +1,7 @@
 #include "tests/support/stages/wafer_stage.hpp"
 
+#include <fmt/format.h>
+
 #include <initializer_list>
 #include <string>
 
@@ -21,7 +23,7 @@ std::vector<Channel> actuators() {
                                 {0.26, 0.21}};
   std::vector<Channel> list;
   for (int i = 0; i < 13; ++i)
-    list.push_back(channel("z" + std::to_string(i + 1), "N", kZ[i][0], kZ[i][1], 'z'));
+    list.push_back(channel(fmt::format("z{}", i + 1), "N", kZ[i][0], kZ[i][1], 'z'));
   list.push_back(channel("x1", "N", -0.28, -0.20, 'x'));
   list.push_back(channel("x2", "N", -0.28, 0.20, 'x'));
   list.push_back(channel("y1", "N", -0.20, -0.28, 'y'));

@@ -230,7 +230,8 @@ TEST_F(LimitedPlanTest, WithTheExactPlantThePredictionIsThatOfTheStage) {
   const ExperimentPlan plan = make_plan(config);
   const WaferStageSpec& stage = config.stage.spec;
   PlantPrior exact;
-  for (const auto& column : exact_pilot(stage, plan.grid().frequency_hz()).response.colwise())
+  const FrfEstimate pilot = exact_pilot(stage, plan.grid().frequency_hz());
+  for (const auto& column : pilot.response.colwise())
     exact.response.push_back(column.reshaped(2, 3));
   exact.sensor_known.assign(2, true);
   exact.actuator_known.assign(3, true);
