@@ -5,13 +5,14 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kAtOnce = 16;  // channels eliminated together
+constexpr Eigen::Index kAtOnce = 16;        // channels eliminated together
+constexpr Eigen::Index kWorthThreads = 64;  // functions
 
 }  // namespace
 
@@ -64,10 +65,6 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
     const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);
     const Eigen::Index* end = std::lower_bound(begin, all_end, part.first + part.count);
     if (begin == end) continue;
-    if (group.few) {
-      add_few(group, begin, end);
-      continue;
-    }
     const GroupProducts products(shared_, group);
     for (const TileRange& block : member_blocks(begin - all, end - begin, problem.size()))
       if (regular_) add_block(products, block);
@@ -100,29 +97,6 @@ void ArrowSystem::add_channels(const Eigen::Index* places, std::vector<Channel>&
   if (use_ != ChannelEquationsUse::only_kept) eliminate(channels);
   for (std::size_t i = 0; keeps() && i < channels.size(); ++i)
     channels_[static_cast<std::size_t>(places[i] - range_.first)] = std::move(channels[i]);
-}
-
-void ArrowSystem::add_few(const BasisGroup& group, const Eigen::Index* begin,
-                          const Eigen::Index* end) {
-  std::vector<ChannelEquations> own(static_cast<std::size_t>(end - begin));
-  for_each_task(problem_.threads, static_cast<int>(own.size()), [&](int r) {
-    const auto at = static_cast<std::size_t>(r);
-    own[at] = channel_equations(shared_, beta_, group, begin[r]);
-  });
-  const Eigen::Index n_f = problem_.functions();
-  const Eigen::Index globals = problem_.globals();
-  std::vector<Channel> channels(own.size());
-  for (std::size_t r = 0; r < own.size(); ++r) {
-    Channel& channel = channels[r];
-    const auto& [M, e] = own[r];
-    channel.bb = M.topLeftCorner(n_f, n_f);
-    channel.ab = M.bottomLeftCorner(globals, n_f);
-    channel.ba = M.topRightCorner(n_f, globals);
-    channel.e = e.head(n_f);
-    M_ += M.bottomRightCorner(globals, globals);
-    e_ += e.tail(globals);
-  }
-  add_channels(begin, channels);
 }
 
 void ArrowSystem::add_denominators(const LineSums& sums) {
@@ -185,7 +159,7 @@ void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eig
 
 void ArrowSystem::eliminate(std::vector<Channel>& channels) {
   std::vector<char> solved(channels.size());
-  const int threads = problem_.functions() < kManyFunctions ? 1 : problem_.threads;
+  const int threads = problem_.functions() < kWorthThreads ? 1 : problem_.threads;
   for_each_task(threads, static_cast<int>(channels.size()), [&](int i) {
     Channel& channel = channels[static_cast<std::size_t>(i)];
     Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);

@@ -70,7 +70,6 @@ class ArrowSystem {
  private:
   bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
   void add_block(const GroupProducts& products, const TileRange& block);
-  void add_few(const BasisGroup& group, const Eigen::Index* begin, const Eigen::Index* end);
   void add_denominators(const LineSums& sums);
   void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                    Channel& channel) const;

@@ -7,7 +7,7 @@
 
 #include "estimation/equations/triangles.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 

@@ -38,27 +38,6 @@ struct NumeratorSums {
   }
 };
 
-/// Lower triangles of F^H W F of a tile, computed per channel; for few channels.
-void add_grams(const BasisGroup& group, Eigen::Index first, const DataTile& data,
-               std::vector<Eigen::MatrixXd>& grams) {
-  const Eigen::Index n = data.W.cols();
-  Eigen::MatrixXd X(group.F.re.cols(), 2 * n);
-  for (std::size_t r = 0; r < grams.size(); ++r) {
-    const Eigen::VectorXd root = data.W.row(static_cast<Eigen::Index>(r)).cwiseSqrt().transpose();
-    X.leftCols(n) = group.F.re.middleRows(first, n).transpose() * root.asDiagonal();
-    X.rightCols(n) = group.F.im.middleRows(first, n).transpose() * root.asDiagonal();
-    grams[r].selfadjointView<Eigen::Lower>().rankUpdate(X);
-  }
-}
-
-/// The lower triangle of a gram in the order of `pairs`.
-Eigen::VectorXd packed(const Eigen::MatrixXd& gram, const std::vector<ColumnPair>& pairs) {
-  Eigen::VectorXd out(static_cast<Eigen::Index>(pairs.size()));
-  Eigen::Index p = 0;
-  for (const auto& [i, j] : pairs) out[p++] = gram(i, j);
-  return out;
-}
-
 /// The sums without FF and S. @param B numerators, members x n_f
 NumeratorSums residual_sums(const FitProblem& problem, const BasisGroup& group,
                             const TileRange& block, const Eigen::MatrixXd& B) {
@@ -78,34 +57,22 @@ NumeratorSums residual_sums(const FitProblem& problem, const BasisGroup& group,
 /// The sums for numerators of zero.
 NumeratorSums gram_sums(const FitProblem& problem, const BasisGroup& group,
                         const PairReduction& pairs, const TileRange& block) {
-  const bool few = group.few;
-  const Eigen::Index base = few ? 0 : group.fractions.simple_columns();
   const auto add = [&](const TileRange& share) {
     NumeratorSums sums;
-    sums.FF.setZero(static_cast<Eigen::Index>(few ? pairs.pairs().size() : pairs.direct().size()),
-                    share.members);
+    sums.FF.setZero(static_cast<Eigen::Index>(pairs.direct().size()), share.members);
     sums.FE.setZero(problem.functions(), share.members);
-    sums.S.setZero(share.members, base);
-    std::vector<Eigen::MatrixXd> own(
-        static_cast<std::size_t>(few ? share.members : 0),
-        Eigen::MatrixXd::Zero(problem.functions(), problem.functions()));
+    sums.S.setZero(share.members, group.fractions.simple_columns());
     DataTile data;
     for_each_tile(share, [&](Eigen::Index first, Eigen::Index n) {
       data.load(problem, group, share, {}, first, n);
-      if (few) {
-        add_grams(group, first, data, own);
-      } else {
-        add_pair_sums(data.W, group.F, group.F, pairs.direct(), first, sums.FF);
-        add_fraction_sums(data.W, group.fractions, first, sums.S);
-      }
+      add_pair_sums(data.W, group.F, group.F, pairs.direct(), first, sums.FF);
+      add_fraction_sums(data.W, group.fractions, first, sums.S);
       add_weighted_gradient(group, first, data, sums.FE);
     });
-    for (std::size_t r = 0; r < own.size(); ++r)
-      sums.FF.col(static_cast<Eigen::Index>(r)) = packed(own[r], pairs.pairs());
     return sums;
   };
   NumeratorSums all = ordered_sum(line_shares(block), problem.threads, add);
-  if (!few) all.FF = pairs.expand(all.S, all.FF, problem.threads);
+  all.FF = pairs.expand(all.S, all.FF, problem.threads);
   return all;
 }
 

@@ -50,14 +50,6 @@ bool FitProblem::is_held(Eigen::Index global) const noexcept {
   return std::find(held.begin(), held.end(), global) != held.end();
 }
 
-namespace {
-
-bool is_few(const FitProblem& problem, std::size_t channels) {
-  return static_cast<Eigen::Index>(channels) < kFewChannels && problem.functions() < kManyFunctions;
-}
-
-}  // namespace
-
 std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {
   std::vector<DerivativeColumn> columns;
   Eigen::Index function = 0;
@@ -173,11 +165,9 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     const auto at = static_cast<std::size_t>(g);
     BasisGroup& group = groups[at];
     through[at].emplace(problem.lines, group.delay_s);
-    group.few = is_few(problem, group.channels.size());
     resize(problem, wanted, group);
-    if (!group.few)
-      group.fractions = fraction_columns(*through[at], problem.lines.omega_rad_s.maxCoeff(),
-                                         problem.shapes, beta.a, with_derivatives, problem.held);
+    group.fractions = fraction_columns(*through[at], problem.lines.omega_rad_s.maxCoeff(),
+                                       problem.shapes, beta.a, with_derivatives, problem.held);
   });
   const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
   for_each_task(problem.threads, static_cast<int>(groups.size() * parts), [&](int task) {

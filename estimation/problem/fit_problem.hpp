@@ -84,19 +84,14 @@ struct FitParameters {
   Eigen::MatrixXd B;               ///< n_c x n_f
 };
 
-/// Smaller groups do not gain from products shared between channels, unless they have many functions.
-constexpr Eigen::Index kFewChannels = 16;
-constexpr Eigen::Index kManyFunctions = 64;
-
 /// Channels with the same delay, and the functions evaluated with that delay.
 struct BasisGroup {
   double delay_s = 0.0;
   std::vector<Eigen::Index> channels;
-  SplitMatrix F;              ///< N x n_f
-  SplitMatrix D;              ///< N x n_d, see DerivativeColumn; empty unless requested
-  SplitMatrix T;              ///< N x n_f: derivative to the delay; empty unless delays are free
-  bool few = false;           ///< the products are multiplied out per channel
-  FractionColumns fractions;  ///< unless few
+  SplitMatrix F;  ///< N x n_f
+  SplitMatrix D;  ///< N x n_d, see DerivativeColumn; empty unless requested
+  SplitMatrix T;  ///< N x n_f: derivative to the delay; empty unless delays are free
+  FractionColumns fractions;
 };
 
 /// Meaning of a column of D: dF_function / da_parameter, for the parameters that are not held.

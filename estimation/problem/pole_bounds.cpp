@@ -55,10 +55,11 @@ PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start)
 
 void PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
                                 Eigen::VectorXd& a) const {
-  // Limited, not refused: one mode must not stop all the others.
+  // A step that moves it too far is shortened, not refused: one mode must not stop all the others.
   constexpr double kMost = kLargestMove * kLargestMove;
   const double here = std::abs(before[1]);
-  a[1] = std::clamp(a[1], here / kMost, here * kMost);
+  const double limited = std::clamp(a[1], here / kMost, here * kMost);
+  if (limited != a[1]) a = before + (limited - before[1]) / (a[1] - before[1]) * (a - before);
   a[1] = std::clamp(a[1], 1.0 / (highest_rad_s_ * highest_rad_s_),
                     1.0 / (lowest_rad_s_[i] * lowest_rad_s_[i]));
   const double root = std::sqrt(a[1]);

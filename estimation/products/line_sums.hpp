@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 
 namespace stageid {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 
 namespace stageid {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {

@@ -6,7 +6,7 @@
 
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/equations/joint_equations.hpp"
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 #include "estimation/uncertainty/data_noise.hpp"
 
 namespace stageid {

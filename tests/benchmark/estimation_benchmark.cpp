@@ -10,7 +10,7 @@
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/equations/numerators.hpp"
 #include "estimation/problem/freed_memory.hpp"
-#include "estimation/products/channel_equations.hpp"
+#include "estimation/products/equation_method.hpp"
 #include "estimation/search/automatic_fit.hpp"
 #include "tests/support/stages/random_stage.hpp"
 

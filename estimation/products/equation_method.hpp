@@ -23,15 +23,4 @@ struct EquationMethod {
   SplitMatrix Y;
 };
 
-/// The part of one channel in M d_beta = e (arrow_system.hpp), order (functions, globals).
-struct ChannelEquations {
-  Eigen::MatrixXd M;
-  Eigen::VectorXd e;
-};
-
-/// The equations of channel c from its own columns, as one matrix product. For groups of few channels, for which the
-/// products shared between channels by line_sums() cost more than they save.
-ChannelEquations channel_equations(const EquationMethod& method, const FitParameters& beta,
-                                   const BasisGroup& group, Eigen::Index c);
-
 }  // namespace stageid
