@@ -174,6 +174,8 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
         squares = squares_by_factors;
       } else if (digits == Digits::none) {
         return false;
+      } else {
+        squares = residual_sums(problem, group, block, of_block).squares;
       }
     }
     sum += squares;

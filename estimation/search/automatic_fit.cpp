@@ -268,7 +268,7 @@ class AutomaticFit {
   int affordable_modes() const { return static_cast<int>(most_modes(frf_, structure_)); }
 
   /// Modes to add together.
-  std::size_t at_once() const {
+  std::size_t added_together() const {
     return std::max(kTried, static_cast<std::size_t>(count_modes(best_.model)) / kShareAtOnce);
   }
 
@@ -404,7 +404,7 @@ class AutomaticFit {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
       const std::vector<ResidualMode> candidates =
-          residual_modes(frf_, best_.model, quick_.user_weights, at_once(), quick_.threads);
+          residual_modes(frf_, best_.model, quick_.user_weights, added_together(), quick_.threads);
       FitResult before = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
@@ -516,8 +516,8 @@ class AutomaticFit {
     }
   }
 
-  /// Whether the squares rise by no more than the removal costs of these modes together. They rise by more if the modes
-  /// stood in for each other.
+  /// Whether the squares rise by no more than the removal costs of these modes together. They rise by more if two of
+  /// them described the same resonance.
   bool is_predicted(const FitResult& without, const std::vector<std::size_t>& out) const {
     double predicted = 0.0;
     for (const std::size_t i : out) predicted += best_.removal_cost[i];
