@@ -48,9 +48,7 @@ Eigen::MatrixXd triangle_of_channel(const FitProblem& problem, const FitParamete
   stack(global_columns(problem, beta, group, c, {0, problem.size()}), root,
         A.middleCols(n_f, globals));
   A.rightCols(1).topRows(2 * problem.size()) = stacked_data(problem, root, c);
-  qr_in_place(A);
-  return Eigen::MatrixXd(
-      A.block(n_f, n_f, globals + 1, globals + 1).triangularView<Eigen::Upper>());
+  return triangle_after(n_f, A);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "estimation/equations/triangles.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/products/fraction_gram.hpp"
-#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -61,9 +60,7 @@ Eigen::MatrixXd factor_of_channel(const Eigen::VectorXd& weights, const Eigen::V
   A.block(0, numerators, N, n) = phi.re.array().colwise() * h_re - phi.im.array().colwise() * h_im;
   A.block(N, numerators, N, n) = phi.re.array().colwise() * h_im + phi.im.array().colwise() * h_re;
   A.rightCols(1) << h_re.matrix(), h_im.matrix();
-  qr_in_place(A);
-  return Eigen::MatrixXd(
-      A.block(numerators, numerators, n + 1, n + 1).triangularView<Eigen::Upper>());
+  return triangle_after(numerators, A);
 }
 
 /// sum_k Re{conj(X) v}, one per column of X

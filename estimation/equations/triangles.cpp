@@ -22,6 +22,13 @@ void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
 
 }  // namespace
 
+Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A) {
+  qr_in_place(A);
+  const Eigen::Index rest = A.cols() - eliminated;
+  return Eigen::MatrixXd(
+      A.block(eliminated, eliminated, rest, rest).triangularView<Eigen::Upper>());
+}
+
 Eigen::MatrixXd stacked_triangle(Eigen::Index count, int threads,
                                  const std::function<Eigen::MatrixXd(Eigen::Index)>& factor) {
   std::vector<Eigen::MatrixXd> shares(static_cast<std::size_t>(std::min(kShares, count)));

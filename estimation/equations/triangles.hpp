@@ -5,6 +5,10 @@
 
 namespace stageid {
 
+/// The rows and columns of R in A = Q R after the first `eliminated`; A has at least as many rows as columns and is
+/// overwritten.
+Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A);
+
 /// R of the matrices factor(0), factor(1), ... stacked, all upper triangular with the same columns. The order of the
 /// work does not depend on the number of threads. @pre count > 0
 Eigen::MatrixXd stacked_triangle(Eigen::Index count, int threads,
