@@ -3,7 +3,7 @@
 /// Modal models from frequency responses: fit, validation, mode shapes, state space.
 
 #include "estimation/modal/modal_assurance.hpp"
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/modal/prediction_error.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 #include "estimation/modal/state_space.hpp"

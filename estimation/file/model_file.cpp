@@ -6,7 +6,7 @@
 
 #include "acquisition/files/output_file.hpp"
 #include "estimation/file/json_file.hpp"
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/model/additive_model.hpp"
 
 namespace stageid {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 
 namespace stageid {
 

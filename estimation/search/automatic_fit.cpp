@@ -19,14 +19,14 @@
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/part_of_data.hpp"
+#include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
-#include "estimation/search/residue_rank_test.hpp"
+#include "estimation/search/residue_ranks.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/search/trial_options.hpp"
 #include "estimation/start/pole_relocation.hpp"
-#include "estimation/start/residual_modes.hpp"
 
 namespace stageid {
 namespace {
@@ -137,8 +137,8 @@ class AutomaticFit {
 
   /// Whether the residual contains a mode that may be worth its parameters.
   bool misses_a_mode() const {
-    const std::vector<ResidualMode> missed =
-        residual_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
+    const std::vector<ProposedMode> missed =
+        proposed_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
     return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
   }
 
@@ -403,8 +403,8 @@ class AutomaticFit {
     for (int round = 0; wanted_more(); ++round) {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
-      const std::vector<ResidualMode> candidates =
-          residual_modes(frf_, best_.model, quick_.user_weights, added_together(), quick_.threads);
+      const std::vector<ProposedMode> candidates =
+          proposed_modes(frf_, best_.model, quick_.user_weights, added_together(), quick_.threads);
       FitResult before = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
@@ -420,10 +420,10 @@ class AutomaticFit {
 
   /// Adds several at once if each is clearly worth it; pruning corrects surplus ones. If very many are requested,
   /// regardless of their worth.
-  bool add_clear_ones(const std::vector<ResidualMode>& candidates) {
+  bool add_clear_ones(const std::vector<ProposedMode>& candidates) {
     const bool demanded = selection_.exactly > 0;
-    std::vector<ResidualMode> clear;
-    for (const ResidualMode& candidate : candidates)
+    std::vector<ProposedMode> clear;
+    for (const ProposedMode& candidate : candidates)
       if (demanded || candidate.gain > 4.0 * worth_.price(best_)) clear.push_back(candidate);
     const int room =
         (selection_.exactly > 0 ? target_ : affordable_modes()) - count_modes(best_.model);
@@ -432,26 +432,26 @@ class AutomaticFit {
     FitResult trial = fit_with(clear);
     if (trial.status == FitStatus::singular) return false;
     if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
-    for (const ResidualMode& candidate : clear)
+    for (const ProposedMode& candidate : clear)
       say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
           candidate.mode.frequency_hz, clear.size(), best_.model.fit.cost, trial.model.fit.cost);
     adopt(std::move(trial));
     return true;
   }
 
-  FitResult fit_with(const std::vector<ResidualMode>& more) const {
+  FitResult fit_with(const std::vector<ProposedMode>& more) const {
     AdditiveModel model = best_.model;
-    for (const ResidualMode& candidate : more)
+    for (const ProposedMode& candidate : more)
       model.submodels.push_back(mode_submodel(frf_, structure_, candidate.mode));
     return fit_additive_model(frf_, model, quick_);
   }
 
-  bool add_one(const std::vector<ResidualMode>& candidates) {
+  bool add_one(const std::vector<ProposedMode>& candidates) {
     FitResult best_trial;
     bool found = false;
     const double price = worth_.price(best_);
     double reach = kReach;
-    for (const ResidualMode& candidate : candidates) {
+    for (const ProposedMode& candidate : candidates) {
       if (selection_.exactly == 0 && reach * candidate.gain < price) continue;
       FitResult trial = fit_with({candidate});
       if (trial.status == FitStatus::singular) continue;

@@ -19,7 +19,7 @@
 #include "estimation/search/determinacy.hpp"
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
-#include "estimation/search/residue_rank_test.hpp"
+#include "estimation/search/residue_ranks.hpp"
 #include "estimation/start/delay_search.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/low_rank_covariance.hpp"

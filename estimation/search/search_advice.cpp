@@ -12,9 +12,9 @@
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
+#include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/search/trial_options.hpp"
-#include "estimation/start/residual_modes.hpp"
 
 namespace stageid {
 namespace {
@@ -77,8 +77,8 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
     return count_modes(move.model) > count_modes(same.model);
   });
   if (!cut_short)  // such a search would add modes in any case
-    for (const ResidualMode& missed :
-         residual_modes(frf, same.model, trial.user_weights, 1, trial.threads)) {
+    for (const ProposedMode& missed :
+         proposed_modes(frf, same.model, trial.user_weights, 1, trial.threads)) {
       moves.push_back({"more modes", same.model, trial});
       moves.back().model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
     }

@@ -14,9 +14,9 @@
 #include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/late_channels.hpp"
+#include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
-#include "estimation/start/residual_modes.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/modal/submodel_residues.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"

@@ -38,8 +38,8 @@ namespace stageid {
 /// interpolation errors; with one period only the residual is used.
 ///
 /// Incomplete runs are skipped; of several complete runs of one (realization, experiment), the last is used. Periods
-/// with a marked sample are dropped. Of outliers (periodic, three periods or more: outlier_detection.hpp), short glitches
-/// are replaced, other periods dropped; with lpm, periods with a glitch are dropped (glitch_detection.hpp). A realization with a run without clean periods is discarded
+/// with a marked sample are dropped. Of outliers (periodic, three periods or more: period_outliers.hpp), short glitches
+/// are replaced, other periods dropped; with lpm, periods with a glitch are dropped (record_glitches.hpp). A realization with a run without clean periods is discarded
 /// (FrfEstimate::left_out_realizations). With two periods and two realizations, the plant's linearity is tested,
 /// see nonlinearity_test(). If only some of the excited actuators are requested as inputs, they are columns of the
 /// whole estimate, because the others move too.

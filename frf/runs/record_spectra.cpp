@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "frf/periods/glitch_detection.hpp"
+#include "frf/periods/record_glitches.hpp"
 #include "frf/runs/health_gathering.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/runs/transient_model.hpp"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/period_comparison.hpp"
+#include "frf/runs/period_rejection.hpp"
 #include "frf/runs/run_steps.hpp"
 
 namespace stageid {
@@ -170,7 +170,7 @@ class RunMeasurement {
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
-  PeriodComparison comparison_;
+  PeriodRejection comparison_;
   int together_ = 1;  // periods that are compared and included together
   bool compare_ = true;
   int unmarked_ = 0;

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "hal/modbus/modbus_answer.hpp"
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_fault.hpp"
 #include "hal/modbus/modbus_map.hpp"
-#include "hal/modbus/modbus_pdu.hpp"
 #include "hal/node/stage_node.hpp"
 
 namespace stageid {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "hal/modbus/modbus_address.hpp"
+#include "hal/modbus/modbus_answer.hpp"
 #include "hal/modbus/modbus_fault.hpp"
-#include "hal/modbus/modbus_frame.hpp"
-#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/modbus/modbus_request_frame.hpp"
 
 namespace stageid {
 

@@ -20,7 +20,7 @@ namespace {
 /// Registers with their addresses.
 class Block {
  public:
-  Block(ModbusLink& link, int first, std::size_t count)
+  Block(ModbusClient& link, int first, std::size_t count)
       : first_(first), registers_(read_registers(link, first, count)) {}
   RegisterBlock<const std::uint16_t> numbers() const { return {first_, registers_}; }
   std::uint32_t operator[](int address) const { return numbers().u32(address); }
@@ -36,12 +36,12 @@ class Block {
   std::vector<std::uint16_t> registers_;
 };
 
-[[noreturn]] void refuse(ModbusLink& link, const std::string& what) {
+[[noreturn]] void refuse(ModbusClient& link, const std::string& what) {
   link.close();
   throw StageError(fmt::format("{}: {}", to_string(link.address()), what));
 }
 
-[[noreturn]] void refuse(ModbusLink& link, PeerStatus status, const std::string& detail) {
+[[noreturn]] void refuse(ModbusClient& link, PeerStatus status, const std::string& detail) {
   refuse(link, meaning(status).words + detail);
 }
 
@@ -51,7 +51,7 @@ bool sound(const std::vector<double>& scales) {
 }
 
 template <std::size_t Count, typename Answered>
-void transact(ModbusLink& link, int first, const std::array<std::uint16_t, Count>& request,
+void transact(ModbusClient& link, int first, const std::array<std::uint16_t, Count>& request,
               int read_first, std::span<std::uint16_t> reply, Answered answered) {
   bool foreign = false;
   const LinkStatus done = link.repeat_once([&] {
@@ -73,7 +73,7 @@ std::string describe(const ModbusState& state) {
 
 /// Sends a run command. `session`: the expected key in the answer, 0: any but 0.
 /// @return the key in the answer.
-std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uint64_t run_seed,
+std::uint32_t give_run_command(ModbusClient& link, std::uint32_t command, std::uint64_t run_seed,
                                std::uint32_t session, std::vector<std::uint16_t>& reply) {
   std::random_device random;
   std::array<std::uint16_t, map::kRunRegisters> request{};
@@ -92,7 +92,7 @@ std::uint32_t give_run_command(ModbusLink& link, std::uint32_t command, std::uin
 
 }  // namespace
 
-std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count) {
+std::vector<std::uint16_t> read_registers(ModbusClient& link, int first, std::size_t count) {
   constexpr std::size_t kMost = 120;
   std::vector<std::uint16_t> registers(count);
   for (std::size_t at = 0; at < count; at += kMost) {
@@ -118,7 +118,7 @@ std::string map_trouble(RegisterBlock<const std::uint16_t> status) {
   return "";
 }
 
-ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) {
+ModbusDescription read_description(ModbusClient& link, const StageInfo& expected) {
   const Block status(link, map::kMagic, 6);
   if (const std::string wrong = map_trouble(status.numbers()); !wrong.empty()) refuse(link, wrong);
   const Block block(link, map::kActuatorCount,
@@ -146,7 +146,7 @@ ModbusDescription read_description(ModbusLink& link, const StageInfo& expected) 
   return description;
 }
 
-ModbusState read_state(ModbusLink& link) {
+ModbusState read_state(ModbusClient& link) {
   const Block block(link, map::kState, 6);
   return {static_cast<NodeState>(block[map::kState] & 0xFFU),
           static_cast<FaultCause>(block[map::kCause] & 0xFFU),
@@ -154,7 +154,7 @@ ModbusState read_state(ModbusLink& link) {
           (block[map::kFlags] & map::kFlagEnabled) != 0};
 }
 
-void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
+void give_supervisor_command(ModbusClient& link, SupervisorCommand command) {
   const std::uint32_t sequence = Block(link, map::kCommandEcho, 2)[map::kCommandEcho] + 1;
   std::array<std::uint16_t, 4> request{};
   const RegisterBlock out(map::kCommand, request);
@@ -169,7 +169,7 @@ void give_supervisor_command(ModbusLink& link, SupervisorCommand command) {
                                describe(read_state(link))));
 }
 
-std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+std::uint32_t begin_run(ModbusClient& link, std::uint64_t run_seed,
                         std::vector<std::uint16_t>& reply) {
   try {
     return give_run_command(link, map::kRunBegin, run_seed, 0, reply);
@@ -182,7 +182,7 @@ std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
       fmt::format("{}: the node does not start a run: {}", place, describe(read_state(link))));
 }
 
-void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {
+void end_run(ModbusClient& link, std::uint32_t session, std::vector<std::uint16_t>& reply) {
   static_cast<void>(give_run_command(link, map::kRunEnd, 0, session, reply));
 }
 

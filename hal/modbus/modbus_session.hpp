@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/modbus/modbus_client.hpp"
 #include "hal/modbus/modbus_encoding.hpp"
-#include "hal/modbus/modbus_link.hpp"
 #include "hal/stage/stage.hpp"
 #include "hal/stage/supervisor.hpp"
 
@@ -16,7 +16,7 @@ namespace stageid {
 
 /// Reads `count` registers starting at `first`, in as many transactions as needed.
 /// @throws StageError, with the link closed.
-std::vector<std::uint16_t> read_registers(ModbusLink& link, int first, std::size_t count);
+std::vector<std::uint16_t> read_registers(ModbusClient& link, int first, std::size_t count);
 
 inline constexpr const char* kForeignReplies =
     "replies do not match the requests; check that only one program uses the link, and check the "
@@ -33,7 +33,7 @@ struct ModbusDescription {
 
 /// Reads the node's description and compares it with the expected one.
 /// @throws StageError if it is not a stage, or has another map, other channels or another rate.
-ModbusDescription read_description(ModbusLink& link, const StageInfo& expected);
+ModbusDescription read_description(ModbusClient& link, const StageInfo& expected);
 
 struct ModbusState {
   NodeState state = NodeState::not_ready;
@@ -42,16 +42,16 @@ struct ModbusState {
   bool enabled = false;  ///< operation_enabled or measuring
 };
 /// @throws StageError
-ModbusState read_state(ModbusLink& link);
+ModbusState read_state(ModbusClient& link);
 
 /// @throws StageError if it is refused; the message names state and cause.
-void give_supervisor_command(ModbusLink& link, SupervisorCommand command);
+void give_supervisor_command(ModbusClient& link, SupervisorCommand command);
 
 /// Begins a run; `reply` receives the measurement block with y[0]. @return the key of the run.
 /// @throws StageError if it is refused or not answered.
-std::uint32_t begin_run(ModbusLink& link, std::uint64_t run_seed,
+std::uint32_t begin_run(ModbusClient& link, std::uint64_t run_seed,
                         std::vector<std::uint16_t>& reply);
 /// Ends the run of this key. @throws StageError as begin_run().
-void end_run(ModbusLink& link, std::uint32_t session, std::vector<std::uint16_t>& reply);
+void end_run(ModbusClient& link, std::uint32_t session, std::vector<std::uint16_t>& reply);
 
 }  // namespace stageid

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/modbus/modbus_link.hpp"
+#include "hal/modbus/modbus_client.hpp"
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/stage/pacer.hpp"
 #include "hal/stage/peer_status.hpp"
@@ -59,7 +59,7 @@ class ModbusStage final : public CyclicStage {
   std::string describe_report(PeerStatus status, std::uint32_t node_status) const;
 
   StageInfo info_;
-  ModbusLink link_;
+  ModbusClient link_;
   Pacer pacer_;
   std::vector<std::uint16_t> request_;  // setpoint block
   std::vector<std::uint16_t> reply_;    // measurement block
@@ -75,7 +75,7 @@ class ModbusStage final : public CyclicStage {
   enum class Trouble : std::uint8_t { none, link, foreign_reply, node, not_carried };
   Trouble trouble_ = Trouble::none;
   PeerStatus status_ = PeerStatus::good;
-  ModbusLink::Trouble link_trouble_;
+  ModbusClient::Trouble link_trouble_;
   std::uint32_t node_status_ = 0;
   // The report of the node that stopped the run; it may be good again while the excitation is ramped down.
   PeerStatus stopped_by_ = PeerStatus::good;

@@ -7,8 +7,8 @@
 #include <string>
 #include <thread>
 
+#include "hal/modbus/modbus_client.hpp"
 #include "hal/modbus/modbus_encoding.hpp"
-#include "hal/modbus/modbus_link.hpp"
 #include "hal/stage/supervisor.hpp"
 
 namespace stageid {
@@ -49,7 +49,7 @@ class ModbusSupervisor final : public Supervisor {
   bool take_status(RegisterBlock<const std::uint16_t> status);
   void set_trouble(std::string trouble);
 
-  ModbusLink link_;
+  ModbusClient link_;
   ModbusSupervisorOptions options_;
   std::uint32_t heartbeat_ = 0;
   std::uint32_t command_ = 0;

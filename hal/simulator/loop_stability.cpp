@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"
-#include "hal/simulator/modal_propagator.hpp"
+#include "hal/simulator/mode_transition.hpp"
 
 namespace stageid {
 namespace {
@@ -102,7 +102,7 @@ class SampledLoop {
       if (m.accelerations.size() > 0) shape += m.accelerations;
       m.measured = (measured.directions.transpose() * measured.scale.asDiagonal() * shape).norm();
       const auto over = [&](double part) {
-        return modal_propagator(m.omega, mode.damping_ratio, part * period_s);
+        return mode_transition(m.omega, mode.damping_ratio, part * period_s);
       };
       m.transition = over(1.0).transition;
       m.of_old = over(1.0 - fraction_).transition * over(fraction_).input;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hal/simulator/modal_propagator.hpp"
+#include "hal/simulator/mode_transition.hpp"
 #include "hal/stage/require.hpp"
 
 namespace stageid {
@@ -75,10 +75,10 @@ void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,
                         double damping_ratio) noexcept {
   const double omega = kTwoPi * natural_frequency_hz;
   const auto over = [&](double part) {
-    return modal_propagator(omega, damping_ratio, part * period_s_);
+    return mode_transition(omega, damping_ratio, part * period_s_);
   };
-  const ModalPropagator all = over(1.0);
-  const ModalPropagator late = over(1.0 - fraction_);
+  const ModeTransition all = over(1.0);
+  const ModeTransition late = over(1.0 - fraction_);
   const Eigen::Vector2d of_old = late.transition * over(fraction_).input;
   const Eigen::Matrix2d& e = all.transition;
   step_.row(mode) << e(0, 0), e(0, 1), e(1, 0), e(1, 1), of_old[0], of_old[1], late.input[0],

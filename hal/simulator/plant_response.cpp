@@ -7,7 +7,7 @@
 #include <cmath>
 #include <complex>
 
-#include "hal/simulator/modal_propagator.hpp"
+#include "hal/simulator/mode_transition.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/require.hpp"
 

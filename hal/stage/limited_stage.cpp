@@ -52,7 +52,7 @@ void LimitedStage::start(std::uint64_t run_seed, Inputs& first) {
   mean_square_.setZero();
   stage_->start(run_seed, first);
   guard_.start(first);
-  const LoopGuard::Finding finding = guard_.inspect(first);
+  const LimitGuard::Finding finding = guard_.inspect(first);
   if (finding.violation.kind != LimitKind::none) {
     violation_ = finding.violation;
     stage_->stop();
@@ -143,7 +143,7 @@ double LimitedStage::limit_channel(Eigen::Index channel, double wanted,
 }
 
 void LimitedStage::inspect(Inputs& inputs) noexcept {
-  const LoopGuard::Finding finding = guard_.inspect(inputs);
+  const LimitGuard::Finding finding = guard_.inspect(inputs);
   if (finding.violation.kind != LimitKind::none) [[unlikely]] {
     report(finding.violation);
     if (!finding.sound) take_emergency(finding.violation);

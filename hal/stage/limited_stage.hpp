@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "hal/stage/limit_guard.hpp"
 #include "hal/stage/limits.hpp"
-#include "hal/stage/loop_guard.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/stage.hpp"
 
@@ -26,7 +26,7 @@ struct Emergency {
 /// channel and cycle. A position outside its window is reported the same way. The loop then ramps its
 /// excitation down in closed loop and stops; its samples are marked.
 ///
-/// This requires a sound loop. As soon as LoopGuard finds it unsound, commands are ignored. The stage is
+/// This requires a sound loop. As soon as LimitGuard finds it unsound, commands are ignored. The stage is
 /// braked (Outcome::braking) if its motion is known. Then the forces are zero, exchange() returns
 /// Outcome::opened, and the loop stops the stage at once. emergency() contains cause and result.
 /// Inputs::applied contains the applied forces if they differ from the command.
@@ -40,7 +40,7 @@ class LimitedStage final : public CyclicStage {
   /// positive.
   LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits);
 
-  /// The feed-forward of the controller is not expected to move the stage, see LoopGuard::carry().
+  /// The feed-forward of the controller is not expected to move the stage, see LimitGuard::carry().
   void carry(const MotionControllerSpec& controller);
 
   const StageInfo& info() const noexcept override { return stage_->info(); }
@@ -67,7 +67,7 @@ class LimitedStage final : public CyclicStage {
 
   std::unique_ptr<CyclicStage> stage_;
   StageLimits limits_;
-  LoopGuard guard_;
+  LimitGuard guard_;
   LimitViolation violation_;
   Emergency emergency_;
   bool limited_ = false;

@@ -17,7 +17,7 @@
 #include "tools/config/config_schema.hpp"
 #include "tools/config/controller_file.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/loop_check.hpp"

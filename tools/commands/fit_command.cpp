@@ -11,7 +11,7 @@
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/model/covariance_file.hpp"
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -30,14 +30,14 @@ struct FitCommandFlags {
   std::filesystem::path frf;
   std::filesystem::path output;
   std::filesystem::path covariance;  ///< empty: not requested
-  FitFlags words;
+  FitWords words;
   FitRequest request;  ///< only its numbers
   std::vector<double> band_hz;
 };
 
 FitRequest checked_request(const FitCommandFlags& flags) {
   FitRequest request = flags.request;
-  parse_fit_flags(flags.words, request);
+  parse_fit_words(flags.words, request);
   if (!flags.band_hz.empty()) request.band_hz = {flags.band_hz[0], flags.band_hz[1]};
   return request;
 }

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tools/config/config_visitor.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 namespace stageid {
 

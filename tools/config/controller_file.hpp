@@ -3,7 +3,7 @@
 #include "frf/wiring/nominal_stage.hpp"
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/controller_keys.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 namespace stageid {
 

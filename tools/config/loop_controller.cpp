@@ -7,7 +7,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tools/config/controller_file.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"

@@ -8,11 +8,11 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/stage/loop_guard.hpp"
+#include "hal/stage/limit_guard.hpp"
 #include "tools/config/config_reader.hpp"
 #include "tools/config/loop_controller.hpp"
 #include "tools/config/stage_keys.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 namespace stageid {
 namespace {
@@ -160,7 +160,7 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
     if (config.spec.has_plant()) {
       const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
     } else {
-      const LoopGuard guard(config.spec.limits, config.spec.info);
+      const LimitGuard guard(config.spec.limits, config.spec.info);
     }
     const MotionController controller(config.spec.controller);
   } catch (const std::invalid_argument& error) {

@@ -11,7 +11,7 @@
 #include "hal/stage/motion_controller.hpp"
 #include "tools/config/controller_file.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 namespace stageid {
 namespace {

@@ -11,9 +11,9 @@
 #include "acquisition/files/key_suggestion.hpp"
 #include "frf/plant/zippered_fit.hpp"
 #include "tools/config/config_reader.hpp"
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 #include "tools/experiment/config_plan.hpp"
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 #include "tools/terminal/format_errors.hpp"
 
 namespace stageid {

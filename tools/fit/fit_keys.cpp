@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "estimation/request/submodel_text.hpp"
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 
 namespace stageid {
 

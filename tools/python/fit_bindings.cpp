@@ -11,7 +11,7 @@
 #include "estimation/model/cmif.hpp"
 #include "estimation/start/stabilization.hpp"
 #include "tools/exchange/model/covariance_file.hpp"
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/python/bindings.hpp"
 #include "tools/python/frf_handle.hpp"
@@ -96,7 +96,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
               const std::optional<std::vector<std::string>>& submodels, const std::string& method,
               int max_iterations, std::optional<double> search_seconds, std::optional<int> threads,
               bool covariance) {
-  FitFlags flags;
+  FitWords flags;
   flags.modes = flag_text(modes);
   flags.weighting = flag_text(weighting);
   flags.hold = hold.value_or("");
@@ -109,7 +109,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
   flags.method = method;
   FitRequest request;
   request.band_hz = band_hz;
-  parse_fit_flags(flags, request);
+  parse_fit_words(flags, request);
   request.max_iterations = max_iterations;
   request.search_seconds = search_seconds.value_or(0.0);
   request.threads = threads.value_or(0);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "estimation/modal/modal_assurance.hpp"
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 #include "estimation/modal/validation.hpp"
 #include "tools/python/arguments.hpp"

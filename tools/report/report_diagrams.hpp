@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "estimation/start/stabilization.hpp"
 #include "frf/response/nonlinearity.hpp"

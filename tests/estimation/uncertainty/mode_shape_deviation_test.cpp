@@ -12,7 +12,7 @@
 #include <numbers>
 #include <vector>
 
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "tests/estimation/correlated_stage.hpp"

@@ -11,9 +11,9 @@
 #include <array>
 #include <random>
 
-#include "hal/modbus/modbus_frame.hpp"
-#include "hal/modbus/modbus_link.hpp"
+#include "hal/modbus/modbus_client.hpp"
 #include "hal/modbus/modbus_map.hpp"
+#include "hal/modbus/modbus_request_frame.hpp"
 #include "hal/modbus/modbus_stage.hpp"
 #include "hal/stage/stage.hpp"
 #include "tests/hal/modbus/modbus_bench.hpp"
@@ -48,7 +48,7 @@ int raw_client(int port) {
 TEST(ModbusServer, GarbageOfOneClientDoesNotDisturbAnother) {
   test::NumberedRegisters registers;
   const test::ServerThread server(registers, nullptr);
-  ModbusLink link(server.address(), test::kQuickTiming);
+  ModbusClient link(server.address(), test::kQuickTiming);
   link.connect();
   std::mt19937 engine(2);
   for (int round = 0; round < 50; ++round) {
@@ -73,7 +73,7 @@ TEST(ModbusServer, ASerialLineIsFoundAgainAfterHalfARequest) {
   const int line = open(server.address().device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
   const std::array<std::uint8_t, 4> half = {1, 3, 0, 0};
   EXPECT_EQ(write(line, half.data(), half.size()), 4);
-  ModbusLink link(server.address(), test::kQuickTiming);
+  ModbusClient link(server.address(), test::kQuickTiming);
   link.connect();
   Pair values{};
   LinkStatus status = link.read(20, values);
@@ -154,7 +154,7 @@ TEST(ModbusServer, AThousandIdleAndAHundredSlowClientsLockNobodyOut) {
     if (i % 5 != 0) continue;
     ASSERT_EQ(exchange(), Outcome::ok) << i << owner.stage.trouble();
   }
-  ModbusLink another(bench.address(), test::kQuickTiming);
+  ModbusClient another(bench.address(), test::kQuickTiming);
   another.connect();
   Pair values{};
   EXPECT_EQ(another.read(modbus_map::kMagic, values), LinkStatus::ok);
@@ -240,7 +240,7 @@ TEST(ModbusServer, OtherUnitsOnASerialLineDoNotDeafenTheNode) {
   test::NumberedRegisters registers;
   const test::ServerThread server(registers, nullptr, true);
   const int line = open(server.address().device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-  ModbusLink link(server.address(), {3.0, 5.0, 1e-3});  // a pty takes its time
+  ModbusClient link(server.address(), {3.0, 5.0, 1e-3});  // a pty takes its time
   link.connect();
   for (int round = 0; round < 20; ++round) {
     for (const Bytes& pdu :

@@ -169,7 +169,7 @@ TEST(ModbusStage, SaysWhyAStageDoesNotStart) {
 }
 
 /// A transmitted setpoint; the reply's sequence and missed count.
-std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t session,
+std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusClient& link, std::uint32_t session,
                                                  std::uint32_t sequence) {
   std::array<std::uint16_t, 8> request{};
   const RegisterBlock out(map::kRunKey, request);
@@ -184,7 +184,7 @@ std::pair<std::uint32_t, std::uint32_t> setpoint(ModbusLink& link, std::uint32_t
 TEST(ModbusNode, OnlyANewerSetpointMovesTheStage) {
   ModbusBench bench;
   ASSERT_TRUE(bench.node().request(SupervisorCommand::enable).accepted);
-  ModbusLink link(bench.address(), test::kQuickTiming);
+  ModbusClient link(bench.address(), test::kQuickTiming);
   link.connect();
   std::vector<std::uint16_t> reply(14);
   const std::uint32_t session = begin_run(link, 3, reply);

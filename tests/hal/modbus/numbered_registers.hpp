@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/modbus/modbus_answer.hpp"
 
 namespace stageid::test {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <unsupported/Eigen/MatrixFunctions>
 
-#include "hal/simulator/modal_propagator.hpp"
+#include "hal/simulator/mode_transition.hpp"
 #include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -254,7 +254,7 @@ TEST_P(Propagator, IsTheMatrixExponential) {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   a << 0.0, 1.0, 0.0, -wt * wt, -2.0 * damping * wt, 1.0, 0.0, 0.0, 0.0;
   const Eigen::Matrix3d e = a.exp();
-  const ModalPropagator p = modal_propagator(kTwoPi * frequency_hz, damping, duration_s);
+  const ModeTransition p = mode_transition(kTwoPi * frequency_hz, damping, duration_s);
   const double tolerance = 1e-13 * (1.0 + wt * wt);
   EXPECT_NEAR(p.transition(0, 0), e(0, 0), tolerance);
   EXPECT_NEAR(p.transition(0, 1) / duration_s, e(0, 1), tolerance);
@@ -271,7 +271,7 @@ INSTANTIATE_TEST_SUITE_P(
                     PropagatorCase{100.0, 1.0, 1e-3}, PropagatorCase{100.0, 2.0, 1e-3}));
 
 TEST(Propagator, OverNoTimeIsTheIdentity) {
-  const ModalPropagator p = modal_propagator(10.0, 0.1, 0.0);
+  const ModeTransition p = mode_transition(10.0, 0.1, 0.0);
   EXPECT_EQ(p.transition, Eigen::Matrix2d::Identity());
   EXPECT_EQ(p.input, Eigen::Vector2d::Zero());
 }

@@ -103,7 +103,7 @@ UffMode uff_mode(const ModeShape& shape, const ChannelList& outputs) {
 /// has three values. Names that begin with x, y or z give the direction; other outputs are stored as X. Real shapes
 /// are normal modes with natural frequency, modal mass and damping ratio; complex ones are eigenvalues with modal A =
 /// 2 j omega sqrt(1 - zeta^2) modal_mass, so that the residue is shape_out shape_in^T / A. Source of the scaling:
-/// estimation/modal/modal_form.hpp.
+/// estimation/modal/mode_shapes.hpp.
 std::vector<UffMode> uff_modes(const AdditiveModel& model) {
   std::vector<UffMode> modes;
   for (const ModeShape& shape : mode_shapes(model)) {

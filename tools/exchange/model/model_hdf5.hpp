@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "acquisition/files/hdf5_matrices.hpp"
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 #include "frf/file/line_datasets.hpp"
 
 namespace stageid {

@@ -24,11 +24,11 @@ enum class LinkStatus : std::uint8_t {
 /// no number. A late one would be taken for the answer to the next request, and so would all that follow.
 /// drain() waits until no more replies can arrive and discards the received ones. If there are too many of them, it
 /// ends the connection.
-class ModbusLink {
+class ModbusClient {
  public:
   /// @throws std::invalid_argument if the address is refused or the times are invalid
   /// (0 < response_s <= worst_reply_s).
-  ModbusLink(const ModbusAddress& address, const ModbusTiming& timing);
+  ModbusClient(const ModbusAddress& address, const ModbusTiming& timing);
 
   /// Does nothing if connected. @throws StageError if the connection fails.
   void connect();

@@ -1,4 +1,4 @@
-#include "frf/periods/outlier_detection.hpp"
+#include "frf/periods/period_outliers.hpp"
 
 #include <algorithm>
 #include <cmath>

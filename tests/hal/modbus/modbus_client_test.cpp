@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_link.hpp"
+#include "hal/modbus/modbus_client.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace test_modbus_link {
+namespace test_modbus_client {
 
 using Pair = std::array<std::uint16_t, 2>;
 using testing::HasSubstr;
@@ -27,7 +27,7 @@ class ModbusLinkTest : public testing::TestWithParam<bool> {
   void serve(const std::vector<std::string>& faults) {
     script_ = ModbusFaultScript(test::modbus_faults(faults));
     server_ = std::make_unique<test::ServerThread>(registers_, &script_, GetParam());
-    link_ = std::make_unique<ModbusLink>(server_->address(), test::kQuickTiming);
+    link_ = std::make_unique<ModbusClient>(server_->address(), test::kQuickTiming);
     link_->connect();
   }
   LinkStatus read(int first, Pair& registers) { return link_->read(first, registers); }
@@ -35,7 +35,7 @@ class ModbusLinkTest : public testing::TestWithParam<bool> {
   test::NumberedRegisters registers_;
   ModbusFaultScript script_;
   std::unique_ptr<test::ServerThread> server_;
-  std::unique_ptr<ModbusLink> link_;
+  std::unique_ptr<ModbusClient> link_;
 };
 
 TEST_P(ModbusLinkTest, WritesBeforeItReads) {
@@ -97,11 +97,11 @@ TEST_P(ModbusRtuLink, AnotherUnitsReplyIsCorrupt) {
   EXPECT_EQ(read(0, values), LinkStatus::corrupt);
 }
 
-TEST(ModbusLink, ADeadServerIsDisconnected) {
+TEST(ModbusClient, ADeadServerIsDisconnected) {
   test::NumberedRegisters registers;
   ModbusFaultScript script(test::modbus_faults({"dead_server@2"}));
   const test::ServerThread server(registers, &script);
-  ModbusLink link(server.address(), test::kQuickTiming);
+  ModbusClient link(server.address(), test::kQuickTiming);
   Pair values{};
   EXPECT_EQ(link.read(0, values), LinkStatus::disconnected) << "not connected yet";
   link.connect();
@@ -112,7 +112,7 @@ TEST(ModbusLink, ADeadServerIsDisconnected) {
 }
 
 // A device that never stops sending keeps every buffer full.
-TEST(ModbusLink, AFloodEndsTheConnection) {
+TEST(ModbusClient, AFloodEndsTheConnection) {
   const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
   ASSERT_EQ(::listen(listener, 1), 0);  // on any free port
   sockaddr_in name{};
@@ -129,7 +129,7 @@ TEST(ModbusLink, AFloodEndsTheConnection) {
   });
   ModbusAddress address;
   address.port = ntohs(name.sin_port);
-  ModbusLink link(address, test::kQuickTiming);
+  ModbusClient link(address, test::kQuickTiming);
   link.connect();
   Pair values{};
   EXPECT_EQ(link.read(0, values), LinkStatus::corrupt);
@@ -142,20 +142,20 @@ TEST(ModbusLink, AFloodEndsTheConnection) {
   ::close(listener);
 }
 
-TEST(ModbusLink, AddressesAndTimesThatMakeNoSenseAreRefused) {
+TEST(ModbusClient, AddressesAndTimesThatMakeNoSenseAreRefused) {
   const auto with = [](auto change) {
     ModbusAddress address;
     address.device = "/dev/null";
     change(address);
     return address;
   };
-  EXPECT_THROW(ModbusLink(with([](auto& a) { a.unit = 248; }), {}), std::invalid_argument);
-  EXPECT_THROW(ModbusLink(with([](auto& a) { a.baud = 12345; }), {}), std::invalid_argument);
-  EXPECT_THROW(ModbusLink(with([](auto& a) { a.parity = 'X'; }), {}), std::invalid_argument);
-  EXPECT_THROW(ModbusLink({}, {0.2, 0.1, 1e-3}), std::invalid_argument);
-  EXPECT_THROW(ModbusLink({}, {0.0, 0.1, 1e-3}), std::invalid_argument);
-  EXPECT_NO_THROW(ModbusLink({}, {0.2, 0.2, 1e-3}));
+  EXPECT_THROW(ModbusClient(with([](auto& a) { a.unit = 248; }), {}), std::invalid_argument);
+  EXPECT_THROW(ModbusClient(with([](auto& a) { a.baud = 12345; }), {}), std::invalid_argument);
+  EXPECT_THROW(ModbusClient(with([](auto& a) { a.parity = 'X'; }), {}), std::invalid_argument);
+  EXPECT_THROW(ModbusClient({}, {0.2, 0.1, 1e-3}), std::invalid_argument);
+  EXPECT_THROW(ModbusClient({}, {0.0, 0.1, 1e-3}), std::invalid_argument);
+  EXPECT_NO_THROW(ModbusClient({}, {0.2, 0.2, 1e-3}));
 }
 
-}  // namespace test_modbus_link
+}  // namespace test_modbus_client
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_link.hpp"
+#include "hal/modbus/modbus_client.hpp"
 
 #include <fmt/format.h>
 #include <modbus/modbus.h>
@@ -25,7 +25,7 @@ bool is_bad_reply(int error) { return error >= EMBBADCRC && error <= EMBBADSLAVE
 
 }  // namespace
 
-ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
+ModbusClient::ModbusClient(const ModbusAddress& address, const ModbusTiming& timing)
     : address_(address), timing_(timing), context_(make_modbus_context(address)) {
   require(timing.response_s >= 1e-3 && timing.response_s <= timing.worst_reply_s &&
               timing.worst_reply_s <= 3600.0,
@@ -40,11 +40,11 @@ ModbusLink::ModbusLink(const ModbusAddress& address, const ModbusTiming& timing)
   modbus_set_byte_timeout(context_.get(), 0, 0);
 }
 
-void ModbusLink::connect() {
+void ModbusClient::connect() {
   if (!try_connect()) throw StageError(describe(last_));
 }
 
-bool ModbusLink::try_connect() noexcept {
+bool ModbusClient::try_connect() noexcept {
   if (connected_) return true;
   if (modbus_connect(context_.get()) != 0) {
     last_ = {LinkStatus::disconnected, errno};
@@ -56,14 +56,14 @@ bool ModbusLink::try_connect() noexcept {
   return connected_;
 }
 
-void ModbusLink::close() noexcept {
+void ModbusClient::close() noexcept {
   if (connected_) modbus_close(context_.get());
   connected_ = false;
 }
 
 /// Makes a request that returns the number of registers read, or -1.
 template <typename Request>
-LinkStatus ModbusLink::transact(std::size_t wanted, Request request) noexcept {
+LinkStatus ModbusClient::transact(std::size_t wanted, Request request) noexcept {
   if (!connected_) {
     if (last_.status != LinkStatus::flooded) last_ = {LinkStatus::disconnected, ENOTCONN};
     return last_.status;
@@ -87,8 +87,8 @@ LinkStatus ModbusLink::transact(std::size_t wanted, Request request) noexcept {
   return last_.status;
 }
 
-LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> written,
-                                int read_first, std::span<std::uint16_t> read) noexcept {
+LinkStatus ModbusClient::exchange(int write_first, std::span<const std::uint16_t> written,
+                                  int read_first, std::span<std::uint16_t> read) noexcept {
   return transact(read.size(), [&] {
     return modbus_write_and_read_registers(context_.get(), write_first,
                                            static_cast<int>(written.size()), written.data(),
@@ -96,14 +96,14 @@ LinkStatus ModbusLink::exchange(int write_first, std::span<const std::uint16_t> 
   });
 }
 
-LinkStatus ModbusLink::read(int first, std::span<std::uint16_t> registers) noexcept {
+LinkStatus ModbusClient::read(int first, std::span<std::uint16_t> registers) noexcept {
   return transact(registers.size(), [&] {
     return modbus_read_registers(context_.get(), first, static_cast<int>(registers.size()),
                                  registers.data());
   });
 }
 
-void ModbusLink::drain() noexcept {
+void ModbusClient::drain() noexcept {
   if (!connected_) return;
   const std::int64_t silent_ns = request_ns_ + std::llround(1e9 * timing_.worst_reply_s);
   std::this_thread::sleep_for(std::chrono::nanoseconds(silent_ns - monotonic_ns()));
@@ -111,7 +111,7 @@ void ModbusLink::drain() noexcept {
 }
 
 // libmodbus would read from a connection for as long as its peer sends.
-void ModbusLink::discard() noexcept {
+void ModbusClient::discard() noexcept {
   if (address_.serial()) {
     modbus_flush(context_.get());
     return;
@@ -124,11 +124,11 @@ void ModbusLink::discard() noexcept {
   last_ = {LinkStatus::flooded, 0};
 }
 
-bool ModbusLink::refused_as_busy() const noexcept {
+bool ModbusClient::refused_as_busy() const noexcept {
   return last_.status == LinkStatus::refused && last_.error == EMBXSBUSY;
 }
 
-std::string ModbusLink::describe(const Trouble& trouble) const {
+std::string ModbusClient::describe(const Trouble& trouble) const {
   const auto line = [this](const std::string& what) {
     return fmt::format("{}: {}", to_string(address_), what);
   };

@@ -36,7 +36,7 @@ Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& o
 /// e + (g - 1) e_f, with e_f the errors of an observer that receives the forces only.
 ///
 /// Only the constructor allocates.
-class LoopGuard {
+class LimitGuard {
  public:
   struct Finding {
     LimitViolation violation;  ///< kind none: no violation
@@ -50,7 +50,7 @@ class LoopGuard {
 
   /// @throws std::invalid_argument if a vector or matrix of the limits has the wrong size, or an
   /// entry is not positive.
-  LoopGuard(const StageLimits& limits, const StageInfo& info);
+  LimitGuard(const StageLimits& limits, const StageInfo& info);
 
   /// A constant load, e.g. the weight, that the commands take over in their first `ramp_samples`: this part of them
   /// does not accelerate the stage, and a brake continues it. @throws std::invalid_argument for a wrong size

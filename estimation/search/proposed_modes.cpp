@@ -1,4 +1,4 @@
-#include "estimation/start/residual_modes.hpp"
+#include "estimation/search/proposed_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -121,7 +121,7 @@ Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& m
 
 }  // namespace
 
-std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
+std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
                                          int threads) {
   const Eigen::Index N = frf.lines();
@@ -162,17 +162,17 @@ std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveM
       share.segment(first, count) = (1.0 - imitated / total).max(kLeastOwnShare);
     });
   }
-  std::vector<ResidualMode> scored(grid.size());
+  std::vector<ProposedMode> scored(grid.size());
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     scored[i] = {grid[i], raw[at] / share[at]};
   }
   std::stable_sort(scored.begin(), scored.end(),
-                   [](const ResidualMode& a, const ResidualMode& b) { return a.gain > b.gain; });
-  std::vector<ResidualMode> best;
-  for (const ResidualMode& candidate : scored) {
+                   [](const ProposedMode& a, const ProposedMode& b) { return a.gain > b.gain; });
+  std::vector<ProposedMode> best;
+  for (const ProposedMode& candidate : scored) {
     if (best.size() == most) break;
-    const bool taken = std::any_of(best.begin(), best.end(), [&](const ResidualMode& other) {
+    const bool taken = std::any_of(best.begin(), best.end(), [&](const ProposedMode& other) {
       const double width = 2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) *
                            other.mode.frequency_hz;
       return std::abs(candidate.mode.frequency_hz - other.mode.frequency_hz) < width;

@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/modbus/modbus_answer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 
 namespace stageid {
-namespace test_modbus_pdu {
+namespace test_modbus_answer {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -80,5 +80,5 @@ TEST_F(ModbusPdu, GarbageGetsAReplyThatIsNoLongerThanAPdu) {
   }
 }
 
-}  // namespace test_modbus_pdu
+}  // namespace test_modbus_answer
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,24 +8,24 @@
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
-namespace test_fit_flags {
+namespace test_fit_words {
 
 using Modes = ModesRequest::Kind;
 using Body = RigidBodyRequest::Kind;
 
-FitRequest parsed(const FitFlags& flags) {
+FitRequest parsed(const FitWords& flags) {
   FitRequest request;
-  parse_fit_flags(flags, request);
+  parse_fit_words(flags, request);
   return request;
 }
 
-FitRequest with(std::string FitFlags::*flag, const std::string& text) {
-  FitFlags flags;
+FitRequest with(std::string FitWords::*flag, const std::string& text) {
+  FitWords flags;
   flags.*flag = text;
   return parsed(flags);
 }
 
-TEST(FitFlags, WithoutFlagsTheRequestIsTheDefault) {
+TEST(FitWords, WithoutFlagsTheRequestIsTheDefault) {
   const FitRequest request = parsed({});
   EXPECT_EQ(request.modes.kind, Modes::by_submodels);
   EXPECT_EQ(request.rigid_body.kind, Body::by_submodels);
@@ -35,10 +35,10 @@ TEST(FitFlags, WithoutFlagsTheRequestIsTheDefault) {
   EXPECT_EQ(request.method, FitMethod::riv);
 }
 
-TEST(FitFlags, ModesAreACountFrequenciesOrAFile) {
+TEST(FitWords, ModesAreACountFrequenciesOrAFile) {
   const test::TemporaryDirectory directory;
   write_modes(directory / "modes.json", {{12.0, 0.02, 1}, {34.0, 0.03, 2}});
-  const auto modes = [](const std::string& text) { return with(&FitFlags::modes, text).modes; };
+  const auto modes = [](const std::string& text) { return with(&FitWords::modes, text).modes; };
   EXPECT_EQ(modes("1").kind, Modes::count);
   EXPECT_EQ(modes("1").count, 1);
   EXPECT_EQ(modes("auto").kind, Modes::search);
@@ -54,9 +54,9 @@ TEST(FitFlags, ModesAreACountFrequenciesOrAFile) {
   EXPECT_THROW(modes("missing.json"), FileError);
 }
 
-TEST(FitFlags, TheRigidBodyIsAWordARankOrASuspension) {
+TEST(FitWords, TheRigidBodyIsAWordARankOrASuspension) {
   const auto body = [](const std::string& text) {
-    return with(&FitFlags::rigid_body, text).rigid_body;
+    return with(&FitWords::rigid_body, text).rigid_body;
   };
   EXPECT_EQ(body("auto").kind, Body::automatic);
   EXPECT_EQ(body("full").kind, Body::free);
@@ -70,37 +70,37 @@ TEST(FitFlags, TheRigidBodyIsAWordARankOrASuspension) {
         << text;
 }
 
-TEST(FitFlags, WordsBecomeValues) {
-  EXPECT_EQ(with(&FitFlags::weighting, "total_variance").weighting, Weighting::total_variance);
-  EXPECT_EQ(with(&FitFlags::weighting, "w.h5").weighting, Weighting::user);
-  EXPECT_EQ(with(&FitFlags::weighting, "w.h5").weight_file, "w.h5");
-  EXPECT_EQ(with(&FitFlags::hold, "sinc").hold, HoldModel::sinc);
-  EXPECT_EQ(with(&FitFlags::delay, "per_channel").delay->model, DelayModel::per_channel);
-  EXPECT_EQ(with(&FitFlags::delay, "-1e-4").delay->delay_s, -1e-4);
-  EXPECT_EQ(with(&FitFlags::damping, "general").general_damping, true);
-  EXPECT_EQ(with(&FitFlags::direct_term, "none").direct_term, false);
-  EXPECT_EQ(with(&FitFlags::method, "sk").method, FitMethod::sk);
-  EXPECT_EQ(with(&FitFlags::residue_rank, "2").residue_rank, 2);
+TEST(FitWords, WordsBecomeValues) {
+  EXPECT_EQ(with(&FitWords::weighting, "total_variance").weighting, Weighting::total_variance);
+  EXPECT_EQ(with(&FitWords::weighting, "w.h5").weighting, Weighting::user);
+  EXPECT_EQ(with(&FitWords::weighting, "w.h5").weight_file, "w.h5");
+  EXPECT_EQ(with(&FitWords::hold, "sinc").hold, HoldModel::sinc);
+  EXPECT_EQ(with(&FitWords::delay, "per_channel").delay->model, DelayModel::per_channel);
+  EXPECT_EQ(with(&FitWords::delay, "-1e-4").delay->delay_s, -1e-4);
+  EXPECT_EQ(with(&FitWords::damping, "general").general_damping, true);
+  EXPECT_EQ(with(&FitWords::direct_term, "none").direct_term, false);
+  EXPECT_EQ(with(&FitWords::method, "sk").method, FitMethod::sk);
+  EXPECT_EQ(with(&FitWords::residue_rank, "2").residue_rank, 2);
 }
 
-TEST(FitFlags, EveryWordThatIsNotOneIsRefused) {
+TEST(FitWords, EveryWordThatIsNotOneIsRefused) {
   const auto refused = [](auto member, const char* value) {
-    FitFlags flags;
+    FitWords flags;
     FitRequest request;
     flags.*member = value;
-    EXPECT_THROW(parse_fit_flags(flags, request), std::invalid_argument) << value;
+    EXPECT_THROW(parse_fit_words(flags, request), std::invalid_argument) << value;
   };
-  refused(&FitFlags::hold, "zoh");
-  refused(&FitFlags::weighting, "user");
-  refused(&FitFlags::weighting, "noise");
-  refused(&FitFlags::delay, "inf");
-  refused(&FitFlags::modes, "-3");
-  refused(&FitFlags::modes, "12,-3");
-  refused(&FitFlags::rigid_body, "half");
-  refused(&FitFlags::damping, "viscous");
-  refused(&FitFlags::direct_term, "half");
-  refused(&FitFlags::method, "lm");
+  refused(&FitWords::hold, "zoh");
+  refused(&FitWords::weighting, "user");
+  refused(&FitWords::weighting, "noise");
+  refused(&FitWords::delay, "inf");
+  refused(&FitWords::modes, "-3");
+  refused(&FitWords::modes, "12,-3");
+  refused(&FitWords::rigid_body, "half");
+  refused(&FitWords::damping, "viscous");
+  refused(&FitWords::direct_term, "half");
+  refused(&FitWords::method, "lm");
 }
 
-}  // namespace test_fit_flags
+}  // namespace test_fit_words
 }  // namespace stageid

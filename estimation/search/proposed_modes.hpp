@@ -13,7 +13,7 @@ inline constexpr double kBelowBand = 0.5;
 inline constexpr double kAboveBand = 1.8;
 
 /// A mode proposed by the weighted residual.
-struct ResidualMode {
+struct ProposedMode {
   ModeCandidate mode;
   double gain = 0.0;  ///< estimated decrease of sum |E|^2 W if it is added
 };
@@ -22,7 +22,7 @@ struct ResidualMode {
 /// on a grid of frequencies (extending beyond the band) and damping ratios, every numerator free. The gain is divided
 /// by the share of the candidate that the functions of the model cannot imitate.
 /// @param weights n_c x N   @returns at most `most`, best first, none two closer than their widths
-std::vector<ResidualMode> residual_modes(const FrfEstimate& frf, const AdditiveModel& model,
+std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
                                          int threads);
 

@@ -1,11 +1,11 @@
-#include "hal/simulator/modal_propagator.hpp"
+#include "hal/simulator/mode_transition.hpp"
 
 namespace stageid {
 
 // In the time unit of one halved step h the state is x = [q; h q'], x' = A x + [0; h^2 f]. With
 //   E(h) = e^A,   F(h) = int_0^1 e^(A s) ds,
 // two steps make E(2h) = E^2 and F(2h) = (I + E) F in the same unit.
-ModalPropagator modal_propagator(double omega_rad_s, double damping_ratio, double duration_s) {
+ModeTransition mode_transition(double omega_rad_s, double damping_ratio, double duration_s) {
   if (duration_s == 0.0) return {Eigen::Matrix2d::Identity(), Eigen::Vector2d::Zero()};
   const double rate = omega_rad_s * (1.0 + damping_ratio);
   int doublings = 0;
@@ -31,7 +31,7 @@ ModalPropagator modal_propagator(double omega_rad_s, double damping_ratio, doubl
     integral += e * integral;
     e = e * e;
   }
-  ModalPropagator propagator;
+  ModeTransition propagator;
   propagator.transition << e(0, 0), e(0, 1) * h, e(1, 0) / h, e(1, 1);
   propagator.input << integral(0, 1) * h * h, integral(1, 1) * h;
   return propagator;

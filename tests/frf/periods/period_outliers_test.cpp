@@ -1,4 +1,4 @@
-#include "frf/periods/outlier_detection.hpp"
+#include "frf/periods/period_outliers.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
-namespace test_outlier_detection {
+namespace test_period_outliers {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -480,5 +480,5 @@ TEST(OutlierDetection, LongRunsAreComparedInGroups) {
   EXPECT_EQ(frf.replaced_samples[1].period, 19);
 }
 
-}  // namespace test_outlier_detection
+}  // namespace test_period_outliers
 }  // namespace stageid

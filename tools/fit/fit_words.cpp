@@ -1,4 +1,4 @@
-#include "tools/fit/fit_flags.hpp"
+#include "tools/fit/fit_words.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -125,7 +125,7 @@ bool is_second(const char* flag, const std::string& word, const std::vector<std:
 
 }  // namespace
 
-void parse_fit_flags(const FitFlags& flags, FitRequest& request) {
+void parse_fit_words(const FitWords& flags, FitRequest& request) {
   request.modes = parse_modes(flags.modes);
   parse_weighting(flags.weighting, request);
   if (!flags.hold.empty()) request.hold = pick<HoldModel>("--hold", flags.hold);

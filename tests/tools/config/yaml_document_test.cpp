@@ -1,4 +1,4 @@
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -9,7 +9,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid {
-namespace test_strict_yaml {
+namespace test_yaml_document {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -126,5 +126,5 @@ TEST(StrictYaml, AFileOfMoreThanAMegabyteIsRefused) {
   EXPECT_THAT(error_of(std::string((1U << 20) + 1, ' ')), HasSubstr("longer than 1 MiB"));
 }
 
-}  // namespace test_strict_yaml
+}  // namespace test_yaml_document
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "frf/periods/outlier_detection.hpp"
+#include "frf/periods/period_outliers.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "frf/runs/channel_choice.hpp"
 #include "frf/runs/run_spectra.hpp"
@@ -13,10 +13,10 @@ namespace stageid {
 
 /// Compares the periods of a group of one run in RunWorkspace::record and spectra. A short glitch is replaced
 /// (bridge_samples()), another difference costs the period.
-class PeriodComparison {
+class PeriodRejection {
  public:
-  PeriodComparison(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
-                   RunWorkspace& workspace)
+  PeriodRejection(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
+                  RunWorkspace& workspace)
       : used_(used), lines_(lines), channels_(channels), w_(workspace) {}
 
   /// Stores the samples of the period in the workspace as number `place` of the group, minus those of the first one,

@@ -1,4 +1,4 @@
-#include "estimation/modal/modal_form.hpp"
+#include "estimation/modal/mode_shapes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/support/models/model_reference.hpp"
 
 namespace stageid {
-namespace test_modal_form {
+namespace test_mode_shapes {
 
 using Complex = std::complex<double>;
 
@@ -146,5 +146,5 @@ TEST(RigidBody, RefusesARankThatContradictsIt) {
   EXPECT_THROW(rigid_body(model), std::invalid_argument);
 }
 
-}  // namespace test_modal_form
+}  // namespace test_mode_shapes
 }  // namespace stageid

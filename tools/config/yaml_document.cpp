@@ -1,4 +1,4 @@
-#include "tools/config/strict_yaml.hpp"
+#include "tools/config/yaml_document.hpp"
 
 #include <fmt/format.h>
 #include <utf8.h>

@@ -9,7 +9,7 @@
 namespace stageid {
 
 /// The flags of `stageid fit` with text values; empty: not given.
-struct FitFlags {
+struct FitWords {
   std::string modes;                  ///< auto | none | N | f1,f2,... | FILE.json
   std::string weighting;              ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
   std::string hold;                   ///< none | phase | sinc | exact
@@ -24,7 +24,7 @@ struct FitFlags {
 
 /// Parses the flags into `request`; other members remain unchanged.
 /// @throws std::invalid_argument naming the flag; FileError, FormatError for a file of modes
-void parse_fit_flags(const FitFlags& flags, FitRequest& request);
+void parse_fit_words(const FitWords& flags, FitRequest& request);
 
 /// Keys of the section `fit` (fit_keys.cpp).
 void describe_fit_keys(ConfigVisitor& visitor, FitRequest& request);

@@ -1,4 +1,4 @@
-#include "hal/stage/loop_guard.hpp"
+#include "hal/stage/limit_guard.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
-namespace test_loop_guard {
+namespace test_limit_guard {
 
 using testing::HasSubstr;
 using Kind = WaferStageSpec::Fault::Kind;
@@ -65,7 +65,7 @@ WaferStageSpec with_fault(Kind kind, double value, int channel = -1) {
   return spec;
 }
 
-TEST(LoopGuard, BrakesByThePredictionWhereTheSensorFailed) {
+TEST(LimitGuard, BrakesByThePredictionWhereTheSensorFailed) {
   WaferStageSpec spec = with_fault(Kind::sensor_offset, 300e-6);
   GuardedLoop loop(spec);
   ASSERT_EQ(loop.steps(100, 20.0), Outcome::ok);
@@ -80,7 +80,7 @@ TEST(LoopGuard, BrakesByThePredictionWhereTheSensorFailed) {
   EXPECT_EQ(loop.stage->emergency().response, 1.0);
 }
 
-TEST(LoopGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
+TEST(LimitGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
   WaferStageSpec spec = with_fault(Kind::nan_sensor, 0.0, 0);
   spec.controller.axes[2].brake = false;
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
@@ -91,7 +91,7 @@ TEST(LoopGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
   EXPECT_EQ(loop.inputs().applied[0], 0.0);
 }
 
-TEST(LoopGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
+TEST(LimitGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
   WaferStageSpec spec = with_fault(Kind::actuator_gain, -1.0);
   GuardedLoop loop(spec);
   ASSERT_EQ(loop.steps(101, 2.0), Outcome::ok);
@@ -104,7 +104,7 @@ TEST(LoopGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
   EXPECT_THAT(describe_stop(*loop.stage), HasSubstr("times the expected one; braked"));
 }
 
-TEST(LoopGuard, ASpeedLimitBrakes) {
+TEST(LimitGuard, ASpeedLimitBrakes) {
   WaferStageSpec spec = test::stop_stage_spec();
   spec.limits.speed_m_s = Eigen::VectorXd::Constant(1, 2e-3);
   GuardedLoop loop(spec);
@@ -114,7 +114,7 @@ TEST(LoopGuard, ASpeedLimitBrakes) {
   EXPECT_LT(loop.watch->speed_m_s(), 1e-4);
 }
 
-TEST(LoopGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
+TEST(LimitGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
   WaferStageSpec spec = test::stop_stage_spec();
   GuardedLoop loop(spec);
   // A disturbance beyond the capability of the controller.
@@ -124,7 +124,7 @@ TEST(LoopGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
   EXPECT_LT(loop.watch->largest_m, 2.0 * test::kStopWindow);
 }
 
-TEST(LoopGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
+TEST(LimitGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
   GuardedLoop loop(test::stop_stage_spec(10.0));  // ten times the gain: unstable
   ASSERT_EQ(loop.steps(2000, 1.0), Outcome::limit);
   EXPECT_EQ(loop.stage->violation().kind, LimitKind::actuator);
@@ -137,7 +137,7 @@ TEST(LoopGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
 }
 
 // Four sensors and three motions out of plane: inconsistent sensors are detected.
-TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
+TEST(LimitGuard, ASensorThatDriftsContradictsTheOthers) {
   WaferStageSpec spec = test::wafer_stage_spec();
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
   spec.faults = {{Kind::sensor_drift, 0, 100, 1, -1, 1e-3}};
@@ -148,7 +148,7 @@ TEST(LoopGuard, ASensorThatDriftsContradictsTheOthers) {
 }
 
 // Feed-forward against gravity: the simulator has no weight, so the stage is played by hand, at rest.
-TEST(LoopGuard, AWeightThatIsCarriedIsNotAMotion) {
+TEST(LimitGuard, AWeightThatIsCarriedIsNotAMotion) {
   WaferStageSpec spec = test::stop_stage_spec();
   spec.limits.stuck_sensor_s = 0.0;
   const auto actuators = static_cast<Eigen::Index>(spec.info.actuators.size());
@@ -156,7 +156,7 @@ TEST(LoopGuard, AWeightThatIsCarriedIsNotAMotion) {
       Eigen::VectorXd::Constant(actuators, 9.81 * spec.mass_kg / static_cast<double>(actuators));
   constexpr int kRamp = 200;
   for (const bool carried : {false, true}) {
-    LoopGuard guard(spec.limits, spec.info);
+    LimitGuard guard(spec.limits, spec.info);
     if (carried) guard.carry(load, kRamp);
     std::vector<double> y(spec.info.sensors.size(), 0.0);
     Inputs inputs;
@@ -175,11 +175,11 @@ TEST(LoopGuard, AWeightThatIsCarriedIsNotAMotion) {
     guard.brake(u);
     EXPECT_LT((u.matrix() - load).norm(), 1e-9 * load.norm());  // a brake lets nothing fall
   }
-  EXPECT_THROW(LoopGuard(spec.limits, spec.info).carry(Eigen::VectorXd::Ones(actuators + 1), 1),
+  EXPECT_THROW(LimitGuard(spec.limits, spec.info).carry(Eigen::VectorXd::Ones(actuators + 1), 1),
                std::invalid_argument);
 }
 
-TEST(LoopGuard, WithoutAMotionNothingIsPredicted) {
+TEST(LimitGuard, WithoutAMotionNothingIsPredicted) {
   WaferStageSpec spec = with_fault(Kind::sensor_offset, 150e-6);
   spec.limits.motion = {};
   GuardedLoop loop(spec);
@@ -187,12 +187,12 @@ TEST(LoopGuard, WithoutAMotionNothingIsPredicted) {
   EXPECT_EQ(loop.stage->violation().kind, LimitKind::actuator);
 }
 
-TEST(LoopGuard, RefusesAMotionThatDoesNotFit) {
+TEST(LimitGuard, RefusesAMotionThatDoesNotFit) {
   const WaferStageSpec spec = test::stop_stage_spec();
   const auto make = [&](auto change) {
     StageLimits limits = spec.limits;
     change(limits.motion);
-    return LoopGuard(limits, spec.info);
+    return LimitGuard(limits, spec.info);
   };
   EXPECT_NO_THROW(make([](RigidMotion&) {}));
   EXPECT_THROW(make([](RigidMotion& m) { m.bandwidth_rad_s = 0.0; }), std::invalid_argument);
@@ -201,5 +201,5 @@ TEST(LoopGuard, RefusesAMotionThatDoesNotFit) {
   EXPECT_THROW(make([](RigidMotion& m) { m.contradiction.setZero(2, 2); }), std::invalid_argument);
 }
 
-}  // namespace test_loop_guard
+}  // namespace test_limit_guard
 }  // namespace stageid

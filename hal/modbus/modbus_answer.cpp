@@ -1,4 +1,4 @@
-#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/modbus/modbus_answer.hpp"
 
 #include <algorithm>
 #include <array>

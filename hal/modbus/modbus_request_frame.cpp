@@ -1,8 +1,8 @@
-#include "hal/modbus/modbus_frame.hpp"
+#include "hal/modbus/modbus_request_frame.hpp"
 
 #include <algorithm>
 
-#include "hal/modbus/modbus_pdu.hpp"
+#include "hal/modbus/modbus_answer.hpp"
 
 namespace stageid {
 namespace {

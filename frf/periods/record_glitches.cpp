@@ -1,4 +1,4 @@
-#include "frf/periods/glitch_detection.hpp"
+#include "frf/periods/record_glitches.hpp"
 
 #include <algorithm>
 #include <cmath>

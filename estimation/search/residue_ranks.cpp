@@ -1,4 +1,4 @@
-#include "estimation/search/residue_rank_test.hpp"
+#include "estimation/search/residue_ranks.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,11 +1,11 @@
-#include "hal/modbus/modbus_frame.hpp"
+#include "hal/modbus/modbus_request_frame.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string_view>
 
 namespace stageid {
-namespace test_modbus_frame {
+namespace test_modbus_request_frame {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -96,5 +96,5 @@ TEST(ModbusFrame, OnlyWhatMayBecomeARequestIsKept) {
   EXPECT_EQ(find_rtu_request(told, 1).bytes, told.size());
 }
 
-}  // namespace test_modbus_frame
+}  // namespace test_modbus_request_frame
 }  // namespace stageid

@@ -1,4 +1,4 @@
-#include "hal/stage/loop_guard.hpp"
+#include "hal/stage/limit_guard.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -34,7 +34,7 @@ Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& o
   return given.array();
 }
 
-LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
+LimitGuard::LimitGuard(const StageLimits& limits, const StageInfo& info)
     : period_s_(1.0 / info.sample_rate_hz) {
   const auto sensors = static_cast<Eigen::Index>(info.sensors.size());
   const auto actuators = static_cast<Eigen::Index>(info.actuators.size());
@@ -115,21 +115,21 @@ LoopGuard::LoopGuard(const StageLimits& limits, const StageInfo& info)
 }
 
 /// Three equal poles of a constant-acceleration observer (a g-h-k filter, critically damped).
-LoopGuard::Gains LoopGuard::observer_gains(double pole_rad_s, double rate_hz) noexcept {
+LimitGuard::Gains LimitGuard::observer_gains(double pole_rad_s, double rate_hz) noexcept {
   const double pole = std::exp(-pole_rad_s / rate_hz);
   const double rest = 1.0 - pole;
   return {1.0 - pole * pole * pole, 1.5 * rest * rest * (1.0 + pole) * rate_hz,
           rest * rest * rest * rate_hz * rate_hz};
 }
 
-void LoopGuard::carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples) {
+void LimitGuard::carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples) {
   if (load.size() == 0 || ramp_samples == 0 || !model_known_) return;
   require_size(load.size(), static_cast<std::size_t>(force_.size()), "load");
   load_ = load;
   load_samples_ = ramp_samples;
 }
 
-void LoopGuard::start(const Inputs& first) noexcept {
+void LimitGuard::start(const Inputs& first) noexcept {
   carried_samples_ = 0;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double y = first.y[static_cast<std::size_t>(i)];
@@ -149,7 +149,7 @@ void LoopGuard::start(const Inputs& first) noexcept {
   brake_samples_left_ = 0;
 }
 
-void LoopGuard::predict(const Eigen::ArrayXd& u) noexcept {
+void LimitGuard::predict(const Eigen::ArrayXd& u) noexcept {
   if (model_known_) find_acceleration(u);
   const double t = period_s_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
@@ -163,7 +163,7 @@ void LoopGuard::predict(const Eigen::ArrayXd& u) noexcept {
 }
 
 /// Acceleration by the commands that act in this interval, which are delayed by a fractional number of samples.
-void LoopGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
+void LimitGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
   force_ = u.matrix();
   if (load_.size() > 0) {
     carried_samples_ = std::min(carried_samples_ + 1, load_samples_);
@@ -179,7 +179,7 @@ void LoopGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
             (1.0 - late_fraction_) * accelerations_.col(next).matrix();
 }
 
-LoopGuard::Finding LoopGuard::inspect(Inputs& inputs) noexcept {
+LimitGuard::Finding LimitGuard::inspect(Inputs& inputs) noexcept {
   Finding finding;
   error_by_force_ *= forget_;
   force_by_force_ *= forget_;
@@ -203,8 +203,8 @@ LoopGuard::Finding LoopGuard::inspect(Inputs& inputs) noexcept {
 }
 
 /// Checks whether the forces explain the measurement.
-void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
-                             Finding& finding) noexcept {
+void LimitGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
+                              Finding& finding) noexcept {
   const double error = y - p_[i];
   const bool far = std::abs(error) > deviation_m_[i];
   const bool was_near = std::abs(last_error_m_[i]) < 0.5 * deviation_m_[i];
@@ -228,7 +228,7 @@ void LoopGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
 }
 
 /// Checks whether all sensors measure one rigid motion.
-void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept {
+void LimitGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept {
   const std::uint64_t all = all_bits(static_cast<std::size_t>(p_.size()));
   if ((inputs.valid & all) != all) return;
   measured_ = last_y_.matrix();
@@ -244,8 +244,8 @@ void LoopGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcept
 }
 
 /// Checks whether there is enough room to stop.
-void LoopGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
-                            Finding& finding) noexcept {
+void LimitGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
+                             Finding& finding) noexcept {
   const double v = speed(i);
   const double rest_m = y + v * std::abs(v) * stopping_s2_m_[i];
   if (std::abs(y) > hard_window_m_[i])
@@ -258,14 +258,14 @@ void LoopGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
     finding.add(violation(LimitKind::position, i, y, window_m_[i], cycle), true);
 }
 
-LimitViolation LoopGuard::sensor_failure(Eigen::Index i, LimitKind kind, double value, double limit,
-                                         std::uint64_t cycle) noexcept {
+LimitViolation LimitGuard::sensor_failure(Eigen::Index i, LimitKind kind, double value,
+                                          double limit, std::uint64_t cycle) noexcept {
   believed_[i] = false;
   sensor_failed_ = true;
   return violation(kind, i, value, limit, cycle);
 }
 
-void LoopGuard::correct(Eigen::Index i, double error) noexcept {
+void LimitGuard::correct(Eigen::Index i, double error) noexcept {
   const Gains& k = open_ ? brake_gains_ : gains_;
   p_[i] += k.position * error;
   v_[i] += k.speed_hz * error;
@@ -279,7 +279,7 @@ void LoopGuard::correct(Eigen::Index i, double error) noexcept {
   force_by_force_ += weight_m2_[i] * force_error * force_error;
 }
 
-bool LoopGuard::begin_brake() noexcept {
+bool LimitGuard::begin_brake() noexcept {
   open_ = true;
   if (!sensor_failed_) {
     p_ += (response_ - 1.0) * force_p_;
@@ -295,7 +295,7 @@ bool LoopGuard::begin_brake() noexcept {
 }
 
 // With a force proportional to the speed v, a brake of rate w needs the distance v / w.
-void LoopGuard::choose_brake_rate() noexcept {
+void LimitGuard::choose_brake_rate() noexcept {
   double needed_rad_s = kBrakeRate * bandwidth_rad_s_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double room_m = room_m_[i] - std::abs(p_[i]);
@@ -305,7 +305,7 @@ void LoopGuard::choose_brake_rate() noexcept {
   brake_rate_rad_s_ = std::min(needed_rad_s, kLargestBrakeRate * bandwidth_rad_s_);
 }
 
-void LoopGuard::brake(Eigen::ArrayXd& u) noexcept {
+void LimitGuard::brake(Eigen::ArrayXd& u) noexcept {
   wanted_acceleration_ = -(brake_rate_rad_s_ * v_ + d_).matrix() / brake_divisor_;
   force_.noalias() = force_per_acceleration_ * wanted_acceleration_;
   if (load_.size() > 0) force_ += carried_share() * load_;
@@ -313,7 +313,7 @@ void LoopGuard::brake(Eigen::ArrayXd& u) noexcept {
   --brake_samples_left_;
 }
 
-double LoopGuard::speed_m_s() const noexcept {
+double LimitGuard::speed_m_s() const noexcept {
   double largest = 0.0;
   for (Eigen::Index i = 0; i < v_.size(); ++i)
     if (moves_[i]) largest = std::max(largest, std::abs(speed(i)));
