@@ -73,7 +73,7 @@ void set_limits(std::size_t file_bytes) {
 }
 
 /// The same error again: FormatError puts the file in front.
-FormatError repeated(const std::filesystem::path& file, std::string what) {
+FormatError repeated(const std::filesystem::path& file, const std::string& what) {
   const std::string name = file.string();
   if (what.starts_with(name + ": ")) return {file, "", what.substr(name.size() + 2)};
   const std::size_t end = what.find(": ", name.size());

@@ -102,7 +102,7 @@ bool is_hdf5_head(std::string_view head) noexcept { return head.starts_with(kHdf
 std::string other_kind(const std::filesystem::path& file, const std::string& wanted) {
   const std::string head = head_of(file, 2048);
   const std::string format = named_format(file, head);
-  if (const std::string ours = sentence_of_format(format, wanted); !ours.empty()) return ours;
+  if (std::string ours = sentence_of_format(format, wanted); !ours.empty()) return ours;
   for (const FileKind& kind : kByHead)
     if (head.starts_with(kind.mark)) return sentence(kind, wanted);
   return "";

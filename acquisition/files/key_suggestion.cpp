@@ -65,7 +65,7 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
     return equal_but_for_case(word, candidate);
   });
   if (same != allowed.end()) return *same;
-  if (const std::string whole = whole_word(word, allowed); !whole.empty()) return whole;
+  if (std::string whole = whole_word(word, allowed); !whole.empty()) return whole;
   for (const std::string& candidate : allowed) {
     const std::size_t distance = edit_distance(word, candidate);
     if (distance < least) {

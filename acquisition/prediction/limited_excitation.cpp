@@ -89,7 +89,7 @@ class LoopTransfers {
   MatrixXcd add_transfers(Index column, const MatrixXcd& G, const MatrixXcd& K,
                           std::vector<MatrixXcd>& u, std::vector<MatrixXcd>& y) const {
     const MatrixXcd S_all = inverse(MatrixXcd::Identity(K.rows(), K.rows()) - K * G);
-    const MatrixXcd S = S_all(Eigen::all, axes_);
+    MatrixXcd S = S_all(Eigen::all, axes_);
     const MatrixXcd Y = G * S;
     for (Index i = 0; i < S.rows(); ++i)
       u[static_cast<std::size_t>(i)].col(column) = S.row(i).transpose();

@@ -45,17 +45,20 @@ HoldEquivalent::HoldEquivalent(const ModelLines& lines, double delay_s)
   const Eigen::Index N = lines.omega_rad_s.size();
   const auto omega = [&](Eigen::Index k) { return lines.omega_rad_s[k]; };
   if (exact_) {
-    const auto [whole, fraction] = split_delay(delay_s, period_s_);
-    rest_s_ = (1.0 - fraction) * period_s_;
+    const SplitDelay split = split_delay(delay_s, period_s_);
+    rest_s_ = (1.0 - split.fraction) * period_s_;
     fill_polar(
         N, [&](Eigen::Index k) { return std::pair(1.0, omega(k) * period_s_); }, z_);
     fill_polar(
-        N, [&](Eigen::Index k) { return std::pair(1.0, -omega(k) * ((whole + 1.0) * period_s_)); },
+        N,
+        [&](Eigen::Index k) {
+          return std::pair(1.0, -omega(k) * ((split.whole + 1.0) * period_s_));
+        },
         first_);
     constant_ = first_;
-    if (fraction == 0.0)
+    if (split.fraction == 0.0)
       fill_polar(
-          N, [&](Eigen::Index k) { return std::pair(1.0, -omega(k) * (whole * period_s_)); },
+          N, [&](Eigen::Index k) { return std::pair(1.0, -omega(k) * (split.whole * period_s_)); },
           constant_);
     constant_delay_.set_zero(N, 1);
     return;

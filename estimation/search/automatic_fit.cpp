@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <ranges>
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
@@ -498,8 +497,8 @@ class AutomaticFit {
       const std::vector<std::size_t> out = least_worthy(best_, limit, most);
       if (out.empty()) return;
       AdditiveModel model = best_.model;
-      for (const std::size_t i : std::views::reverse(out))
-        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(i));
+      for (std::size_t n = out.size(); n-- > 0;)
+        model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(out[n]));
       FitResult without = fit_additive_model(frf_, model, quick_);
       const bool worse = surplus > 0 ? out.size() > 1 && !is_predicted(without, out)
                                      : !(worth_.criterion(without) < worth_.criterion(best_));

@@ -156,10 +156,10 @@ class RankedFit {
     std::string said = "instead of";
     for (const std::size_t i : out)
       said += fmt::format(" {:.6g} Hz", free_.model.submodels[i].natural_frequency_hz());
-    for (auto i = out.rbegin(); i != out.rend(); ++i) {
-      raised.model.submodels.erase(raised.model.submodels.begin() +
-                                   static_cast<std::ptrdiff_t>(*i));
-      raised.ranks.erase(raised.ranks.begin() + static_cast<std::ptrdiff_t>(*i));
+    for (std::size_t n = out.size(); n-- > 0;) {
+      const auto i = static_cast<std::ptrdiff_t>(out[n]);
+      raised.model.submodels.erase(raised.model.submodels.begin() + i);
+      raised.ranks.erase(raised.ranks.begin() + i);
     }
     const double cost = best_.model.fit.cost;
     if (!adopt(raised, constrained(raised))) return;

@@ -89,9 +89,9 @@ void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, F
     AdditiveModel fewer = fit.model;
     fewer.submodels.erase(fewer.submodels.begin() + static_cast<std::ptrdiff_t>(i));
     FitResult trial = fit_additive_model(frf, fewer, options);
-    if (!trial.trustworthy() ||
-        !(information_criterion(frf, trial) < information_criterion(frf, fit)))
-      return false;
+    const bool better =
+        trial.trustworthy() && information_criterion(frf, trial) < information_criterion(frf, fit);
+    if (!better) return false;
     said.push_back(fmt::format(
         "removed {:.6g} Hz (damping {:.3g}), which the data do not support and which does not "
         "justify its parameters (BIC): cost {:.6g} -> {:.6g}",

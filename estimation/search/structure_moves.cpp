@@ -55,7 +55,7 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
                                              const OpenStructure& open) {
   std::vector<StructureMove> out;
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs());
-  const bool affordable = 2 * count_modes(model) <= most_modes(frf, {});
+  const bool affordable = Eigen::Index{2} * count_modes(model) <= most_modes(frf, {});
   if (open.general_damping && affordable &&
       has(model, [](const Submodel& s) { return is_searched_mode(s) && !is_general(s); })) {
     StructureMove general{"--damping general", model, options};

@@ -108,7 +108,7 @@ void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& befo
 
 std::vector<StabilizationPole> stabilization(const FrfEstimate& frf,
                                              const StabilizationOptions& options) {
-  if (options.most_order < 2 || 2 * options.most_order >= frf.lines())
+  if (options.most_order < 2 || Eigen::Index{2} * options.most_order >= frf.lines())
     throw std::invalid_argument(
         fmt::format("stabilization: most_order {} is out of range for {} lines; give 2 to less "
                     "than half of the lines",

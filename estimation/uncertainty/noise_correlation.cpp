@@ -153,7 +153,7 @@ SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, IndexR
   const Eigen::Index u = c / n_y;
   const Eigen::Index v = d / n_y;
   if (u != v && !between_inputs()) return {};
-  const SplitMatrix of_outputs = R(c % n_y, d % n_y, lines);
+  SplitMatrix of_outputs = R(c % n_y, d % n_y, lines);
   if (u == v) return of_outputs;
   const auto& [re, im] = of_outputs;
   const SplitMatrix of_inputs = S(u, v, lines);

@@ -12,7 +12,7 @@ namespace {
 /// "one sample of s2"
 std::string samples_of(const SampleSlip& slip) {
   const int count = std::abs(slip.lost);
-  const std::string samples = count == 1 ? "one sample" : counted(count, "sample");
+  std::string samples = count == 1 ? "one sample" : counted(count, "sample");
   if (!slip.channel.empty()) return fmt::format("{} of {}", samples, slip.channel);
   if (slip.sensors && slip.actuators) return samples;
   return fmt::format("{} of all {}", samples, slip.sensors ? "sensors" : "actuators");

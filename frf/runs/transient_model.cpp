@@ -78,7 +78,7 @@ Eigen::Index TransientModel::first_of_window(Eigen::Index bin) const {
 
 void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
                                    RunSpectra& run) const {
-  const Eigen::Index bin = periods_ * excitation_.lines[static_cast<std::size_t>(k)];
+  const Eigen::Index bin = Eigen::Index{periods_} * excitation_.lines[static_cast<std::size_t>(k)];
   const auto first = usable_.begin() + first_of_window(bin);
   const std::vector<Eigen::Index> bins(first, first + window_);
   const double reach =

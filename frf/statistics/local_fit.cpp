@@ -113,8 +113,7 @@ struct DenominatorStep {
 
   /// The first `poles` coefficients; `linear_cost`: the remaining cost.
   Eigen::VectorXcd solution(Eigen::Index poles, double& linear_cost) const {
-    const Eigen::VectorXcd d =
-        normal.topLeftCorner(poles, poles).fullPivLu().solve(right.head(poles));
+    Eigen::VectorXcd d = normal.topLeftCorner(poles, poles).fullPivLu().solve(right.head(poles));
     linear_cost = cost - right.head(poles).dot(d).real();
     return d;
   }

@@ -105,8 +105,7 @@ class Search {
     check.misfits = misfits();
     // Then another controller, or a setpoint, is the cause.
     if (!check.misfits.empty() && check.misfits.front().of_all) {
-      for (auto change = check.changes.rbegin(); change != check.changes.rend(); ++change)
-        undo(inverse(*change), record_);
+      for (std::size_t n = check.changes.size(); n-- > 0;) undo(inverse(check.changes[n]), record_);
       check.changes.clear();
       refresh();
       check.misfits = misfits();

@@ -57,13 +57,11 @@ std::string plant_trouble(const PlantSnapshot& snapshot, const PlantConditions& 
   if (age_s > conditions.stale_s)
     return fmt::format("supervisor: the status is older than {:.3g} s", conditions.stale_s);
   if (!snapshot.interlock_closed) return "the interlock is open; close it";
-  const std::string gravity =
-      range_trouble(snapshot.gravity_compensator_n, conditions.gravity_low_n,
-                    conditions.gravity_high_n, "gravity compensator", "N");
+  std::string gravity = range_trouble(snapshot.gravity_compensator_n, conditions.gravity_low_n,
+                                      conditions.gravity_high_n, "gravity compensator", "N");
   if (!gravity.empty()) return gravity;
-  const std::string temperature =
-      range_trouble(snapshot.temperature_k, conditions.temperature_low_k,
-                    conditions.temperature_high_k, "temperature", "K");
+  std::string temperature = range_trouble(snapshot.temperature_k, conditions.temperature_low_k,
+                                          conditions.temperature_high_k, "temperature", "K");
   if (!temperature.empty()) return temperature;
   if (snapshot.state == NodeState::fault || snapshot.state == NodeState::fault_reaction)
     return fmt::format("the plant is in fault: {}; remove the cause and add --reset-fault",

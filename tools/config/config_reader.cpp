@@ -61,15 +61,16 @@ class MapReader final : public ConfigVisitor {
                                                suggest_key(entry.key, known_)));
       });
     }
-    for (const auto& [key, help] : missing_)
+    for (const Missing& missing : missing_)
       if (!unknown)
         errors_.attempt([&] {
-          document_.fail(map_.mark, fmt::format("key '{}' is missing{}; add it ({})", key,
-                                                place_.empty() ? "" : " in " + place_, help));
+          document_.fail(map_.mark,
+                         fmt::format("key '{}' is missing{}; add it ({})", missing.key,
+                                     place_.empty() ? "" : " in " + place_, missing.help));
         });
     if (errors_.size() > errors_before_) return;
-    for (const auto& [mark, message] : broken_)
-      errors_.attempt([&] { document_.fail(mark, message); });
+    for (const Broken& broken : broken_)
+      errors_.attempt([&] { document_.fail(broken.mark, broken.message); });
   }
 
   void number(const char* key, double& value, const NumberRule& rule, Presence presence,
@@ -174,7 +175,7 @@ class MapReader final : public ConfigVisitor {
   void require(bool holds, const char* key, const std::string& message) override {
     if (holds) return;
     const YamlNode* value = document_.value(map_, key);
-    broken_.emplace_back(value == nullptr ? map_.mark : value->mark, message);
+    broken_.push_back({value == nullptr ? map_.mark : value->mark, message});
   }
 
  private:
@@ -186,7 +187,7 @@ class MapReader final : public ConfigVisitor {
     if (value != nullptr)
       errors_.attempt([&] { take(*value); });
     else if (presence == Presence::required)
-      missing_.emplace_back(key, help);
+      missing_.push_back({key, help});
   }
   template <typename Values, typename Take>
   void read_list(const char* key, Values& values, CountRule count, Presence presence,
@@ -301,12 +302,21 @@ class MapReader final : public ConfigVisitor {
     return node.kind == YamlNode::Kind::scalar ? nearest_hint(node.text, words) : "";
   }
 
+  struct Missing {
+    std::string key;
+    std::string help;
+  };
+  struct Broken {
+    YamlMark mark;
+    std::string message;
+  };
+
   const YamlDocument& document_;
   const YamlNode& map_;
   std::string place_;
   std::vector<std::string> known_;
-  std::vector<std::pair<std::string, std::string>> missing_;  // key, help
-  std::vector<std::pair<YamlMark, std::string>> broken_;
+  std::vector<Missing> missing_;
+  std::vector<Broken> broken_;
   FormatErrorList& errors_;
   std::size_t errors_before_ = 0;
 };

@@ -129,7 +129,8 @@ void add_checks(ReportData& data) {
 void add_stabilization(ReportData& data) {
   const FrfEstimate& frf = *data.frf;
   const StabilizationOptions options{.delay_s = delay_in(frf, data.model)};
-  if (frf.lines() > 2 * options.most_order) data.stabilization = stabilization(frf, options);
+  if (frf.lines() > Eigen::Index{2} * options.most_order)
+    data.stabilization = stabilization(frf, options);
 }
 
 /// Reads the parts that only a summary has: the truth of a simulated plant, and the duration of the steps. Notes that

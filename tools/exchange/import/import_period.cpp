@@ -127,7 +127,8 @@ Eigen::MatrixXd period_of(const ArrayList& arrays, const ImportMap& map,
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(period, all.cols());
   for (Eigen::Index at = 0; at < settled.rows(); at += period)
     sum += settled.middleRows(at, period);
-  return sum / static_cast<double>(settled.rows() / period);
+  const Eigen::Index periods = settled.rows() / period;
+  return sum / static_cast<double>(periods);
 }
 
 }  // namespace stageid
