@@ -155,8 +155,8 @@ void design_command(CLI::App& app, Console& console) {
   command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
   command
       .add_option("--accuracy", flags.accuracy,
-                  "with level.limits: target mean relative variance, e.g. 1e-6 for 0.1 %; prints "
-                  "the measuring time that it needs")
+                  "print the measuring time for this mean relative variance of the response, e.g. "
+                  "1e-6 for 0.1 % rms; needs level.limits")
       ->check(kPositive);
   command.add_flag("--force", flags.force, "write even if a limit would be exceeded");
 }

@@ -111,8 +111,8 @@ void export_command(CLI::App& app, Console& console) {
       "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
   command
       .add_option("--driving-point", flags.driving_point,
-                  "OUTPUT INPUT at the same point and in the same direction; .h5, .mat, .npz: "
-                  "adds the modal mass of each mode there")
+                  "OUTPUT INPUT at the same point and in the same direction: add the modal mass of "
+                  "each mode at this point to .h5, .mat or .npz")
       ->expected(2);
   add_mat_version(command, flags.mat_version);
 }

@@ -121,27 +121,29 @@ void fit_command(CLI::App& app, Console& console) {
                      "hold, delay and sampler, including aliasing. Default: from the FRF");
   command.add_option(
       "--delay", flags.words.delay,
-      "SECONDS | estimate | per_channel. Default for an FRF without a hold: none; for a "
-      "compensated one: its known delay; else estimate (per_channel if the data require it)");
-  command.add_option("--rigid-body", flags.words.rigid_body,
-                     "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes "
-                     "below the lines, for a body on soft springs | suspension:F1:F2: the same at "
-                     "known frequencies in Hz | auto: chosen from the data. Default: auto, or "
-                     "none with --submodel or if the outputs are accelerations");
+      "SECONDS | estimate | per_channel; default: for a compensated FRF, the delay that was "
+      "removed; for one without a hold, none; else estimate (per_channel if the data require it)");
+  command.add_option(
+      "--rigid-body", flags.words.rigid_body,
+      "none | full | RANK: the term B_0 / s^2 of this rank | suspension: modes below the lowest "
+      "line, for a body on soft springs | suspension:F1:F2: the same at known frequencies in Hz | "
+      "auto: chosen from the data. Default: auto, or none with --submodel or if the outputs are "
+      "accelerations");
   command.add_option("--direct-term", flags.words.direct_term,
                      "none | full: a constant, the compliance of modes above the band. Default: "
                      "chosen from the data; full if the outputs are accelerations");
   command
       .add_option("--residue-rank", flags.words.residue_rank,
-                  "full | 1: residues phi psi^T, one pair of mode shapes each, of mechanical modes")
+                  "full | 1: each residue is phi psi^T with one pair of mode shapes, as for a "
+                  "mechanical mode")
       ->capture_default_str();
   command
       .add_option("--submodel", flags.words.submodels,
-                  "adds the term (B_0 + ... + B_m s^m) / (s^l A), A a polynomial of order n, such "
-                  "as n=4,m=3,f=120:180,zeta=0.01; repeatable. l: integrators, default 0. m: "
-                  "default n + l - 1. f: starting frequencies in Hz, one per pole pair, then the "
-                  "real pole of an odd n; default: by a search. zeta: starting damping ratio. "
-                  "n=auto: one denominator for all modes that a search finds")
+                  "add the term (B_0 + ... + B_m s^m) / (s^l A) with a polynomial A of order n, "
+                  "e.g. n=4,m=3,f=120:180,zeta=0.01; repeatable. l: number of integrators, default "
+                  "0. m: default n + l - 1. f: starting frequencies in Hz, one per pole pair, and "
+                  "last that of the real pole if n is odd; default: found by a search. zeta: "
+                  "starting damping ratio. n=auto: one denominator for all modes found by a search")
       ->allow_extra_args(false);
   command.add_option("--damping", flags.words.damping,
                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
@@ -154,7 +156,7 @@ void fit_command(CLI::App& app, Console& console) {
       ->capture_default_str();
   command
       .add_option("--search-seconds", flags.request.search_seconds,
-                  "limit of the search: work, in seconds of a typical core, so that the result "
+                  "limit of the search, in seconds of work on a typical core, so that the result "
                   "does not depend on the machine. At the limit, the best model so far is written "
                   "and the exit code is 3. 0: unlimited")
       ->check(kNotNegative)

@@ -142,7 +142,8 @@ void frf_command(CLI::App& app, Console& console) {
       "--transient-periods", flags.options.transient_periods,
       "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
   add_choice(command, "--method", flags.options.method,
-             "periodic: means over periods | lpm: whole records, transient modelled");
+             "periodic: means over periods | lpm: local polynomial method, which models the "
+             "transient in whole records");
   add_choice(command, "--periods", flags.options.periods,
              "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
              "discard periods with glitches) | unmarked: use all periods without marked samples");
@@ -165,8 +166,9 @@ void frf_command(CLI::App& app, Console& console) {
       "stage or controller file for the health checks; default: the one stored in the log");
   command.add_flag("--no-health", flags.no_health, "skip the health checks of the data");
   command
-      .add_option("--fft-wisdom", flags.fft_wisdom,
-                  "store FFT plans found by timing in FILE and reuse those already there")
+      .add_option(
+          "--fft-wisdom", flags.fft_wisdom,
+          "file of FFT plans: its plans are reused; missing ones are found by timing and added")
       ->type_name("FILE");
   add_threads(command, flags.options.threads);
 }

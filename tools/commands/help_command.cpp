@@ -42,7 +42,8 @@ void help_command(CLI::App& app, Console&) {
   const std::vector<std::string> names = names_of(command_tree(app).commands);
   CLI::App& command = add_command(app, "help", "Describe a command and its options");
   command
-      .add_option("command", *words, "name of the command: 'frf', 'log info'; default: list all")
+      .add_option("command", *words,
+                  "name of the command, e.g. 'frf' or 'log info'; default: list all")
       ->type_name(fmt::format("TEXT:{{{}}}", fmt::join(names, ",")));
   command.final_callback([words, &app] { print_help(app, *words); });
 }

@@ -47,8 +47,8 @@ void manual_command(CLI::App& app, Console& console) {
       add_command(app, "manual", "Write man pages and completions for bash and zsh");
   command
       .add_option("-o,--output", *output,
-                  "directory such as /usr/share or ~/.local/share; the files go to man/man1, "
-                  "bash-completion/completions and zsh/vendor-completions in it")
+                  "directory such as /usr/share or ~/.local/share; the files go to its "
+                  "subdirectories man/man1, bash-completion/completions and zsh/vendor-completions")
       ->required();
   command.final_callback([output, &app, &console] { write_manual(app, *output, console); });
 }

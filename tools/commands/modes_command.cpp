@@ -66,8 +66,10 @@ void modes_command(CLI::App& app, Console& console) {
   command.add_option("frf", flags.frf, "frf.h5")->required();
   command.add_option("-o,--output", flags.output, "modes.json to write");
   command.add_option("--band", flags.band_hz, "LOW HIGH, Hz")->expected(2);
-  add_choice(command, "--kind", flags.kind,
-             "response: G | accelerance: omega^2 G | whitened: G over its standard deviations");
+  add_choice(
+      command, "--kind", flags.kind,
+      "matrix to analyse: response: the FRF G | accelerance: omega^2 G | whitened: G divided by "
+      "its standard deviations");
   command.add_option("--prominence", flags.prominence_db, "minimum prominence of a peak, dB")
       ->check(kNotNegative)
       ->capture_default_str();

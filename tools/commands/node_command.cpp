@@ -144,9 +144,9 @@ void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
       ->capture_default_str();
   command.add_option(
       "--modbus-fault", flags.faults,
-      "KIND[@REQUEST][xCOUNT][:VALUE], counted from the first request: late_reply:SECONDS, "
-      "half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, interlock, "
-      "temperature:KELVIN, gravity:NEWTON");
+      "KIND[@REQUEST][xCOUNT][:VALUE]: inject a fault; requests are counted from 1. Kinds: "
+      "late_reply:SECONDS, half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, "
+      "interlock, temperature:KELVIN, gravity:NEWTON");
 }
 
 bool forces_act(NodeState state) {
@@ -301,7 +301,7 @@ void node_command(CLI::App& app, Console& console) {
   command
       .add_option(
           "--can", flags.can_interfaces,
-          "CAN FD interfaces, one per bus of the stage file and in its order, such as can0,can1")
+          "CAN FD interfaces, one per bus, in the order of the stage file, such as can0,can1")
       ->delimiter(',');
   command
       .add_option("--can-fault", flags.can_faults,
@@ -315,9 +315,9 @@ void node_command(CLI::App& app, Console& console) {
       ->check(kNotNegative)
       ->capture_default_str();
   command
-      .add_option(
-          "--hold", flags.hold_s,
-          "after a quick stop or a fault: seconds in the node's own loop before it cuts the forces")
+      .add_option("--hold", flags.hold_s,
+                  "after a quick stop or a fault, seconds for which the node keeps the loop closed "
+                  "before it cuts the forces")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
   add_modbus_options(command, flags.modbus);
@@ -325,9 +325,8 @@ void node_command(CLI::App& app, Console& console) {
       .add_option(
           "--watchdog", flags.watchdog_s,
           "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
-          "'watchdog_s' of the group 'can'; over Modbus, the longest time in which the host "
-          "repeats "
-          "a lost request, plus one sample")
+          "'watchdog_s' of the group 'can'; over Modbus, the longest time that the host needs to "
+          "repeat a lost request, plus one sample")
       ->check(CLI::Range(0.0, 3600.0));
 }
 

@@ -114,7 +114,7 @@ void plot_command(CLI::App& app, Console& console) {
   command
       .add_option("inputs", flags.inputs,
                   "output directory of 'stageid identify', or files: FRF, model, modes "
-                  "(candidates in cmif)")
+                  "(the candidates shown in cmif)")
       ->required();
   command
       .add_option("--output-channel", flags.output_channels,

@@ -35,15 +35,17 @@ constexpr const char* kWelcome =
   stageid identify configs/experiment/wafer_stage_quick.yaml -o first
       identify a simulated wafer stage; writes a model and first/report.html
   stageid import YOUR_LOG.csv
-      the contents of a log from another program (also .mat, .h5, .npz); docs/guide.md describes the next steps
+      list the contents of a log from another program (also .mat, .h5, .npz);
+      docs/guide.md describes the next steps
   stageid config schema
-      all keys of a configuration
+      list all keys of the configuration files
 
 'stageid help' lists the commands, 'stageid help COMMAND' the options of one.)";
 
 constexpr const char* kFooter =
-    R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done but
-not to be relied on, see the printed reason; 4 stopped for safety; 130 interrupted, recorded data are kept.)";
+    R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done, but do
+not rely on the result (see the printed reason); 4 stopped for safety; 130 interrupted, recorded
+data are kept.)";
 
 /// The text before and after `middle`.
 std::optional<std::pair<std::string, std::string>> split_at(const std::string& text,
@@ -107,7 +109,9 @@ class Program {
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
-    add_choice(app_, "--verbosity", console_.verbosity, "quiet | normal | debug");
+    add_choice(
+        app_, "--verbosity", console_.verbosity,
+        "messages on stderr: quiet: only warnings and errors | normal, debug: also progress");
     app_.require_subcommand(0, 1);
     app_.footer(kFooter);
   }

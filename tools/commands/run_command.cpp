@@ -106,15 +106,15 @@ void run_command(CLI::App& app, Console& console) {
                      "play this result of 'stageid design' instead of designing again");
   command
       .add_option("--until", flags.request.until,
-                  "VARIANCE: stop after the realization that lowers the mean relative variance of "
-                  "the response to this value, e.g. 1e-6 for 0.1 %")
+                  "stop after the realization that lowers the mean relative variance of the "
+                  "response to this value, e.g. 1e-6 for 0.1 % rms")
       ->check(kPositive);
   command.add_flag("--resume", flags.request.resume,
                    "continue an interrupted log; complete runs are not repeated");
   command.add_option("--dashboard", flags.dashboard,
                      "live view in a browser. PORT: on this machine (0: any free port) | "
-                     "HOST:PORT: also on others. The printed address contains the token that "
-                     "other machines and the stop button need");
+                     "HOST:PORT: also on other machines. These and the stop button need the "
+                     "access token in the printed address");
   command.add_flag("--reset-fault", flags.request.reset_fault,
                    "clear a fault of the node or plant before the first run");
 }
