@@ -64,7 +64,7 @@ std::uint16_t sign_last(std::int16_t value) {
 struct Block16 {
   std::int16_t re = 0;
   std::int16_t im = 0;
-  std::int8_t exponent = 0;
+  int exponent = 0;  // -127 to 127
 };
 
 Block16 to_block16(std::complex<double> value) {
@@ -79,7 +79,7 @@ Block16 to_block16(std::complex<double> value) {
     const double scaled = std::clamp(std::ldexp(part, 15 - exponent), -32767.0, 32767.0);
     return static_cast<std::int16_t>(std::lround(scaled));
   };
-  return {mantissa(value.real()), mantissa(value.imag()), static_cast<std::int8_t>(exponent)};
+  return {mantissa(value.real()), mantissa(value.imag()), exponent};
 }
 
 std::complex<double> value_of(const Block16& block) {

@@ -1,24 +1,16 @@
 #pragma once
 
-#include <array>
 #include <chrono>
-#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "excitation/words/words.hpp"
-
 namespace stageid {
-
-enum class Verbosity : std::uint8_t { quiet, normal, debug };
-template <>
-inline constexpr std::array kWords<Verbosity> = {"quiet", "normal", "debug"};
 
 /// Output of a command: results on stdout (a text, or with --json one object), messages and progress on stderr.
 class Console {
  public:
-  Verbosity verbosity = Verbosity::normal;
+  bool quiet = false;
   bool json = false;
   int exit_code = 0;  ///< of the executed command
 
@@ -27,8 +19,7 @@ class Console {
   void result(const char* line) const { result(std::string(line)); }
   /// The whole result with --json; else nothing.
   void result(const nlohmann::ordered_json& object) const;
-  void message(const std::string& line) const;  ///< normal and debug
-  void detail(const std::string& line) const;   ///< debug
+  void message(const std::string& line) const;  ///< unless quiet
   void warning(const std::string& line) const;  ///< always
 };
 
