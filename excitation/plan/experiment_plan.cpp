@@ -12,7 +12,7 @@
 #include "excitation/multisine/line_spectrum.hpp"
 #include "excitation/multisine/multisine_lines.hpp"
 #include "excitation/multisine/random_stream.hpp"
-#include "excitation/plan/hadamard.hpp"
+#include "excitation/plan/hadamard_matrix.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {

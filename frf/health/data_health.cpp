@@ -14,9 +14,9 @@
 #include "frf/health/transient_check.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/order_statistic.hpp"
-#include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
 #include "frf/wiring/excitation_timing.hpp"
+#include "frf/wiring/recorded_channels_check.hpp"
 #include "frf/wiring/timing_check.hpp"
 
 namespace stageid {

@@ -14,9 +14,9 @@ namespace stageid {
 /// - Timing (timing_check.hpp): lost samples, a late excitation, a response that changes.
 /// - Samples: dead and clipped channels, marked and late cycles.
 /// - Spectra: channels without response, cond(R), cond(U), actuators that move outside the sub-plant.
-/// - With the configuration: whether u = r - C y holds between the recorded signals (controller_check.hpp:
+/// - With the configuration: whether u = r - C y holds between the recorded signals (recorded_channels_check.hpp:
 ///   names, signs, scales and timing of the recording), then whether the rigid body has the configured geometry
-///   and mass (rigid_body_check.hpp: wiring behind the recorder).
+///   and mass (stage_wiring_check.hpp: wiring behind the recorder).
 /// What this log cannot show is a finding of severity `unchecked` that names the missing data.
 ///
 /// The comment of each check states its rate of false alarms. health_study measures them over random

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "frf/runs/dropped_periods.hpp"
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/period_rejection.hpp"
 #include "frf/runs/run_steps.hpp"
 
 namespace stageid {
@@ -170,7 +170,7 @@ class RunMeasurement {
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
-  PeriodRejection comparison_;
+  DroppedPeriods comparison_;
   int together_ = 1;  // periods that are compared and included together
   bool compare_ = true;
   int unmarked_ = 0;

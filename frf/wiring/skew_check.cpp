@@ -207,15 +207,15 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
           of_sensors
               ? outputs[static_cast<std::size_t>(block.outputs[static_cast<std::size_t>(i)])]
               : inputs[static_cast<std::size_t>(block.inputs[static_cast<std::size_t>(i - n_y)])];
-      check.changes.push_back(
-          {ChannelChange::Kind::skew, of_sensors, in_log, -1, skew[i], deviation[i]});
+      check.errors.push_back(
+          {ChannelError::Kind::skew, of_sensors, in_log, -1, skew[i], deviation[i]});
     }
   }
   if (!any)
     check.unchecked =
         "100 excited lines, and three sensors and three actuators that respond to each other "
         "above the noise";
-  else if (check.changes.empty() && kSkewDeviations * check.largest_deviation_s > kWantedSkew_s)
+  else if (check.errors.empty() && kSkewDeviations * check.largest_deviation_s > kWantedSkew_s)
     check.unchecked =
         fmt::format("more power or lighter damping ({:.0f} standard deviations are {:.3g} us)",
                     kSkewDeviations, 1e6 * kSkewDeviations * check.largest_deviation_s);

@@ -3,15 +3,15 @@
 #include <string>
 #include <vector>
 
-#include "frf/wiring/channel_change.hpp"
+#include "frf/wiring/channel_error.hpp"
 #include "frf/wiring/plant_lines.hpp"
 
 namespace stageid {
 
 struct SkewCheck {
-  std::string unchecked;               ///< the missing data; empty: it was checked
-  std::vector<ChannelChange> changes;  ///< channels whose timing differs from their kind's
-  double largest_deviation_s = 0.0;    ///< largest standard deviation of a skew
+  std::string unchecked;             ///< the missing data; empty: it was checked
+  std::vector<ChannelError> errors;  ///< channels whose timing differs from their kind's
+  double largest_deviation_s = 0.0;  ///< largest standard deviation of a skew
 };
 
 /// Checks whether all sensors sample, and all actuators act, at the same time (docs/theory.md, section 13).

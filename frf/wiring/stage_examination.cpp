@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
-#include "frf/wiring/controller_check.hpp"
 #include "frf/wiring/examination.hpp"
 #include "frf/wiring/feedback_check.hpp"
-#include "frf/wiring/rigid_body_check.hpp"
+#include "frf/wiring/recorded_channels_check.hpp"
 #include "frf/wiring/skew_check.hpp"
+#include "frf/wiring/stage_wiring_check.hpp"
 
 namespace stageid {
 namespace {
@@ -130,8 +130,8 @@ void Examination::check_recording() {
     return;
   }
   const ControllerCheck check = check_controller(record_, *nominal_);
-  for (const ChannelChange& change : check.changes)
-    findings_.push_back(to_finding(change, record_.info, true));
+  for (const ChannelError& error : check.errors)
+    findings_.push_back(to_finding(error, record_.info, true));
   if (!check.misfits.empty() && check.misfits.front().of_all) {
     if (find_suspected(0, record_.n_y())) return;
     find(Severity::doubt, Cause::controller, "",
@@ -187,8 +187,8 @@ void Examination::check_stage() {
   for (const Index a : check.dead_actuators)
     find(Severity::fault, Cause::dead, name(record_.n_y() + a), "dead: its force has no effect",
          "less than 5 % of the motion of the rigid body", "check its amplifier and cable");
-  for (const ChannelChange& change : check.changes)
-    findings_.push_back(to_finding(change, record_.info, false));
+  for (const ChannelError& error : check.errors)
+    findings_.push_back(to_finding(error, record_.info, false));
   if (check.deviation > kLargestRigidDeviation)
     find(Severity::doubt, Cause::rigid_body, "", "the rigid body differs from the configuration",
          fmt::format("by {:.0f} %, {:.3g} ... {:.3g} Hz", 100.0 * check.deviation, check.band_hz[0],
@@ -196,8 +196,8 @@ void Examination::check_stage() {
          "correct mass, inertia or positions in the stage file");
   if (!check.dead_actuators.empty()) return;  // the phase of noise is meaningless
   const SkewCheck skew = check_skew(lines, outputs, inputs);
-  for (const ChannelChange& change : skew.changes)
-    findings_.push_back(to_finding(change, record_.info, false));
+  for (const ChannelError& error : skew.errors)
+    findings_.push_back(to_finding(error, record_.info, false));
   if (!skew.unchecked.empty())
     find_unchecked(Cause::skew, "timing skew between recorder and stage",
                    "needs " + skew.unchecked + "; fit --delay per_channel estimates it");

@@ -101,7 +101,7 @@ TEST(SkewOfBlocks, ADelayBetweenBlocksIsNotACharge) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const auto lines = decoupled_plant(seed, {{4, 5}, {3, 4}}, {0.0, 20e-6});
     const SkewCheck check = check_skew(lines, first_indices(7), first_indices(9));
-    EXPECT_TRUE(check.changes.empty()) << seed << ": " << check.changes.front().value;
+    EXPECT_TRUE(check.errors.empty()) << seed << ": " << check.errors.front().value;
   }
 }
 
@@ -110,10 +110,10 @@ TEST(SkewOfBlocks, AChannelThatIsLateInItsBlockIsFound) {
     auto lines = decoupled_plant(seed, {{4, 5}, {5, 4}}, {0.0, 20e-6});
     for (PlantLine& line : lines) line.G.row(5) *= std::polar(1.0, -line.omega_rad_s * 12e-6);
     const SkewCheck check = check_skew(lines, first_indices(9), first_indices(9));
-    ASSERT_EQ(check.changes.size(), 1U) << seed;
-    EXPECT_TRUE(check.changes[0].of_sensors);
-    EXPECT_EQ(check.changes[0].a, 5);
-    EXPECT_NEAR(check.changes[0].value, 12e-6, 1e-6);
+    ASSERT_EQ(check.errors.size(), 1U) << seed;
+    EXPECT_TRUE(check.errors[0].of_sensors);
+    EXPECT_EQ(check.errors[0].a, 5);
+    EXPECT_NEAR(check.errors[0].value, 12e-6, 1e-6);
   }
 }
 

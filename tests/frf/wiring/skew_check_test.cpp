@@ -93,10 +93,10 @@ TEST(SkewCheck, TellsTheLateChannelToAMicrosecond) {
       request.seed = static_cast<std::uint64_t>(c) + 1;
       request.late_s = late_s * Eigen::VectorXd::Unit(12, c);
       const SkewCheck check = checked(request);
-      ASSERT_EQ(check.changes.size(), 1U) << "channel " << c << ", " << late_s;
-      EXPECT_EQ(check.changes[0].of_sensors, c < 4);
-      EXPECT_EQ(check.changes[0].a, c < 4 ? c : c - 4);
-      EXPECT_NEAR(check.changes[0].value, late_s, 1e-6);
+      ASSERT_EQ(check.errors.size(), 1U) << "channel " << c << ", " << late_s;
+      EXPECT_EQ(check.errors[0].of_sensors, c < 4);
+      EXPECT_EQ(check.errors[0].a, c < 4 ? c : c - 4);
+      EXPECT_NEAR(check.errors[0].value, late_s, 1e-6);
     }
 }
 
@@ -107,10 +107,10 @@ TEST(SkewCheck, TellsSeveralAtOnce) {
   request.late_s[6] = -10e-6;
   request.late_s[9] = 15e-6;
   const SkewCheck check = checked(request);
-  ASSERT_EQ(check.changes.size(), 3U);
-  EXPECT_NEAR(check.changes[0].value, 20e-6, 1e-6);
-  EXPECT_NEAR(check.changes[1].value, -10e-6, 1e-6);
-  EXPECT_NEAR(check.changes[2].value, 15e-6, 1e-6);
+  ASSERT_EQ(check.errors.size(), 3U);
+  EXPECT_NEAR(check.errors[0].value, 20e-6, 1e-6);
+  EXPECT_NEAR(check.errors[1].value, -10e-6, 1e-6);
+  EXPECT_NEAR(check.errors[2].value, 15e-6, 1e-6);
 }
 
 TEST(SkewCheck, ThreeByThreeIsEnough) {
@@ -118,9 +118,9 @@ TEST(SkewCheck, ThreeByThreeIsEnough) {
   request.sensors = request.actuators = 3;
   request.late_s = 10e-6 * Eigen::VectorXd::Unit(6, 4);
   const SkewCheck check = checked(request);
-  ASSERT_EQ(check.changes.size(), 1U) << check.unchecked;
-  EXPECT_EQ(check.changes[0].a, 1);
-  EXPECT_NEAR(check.changes[0].value, 10e-6, 1e-6);
+  ASSERT_EQ(check.errors.size(), 1U) << check.unchecked;
+  EXPECT_EQ(check.errors[0].a, 1);
+  EXPECT_NEAR(check.errors[0].value, 10e-6, 1e-6);
 }
 
 TEST(SkewCheck, FindsNothingWhereNobodyIsLate) {
@@ -128,7 +128,7 @@ TEST(SkewCheck, FindsNothingWhereNobodyIsLate) {
   for (request.seed = 1; request.seed <= 10; ++request.seed) {
     const SkewCheck check = checked(request);
     EXPECT_TRUE(check.unchecked.empty()) << check.unchecked;
-    EXPECT_TRUE(check.changes.empty()) << request.seed;
+    EXPECT_TRUE(check.errors.empty()) << request.seed;
   }
 }
 
@@ -137,14 +137,14 @@ TEST(SkewCheck, ModeShapesThatAreNotQuiteRealAreNotSkew) {
   PlantRequest request;
   request.shape_phase_rad = 1.0 * std::numbers::pi / 180.0;
   for (request.seed = 1; request.seed <= 10; ++request.seed)
-    EXPECT_TRUE(checked(request).changes.empty()) << request.seed;
+    EXPECT_TRUE(checked(request).errors.empty()) << request.seed;
 }
 
 TEST(SkewCheck, TooMuchNoiseIsNotCheckedRatherThanFine) {
   PlantRequest request;
   request.noise = 1.0;
   const SkewCheck check = checked(request);
-  EXPECT_TRUE(check.changes.empty());
+  EXPECT_TRUE(check.errors.empty());
   EXPECT_NE(check.unchecked.find("above the noise"), std::string::npos) << check.unchecked;
 }
 

@@ -11,7 +11,7 @@ namespace stageid {
 /// A recording or wiring error of a channel:
 ///   gain: recorded = value * true;   skew: recorded(t) = true(t - value);
 ///   swap: the names of a and b are exchanged.
-struct ChannelChange {
+struct ChannelError {
   using Kind = RealizationChange::Kind;
   Kind kind = Kind::gain;
   bool of_sensors = true;  ///< otherwise of actuators
@@ -21,13 +21,13 @@ struct ChannelChange {
   double deviation = 0.0;  ///< standard deviation of value; 0: unknown
 };
 
-/// Undoes the change in the record's spectra.
-void undo(const ChannelChange& change, HealthRecord& record);
+/// Undoes the error in the record's spectra.
+void undo(const ChannelError& error, HealthRecord& record);
 
-/// undo() of it restores what undo() of the change altered.
-ChannelChange inverse(ChannelChange change);
+/// undo() of it restores what undo() of the error altered.
+ChannelError inverse(ChannelError error);
 
-/// The change as a finding. `in_recording`: between the recorded signals; otherwise between recorder and stage.
-Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording);
+/// The error as a finding. `in_recording`: between the recorded signals; otherwise between recorder and stage.
+Finding to_finding(const ChannelError& error, const LogInfo& info, bool in_recording);
 
 }  // namespace stageid

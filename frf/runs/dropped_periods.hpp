@@ -13,10 +13,10 @@ namespace stageid {
 
 /// Compares the periods of a group of one run in RunWorkspace::record and spectra. A short glitch is replaced
 /// (bridge_samples()), another difference costs the period.
-class PeriodRejection {
+class DroppedPeriods {
  public:
-  PeriodRejection(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
-                  RunWorkspace& workspace)
+  DroppedPeriods(const UsedRun& used, const SpectrumLines& lines, const ChannelChoice& channels,
+                 RunWorkspace& workspace)
       : used_(used), lines_(lines), channels_(channels), w_(workspace) {}
 
   /// Stores the samples of the period in the workspace as number `place` of the group, minus those of the first one,

@@ -1,4 +1,4 @@
-#include "frf/runs/period_rejection.hpp"
+#include "frf/runs/dropped_periods.hpp"
 
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@ constexpr double kLargestGap = 0.1;
 
 }  // namespace
 
-void PeriodRejection::keep_samples(std::size_t place) {
+void DroppedPeriods::keep_samples(std::size_t place) {
   const auto n_y = std::ssize(channels_.outputs);
   const auto n = n_y + std::ssize(channels_.estimated);
   Eigen::MatrixXd& first = w_.first_samples;
@@ -35,7 +35,7 @@ void PeriodRejection::keep_samples(std::size_t place) {
 }
 
 // Each replacement makes the others more visible, and may not be enough.
-std::vector<char> PeriodRejection::settle(const std::vector<int>& numbers, RunSpectra& run) {
+std::vector<char> DroppedPeriods::settle(const std::vector<int>& numbers, RunSpectra& run) {
   const std::size_t P = numbers.size();
   const ComparedPeriods compared{std::span<const Eigen::MatrixXcd>(w_.spectra).first(P),
                                  std::span<const Eigen::MatrixXf>(w_.record).first(P), numbers,
@@ -76,8 +76,8 @@ std::vector<char> PeriodRejection::settle(const std::vector<int>& numbers, RunSp
 
 /// Replaces the samples that deviate. If this is not enough, the next call replaces at least twice as many.
 /// @returns false if there would be too many, or if they reach an end of the period; nothing has changed then
-bool PeriodRejection::replace(const PeriodOutlier& outlier,
-                              const std::vector<std::size_t>& reference, IndexRange& replaced) {
+bool DroppedPeriods::replace(const PeriodOutlier& outlier,
+                             const std::vector<std::size_t>& reference, IndexRange& replaced) {
   const auto N = static_cast<Index>(w_.dft.length());
   IndexRange range = outlier.where;
   if (range.empty() || reference.empty()) return false;
@@ -92,8 +92,8 @@ bool PeriodRejection::replace(const PeriodOutlier& outlier,
   return true;
 }
 
-void PeriodRejection::bridge(std::size_t place, const std::vector<std::size_t>& reference,
-                             IndexRange range) {
+void DroppedPeriods::bridge(std::size_t place, const std::vector<std::size_t>& reference,
+                            IndexRange range) {
   Eigen::MatrixXf& period = w_.record[place];
   Eigen::MatrixXd change = -period.cast<double>();
   bridge_samples(w_.record, reference, place, range);
@@ -104,7 +104,7 @@ void PeriodRejection::bridge(std::size_t place, const std::vector<std::size_t>& 
   spectra += difference;
 }
 
-std::string PeriodRejection::reason(const PeriodOutlier& outlier) const {
+std::string DroppedPeriods::reason(const PeriodOutlier& outlier) const {
   return fmt::format("{:.3g} times the scatter of the other periods on {}, {:.4g} ... {:.4g} Hz",
                      outlier.ratio, channels_.name(used_.log->info(), outlier.channel),
                      outlier.low_hz, outlier.high_hz);

@@ -1,4 +1,4 @@
-#include "excitation/plan/hadamard.hpp"
+#include "excitation/plan/hadamard_matrix.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "frf/runs/health_record.hpp"
-#include "frf/wiring/channel_change.hpp"
+#include "frf/wiring/channel_error.hpp"
 #include "frf/wiring/nominal_stage.hpp"
 
 namespace stageid {
@@ -17,19 +17,19 @@ struct ControllerMisfit {
 };
 
 struct ControllerCheck {
-  std::vector<ChannelChange> changes;     ///< ordered by what they explain; undone in the record
-  std::vector<ControllerMisfit> misfits;  ///< not explained by a change of one channel
+  std::vector<ChannelError> errors;       ///< ordered by what they explain; undone in the record
+  std::vector<ControllerMisfit> misfits;  ///< not explained by an error of one channel
 };
 
 /// Checks u = r - C y between the recorded signals, line by line (S + T = I with S = U R^-1 and T = C Y R^-1). If it is
 /// violated, searches for the wrongly recorded channels that explain it.
 ///
 /// Let E = U - R + C Y with means over the periods, and weights w = 1 / (s^2 + (epsilon C Y)^2), s^2 the variance of E
-/// from its scatter over periods. Every change of one channel moves E along one direction X: E - d X, d real. Least
+/// from its scatter over periods. Every error of one channel moves E along one direction X: E - d X, d real. Least
 /// squares give d, its standard deviation (2 |X|_w^2)^(-1/2), and the explained part of |E|_w^2. The exchange of two
-/// channels has no parameter. The change that explains most is undone, and the search is repeated.
+/// channels has no parameter. The error that explains most is undone, and the search is repeated.
 ///
-/// A change is accepted on three conditions:
+/// An error is accepted on three conditions:
 ///   - d is 6 standard deviations from zero. False alarms: 2e-9 per candidate, 6e-7 for the 300 candidates of a wafer
 ///     stage. s^2 is rather too large, because the noise in E is the difference of two ends of a period and
 ///     cancels in the mean.

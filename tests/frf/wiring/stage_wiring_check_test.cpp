@@ -1,4 +1,4 @@
-#include "frf/wiring/rigid_body_check.hpp"
+#include "frf/wiring/stage_wiring_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "tests/support/process/random_numbers.hpp"
 
 namespace stageid {
-namespace test_rigid_body_check {
+namespace test_stage_wiring_check {
 
 using Index = Eigen::Index;
 
@@ -42,23 +42,23 @@ std::vector<PlantLine> body(std::uint64_t seed, double distortion, double factor
   return lines;
 }
 
-std::vector<ChannelChange> changes(std::uint64_t seed, double distortion, double factor) {
-  return check_rigid_body(body(seed, distortion, factor), kAll, kAll).changes;
+std::vector<ChannelError> errors(std::uint64_t seed, double distortion, double factor) {
+  return check_rigid_body(body(seed, distortion, factor), kAll, kAll).errors;
 }
 
 // A nonlinear plant distorts the lines, the same in all periods.
 TEST(RigidBodyCheck, DistortionIsNoFactorOfAChannel) {
   int told = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed)
-    if (!changes(seed, 0.5, 1.0).empty()) ++told;
+    if (!errors(seed, 0.5, 1.0).empty()) ++told;
   EXPECT_LE(told, 2);
 }
 
 TEST(RigidBodyCheck, AFactorIsFoundInSpiteOfDistortion) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    const std::vector<ChannelChange> found = changes(seed, 0.05, 2.0);
+    const std::vector<ChannelError> found = errors(seed, 0.05, 2.0);
     ASSERT_EQ(found.size(), 1U) << seed;
-    EXPECT_EQ(found[0].kind, ChannelChange::Kind::gain);
+    EXPECT_EQ(found[0].kind, ChannelError::Kind::gain);
     EXPECT_TRUE(found[0].of_sensors);
     EXPECT_EQ(found[0].a, 1);
     EXPECT_NEAR(found[0].value, 2.0, 0.3);
@@ -80,10 +80,10 @@ TEST(RigidBodyCheck, ASuspensionThatTheMotionStiffensIsNotAFactor) {
       line.G0 += heave;
       line.G += omega2 / (omega2 - resonance_rad_s * resonance_rad_s) * heave;
     }
-    if (!check_rigid_body(lines, kAll, kAll).changes.empty()) ++told;
+    if (!check_rigid_body(lines, kAll, kAll).errors.empty()) ++told;
   }
   EXPECT_EQ(told, 0);
 }
 
-}  // namespace test_rigid_body_check
+}  // namespace test_stage_wiring_check
 }  // namespace stageid

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "frf/wiring/channel_change.hpp"
+#include "frf/wiring/channel_error.hpp"
 #include "frf/wiring/plant_lines.hpp"
 
 namespace stageid {
@@ -13,7 +13,7 @@ inline constexpr double kLargestRigidDeviation = 0.3;
 
 struct RigidBodyCheck {
   std::string unchecked;                     ///< the missing data; empty: it was checked
-  std::vector<ChannelChange> changes;        ///< gains and exchanges, not undone in the record
+  std::vector<ChannelError> errors;          ///< gains and exchanges, not undone in the record
   std::vector<Eigen::Index> dead_actuators;  ///< excited but without any effect
   double deviation = 0.0;  ///< remaining rms over the entries, relative to the rms of their row
   double band_hz[2] = {0.0, 0.0};
@@ -29,7 +29,7 @@ struct RigidBodyCheck {
 /// closer to A0. A wiring gain g of a channel scales its row or column; an exchange of channels exchanges them.
 /// The variance of A is that of the scatter of the lines where it exceeds the noise: a nonlinear plant distorts the
 /// lines in all periods alike.
-/// The change that brings A closest to A0 is accepted if it does so in the lower and in the upper half of the lines
+/// The error that brings A closest to A0 is accepted if it does so in the lower and in the upper half of the lines
 /// too, and the search is repeated: a channel's gain is the same on all lines, a suspension that stiffens with the
 /// motion is not. Positive gains after which the body still differs by more than kLargestRigidDeviation are no
 /// explanation and are discarded. Entries have a tolerance of 10 % of the rms of their row, the accuracy of

@@ -1,4 +1,4 @@
-#include "frf/wiring/controller_check.hpp"
+#include "frf/wiring/recorded_channels_check.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ constexpr double kHardlyWorse = 4.0;
 constexpr double kLargestSkew = 4.0;
 constexpr double kSkewStep = 0.5;
 
-/// One line after the changes found so far have been undone.
+/// One line after the errors found so far have been undone.
 struct Line {
   double omega_rad_s = 0.0;
   bool known = true;   // whether the controller is known here
@@ -35,32 +35,32 @@ struct Line {
 };
 
 struct Candidate {
-  ChannelChange change;
+  ChannelError error;
   double explained = 0.0;
   double share = 0.0;  // of the misfit of the affected rows
 };
 
-/// Combines a change with an earlier one of the same channel.
-bool merge(const ChannelChange& change, std::vector<ChannelChange>& changes) {
-  for (ChannelChange& earlier : changes) {
-    if (earlier.kind != change.kind || earlier.of_sensors != change.of_sensors ||
-        earlier.a != change.a || change.kind == ChannelChange::Kind::swap)
+/// Combines an error with an earlier one of the same channel.
+bool merge(const ChannelError& error, std::vector<ChannelError>& errors) {
+  for (ChannelError& earlier : errors) {
+    if (earlier.kind != error.kind || earlier.of_sensors != error.of_sensors ||
+        earlier.a != error.a || error.kind == ChannelError::Kind::swap)
       continue;
-    earlier.value = change.kind == ChannelChange::Kind::gain ? earlier.value * change.value
-                                                             : earlier.value + change.value;
-    earlier.deviation = change.deviation;
+    earlier.value = error.kind == ChannelError::Kind::gain ? earlier.value * error.value
+                                                           : earlier.value + error.value;
+    earlier.deviation = error.deviation;
     return true;
   }
   return false;
 }
 
-/// Whether the same exchange was applied already. Weights depend on the record, so costs before and after a change
+/// Whether the same exchange was applied already. Weights depend on the record, so costs before and after an error
 /// are not comparable exactly, and an exchange and its inverse could alternate forever.
-bool exchanged_before(const ChannelChange& change, const std::vector<ChannelChange>& changes) {
-  return change.kind == ChannelChange::Kind::swap &&
-         std::ranges::any_of(changes, [&](const ChannelChange& earlier) {
-           return earlier.kind == change.kind && earlier.of_sensors == change.of_sensors &&
-                  earlier.a == change.a && earlier.b == change.b;
+bool exchanged_before(const ChannelError& error, const std::vector<ChannelError>& errors) {
+  return error.kind == ChannelError::Kind::swap &&
+         std::ranges::any_of(errors, [&](const ChannelError& earlier) {
+           return earlier.kind == error.kind && earlier.of_sensors == error.of_sensors &&
+                  earlier.a == error.a && earlier.b == error.b;
          });
 }
 
@@ -97,16 +97,16 @@ class Search {
       try_sensors();
       try_actuators();
       const std::optional<Candidate> chosen = best();
-      if (!chosen || exchanged_before(chosen->change, check.changes)) break;
-      undo(chosen->change, record_);
-      if (!merge(chosen->change, check.changes)) check.changes.push_back(chosen->change);
+      if (!chosen || exchanged_before(chosen->error, check.errors)) break;
+      undo(chosen->error, record_);
+      if (!merge(chosen->error, check.errors)) check.errors.push_back(chosen->error);
       refresh();
     }
     check.misfits = misfits();
     // Then another controller, or a setpoint, is the cause.
     if (!check.misfits.empty() && check.misfits.front().of_all) {
-      for (std::size_t n = check.changes.size(); n-- > 0;) undo(inverse(check.changes[n]), record_);
-      check.changes.clear();
+      for (std::size_t n = check.errors.size(); n-- > 0;) undo(inverse(check.errors[n]), record_);
+      check.errors.clear();
       refresh();
       check.misfits = misfits();
     }
@@ -219,7 +219,7 @@ class Search {
 
   /// Tries E - d X with X of `direction`, rows x E.
   template <typename Direction>
-  void try_direction(ChannelChange change, double cost, Index first, Index rows,
+  void try_direction(ChannelError error, double cost, Index first, Index rows,
                      const Direction& direction) {
     double along = 0.0;
     double length = 0.0;
@@ -234,22 +234,22 @@ class Search {
     const double d = along / length;
     const double deviation = 1.0 / std::sqrt(2.0 * length);
     if (std::abs(d) < kChangeDeviations * deviation) return;
-    if (change.kind == ChannelChange::Kind::gain) {
+    if (error.kind == ChannelError::Kind::gain) {
       // The true signal is (1 + d) times the recorded one.
-      change.value = 1.0 / (1.0 + d);
-      change.deviation = noise_known_ ? deviation * change.value * change.value : 0.0;
-      if (!std::isfinite(change.value) || std::abs(change.value - 1.0) < kLeastGainChange) return;
+      error.value = 1.0 / (1.0 + d);
+      error.deviation = noise_known_ ? deviation * error.value * error.value : 0.0;
+      if (!std::isfinite(error.value) || std::abs(error.value - 1.0) < kLeastGainChange) return;
     } else {
-      change.value = d;
-      change.deviation = deviation;
+      error.value = d;
+      error.deviation = deviation;
       if (!noise_known_ || std::abs(d) < kLeastSkewChange_s) return;
     }
-    candidates_.push_back({change, along * d, along * d / cost});
+    candidates_.push_back({error, along * d, along * d / cost});
   }
 
-  void try_swap(ChannelChange change, double cost, double after) {
+  void try_swap(ChannelError error, double cost, double after) {
     if (cost - after > kChangeDeviations * kChangeDeviations)
-      candidates_.push_back({change, cost - after, (cost - after) / cost});
+      candidates_.push_back({error, cost - after, (cost - after) / cost});
   }
 
   /// Tries large skews, beyond the linear range of a small one.
@@ -265,10 +265,10 @@ class Search {
         return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
       });
       if (after > (1.0 - kLeastChangeShare) * cost || !(length > 0.0)) continue;
-      ChannelChange change{ChannelChange::Kind::skew, false, a};
-      change.value = skew_s;
-      change.deviation = 1.0 / std::sqrt(2.0 * length);
-      try_swap(change, cost, after);
+      ChannelError error{ChannelError::Kind::skew, false, a};
+      error.value = skew_s;
+      error.deviation = 1.0 / std::sqrt(2.0 * length);
+      try_swap(error, cost, after);
     }
   }
 
@@ -283,8 +283,8 @@ class Search {
   void try_gain_and_skew(bool of_sensors, Index a, bool follows, double cost, Index first,
                          Index rows, const Direction& direction) {
     if (follows)
-      try_direction({ChannelChange::Kind::gain, of_sensors, a}, cost, first, rows, direction);
-    try_direction({ChannelChange::Kind::skew, of_sensors, a}, cost, first, rows,
+      try_direction({ChannelError::Kind::gain, of_sensors, a}, cost, first, rows, direction);
+    try_direction({ChannelError::Kind::skew, of_sensors, a}, cost, first, rows,
                   [&](const Line& line) {
                     const std::complex<double> j_omega(0.0, line.omega_rad_s);
                     return Eigen::MatrixXcd(j_omega * direction(line));
@@ -300,7 +300,7 @@ class Search {
         return Eigen::MatrixXcd(line.F.col(s) * line.Y.row(s));
       });
       for (Index t = 0; t < s; ++t)
-        try_swap({ChannelChange::Kind::swap, true, t, s}, total_,
+        try_swap({ChannelError::Kind::swap, true, t, s}, total_,
                  sum_over_lines([&](const Line& line) {
                    const Eigen::MatrixXcd changed =
                        line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
@@ -335,7 +335,7 @@ class Search {
         const bool one = (after_a < kOfAnother * cost && after_b < kHardlyWorse * cost_b) ||
                          (after_b < kOfAnother * cost_b && after_a < kHardlyWorse * cost);
         if (!both && !one) continue;
-        try_swap({ChannelChange::Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
+        try_swap({ChannelError::Kind::swap, false, b, a}, cost + cost_b, after_a + after_b);
       }
     }
   }

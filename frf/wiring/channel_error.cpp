@@ -1,4 +1,4 @@
-#include "frf/wiring/channel_change.hpp"
+#include "frf/wiring/channel_error.hpp"
 
 #include <fmt/format.h>
 
@@ -12,11 +12,11 @@ namespace stageid {
 namespace {
 
 /// "a3", "a3 a7", "all sensors".
-std::string channel_names(const ChannelChange& change, const LogInfo& info) {
-  const ChannelList& list = change.of_sensors ? info.sensors : info.actuators;
-  if (change.a < 0) return change.of_sensors ? "all sensors" : "all actuators";
-  const std::string& a = list.name(change.a);
-  return change.b < 0 ? a : a + " " + list.name(change.b);
+std::string channel_names(const ChannelError& error, const LogInfo& info) {
+  const ChannelList& list = error.of_sensors ? info.sensors : info.actuators;
+  if (error.a < 0) return error.of_sensors ? "all sensors" : "all actuators";
+  const std::string& a = list.name(error.a);
+  return error.b < 0 ? a : a + " " + list.name(error.b);
 }
 
 /// A fault of the channels that to_finding() names.
@@ -36,72 +36,72 @@ Finding swap_finding(bool in_recording, bool of_sensors) {
                  : "exchange the two amplifiers' cables, or their positions in the stage file");
 }
 
-Finding gain_finding(const ChannelChange& change, bool in_recording) {
-  const double factor = std::abs(change.value);
+Finding gain_finding(const ChannelError& error, bool in_recording) {
+  const double factor = std::abs(error.value);
   const char* where = in_recording ? "in the recording" : "at the stage";
   const std::string figure =
-      fmt::format("factor {}", with_deviation(change.value, change.deviation, 3));
-  if (change.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3))
+      fmt::format("factor {}", with_deviation(error.value, error.deviation, 3));
+  if (error.value < 0.0 && std::abs(std::log(factor)) < std::log(1.3))
     return fault(Cause::sign, fmt::format("sign flipped {}", where), figure,
                  in_recording
                      ? "change the sign of the channel in the scaling of the recorder"
                      : "change the polarity of the channel, or its direction in the stage file");
   return fault(
       Cause::scale,
-      fmt::format("{} {}", change.value < 0.0 ? "sign and scale wrong" : "scale wrong", where),
+      fmt::format("{} {}", error.value < 0.0 ? "sign and scale wrong" : "scale wrong", where),
       figure,
       fmt::format("divide the channel by the factor; check its unit and {}",
                   in_recording ? "the scaling of the recorder"
                                : "its gain, or the mass in the stage file"));
 }
 
-Finding skew_finding(const ChannelChange& change, bool in_recording) {
+Finding skew_finding(const ChannelError& error, bool in_recording) {
   return fault(
       Cause::skew,
       fmt::format("{} {} than the other channels", in_recording ? "recorded" : "acts or samples",
-                  change.value > 0.0 ? "later" : "earlier"),
-      fmt::format("{} us", with_deviation(kMicroseconds * std::abs(change.value),
-                                          kMicroseconds * change.deviation, 3)),
+                  error.value > 0.0 ? "later" : "earlier"),
+      fmt::format("{} us", with_deviation(kMicroseconds * std::abs(error.value),
+                                          kMicroseconds * error.deviation, 3)),
       in_recording ? "sample all channels simultaneously, or shift this one back"
                    : "sample all channels simultaneously, or fit with --delay per_channel");
 }
 
 }  // namespace
 
-void undo(const ChannelChange& change, HealthRecord& record) {
-  const Eigen::Index offset = change.of_sensors ? 0 : record.n_y();
-  const Eigen::Index first = offset + std::max<Eigen::Index>(change.a, 0);
-  const Eigen::Index count = change.a >= 0 ? 1 : change.of_sensors ? record.n_y() : record.n_u();
+void undo(const ChannelError& error, HealthRecord& record) {
+  const Eigen::Index offset = error.of_sensors ? 0 : record.n_y();
+  const Eigen::Index first = offset + std::max<Eigen::Index>(error.a, 0);
+  const Eigen::Index count = error.a >= 0 ? 1 : error.of_sensors ? record.n_y() : record.n_u();
   for (std::size_t k = 0; k < record.lines.size(); ++k) {
     Eigen::MatrixXcd& Z = record.lines[k].Z;
     const double omega_rad_s =
         2.0 * std::numbers::pi * record.frequency_hz[static_cast<Eigen::Index>(k)];
-    switch (change.kind) {
-      case ChannelChange::Kind::gain:
-        Z.middleRows(first, count) /= change.value;
+    switch (error.kind) {
+      case ChannelError::Kind::gain:
+        Z.middleRows(first, count) /= error.value;
         break;
-      case ChannelChange::Kind::skew:
-        Z.middleRows(first, count) *= std::polar(1.0, omega_rad_s * change.value);
+      case ChannelError::Kind::skew:
+        Z.middleRows(first, count) *= std::polar(1.0, omega_rad_s * error.value);
         break;
-      case ChannelChange::Kind::swap:
-        Z.row(first).swap(Z.row(offset + change.b));
+      case ChannelError::Kind::swap:
+        Z.row(first).swap(Z.row(offset + error.b));
         break;
     }
   }
 }
 
-ChannelChange inverse(ChannelChange change) {
-  if (change.kind == ChannelChange::Kind::gain) change.value = 1.0 / change.value;
-  if (change.kind == ChannelChange::Kind::skew) change.value = -change.value;
-  return change;
+ChannelError inverse(ChannelError error) {
+  if (error.kind == ChannelError::Kind::gain) error.value = 1.0 / error.value;
+  if (error.kind == ChannelError::Kind::skew) error.value = -error.value;
+  return error;
 }
 
-Finding to_finding(const ChannelChange& change, const LogInfo& info, bool in_recording) {
-  using Kind = ChannelChange::Kind;
-  Finding finding = change.kind == Kind::swap   ? swap_finding(in_recording, change.of_sensors)
-                    : change.kind == Kind::gain ? gain_finding(change, in_recording)
-                                                : skew_finding(change, in_recording);
-  finding.channel = channel_names(change, info);
+Finding to_finding(const ChannelError& error, const LogInfo& info, bool in_recording) {
+  using Kind = ChannelError::Kind;
+  Finding finding = error.kind == Kind::swap   ? swap_finding(in_recording, error.of_sensors)
+                    : error.kind == Kind::gain ? gain_finding(error, in_recording)
+                                               : skew_finding(error, in_recording);
+  finding.channel = channel_names(error, info);
   return finding;
 }
 

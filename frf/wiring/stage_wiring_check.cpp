@@ -1,4 +1,4 @@
-#include "frf/wiring/rigid_body_check.hpp"
+#include "frf/wiring/stage_wiring_check.hpp"
 
 #include <fmt/format.h>
 
@@ -92,24 +92,24 @@ double cost(const Gains& gains) {
   return (gains.weight.array() * (gains.A - gains.A0).array().square()).sum();
 }
 
-/// The gains with the change undone; indices are those in A.
-Gains undone(const ChannelChange& change, Gains gains) {
-  Eigen::MatrixXd B = change.of_sensors ? gains.A : Eigen::MatrixXd(gains.A.transpose());
-  if (change.kind == ChannelChange::Kind::swap)
-    B.row(change.a).swap(B.row(change.b));
-  else if (change.a < 0)
-    B /= change.value;
+/// The gains with the error undone; indices are those in A.
+Gains undone(const ChannelError& error, Gains gains) {
+  Eigen::MatrixXd B = error.of_sensors ? gains.A : Eigen::MatrixXd(gains.A.transpose());
+  if (error.kind == ChannelError::Kind::swap)
+    B.row(error.a).swap(B.row(error.b));
+  else if (error.a < 0)
+    B /= error.value;
   else
-    B.row(change.a) /= change.value;
-  gains.A = change.of_sensors ? B : Eigen::MatrixXd(B.transpose());
+    B.row(error.a) /= error.value;
+  gains.A = error.of_sensors ? B : Eigen::MatrixXd(B.transpose());
   return gains;
 }
 
-double explained(const ChannelChange& change, const Gains& gains) {
-  return cost(gains) - cost(undone(change, gains));
+double explained(const ChannelError& error, const Gains& gains) {
+  return cost(gains) - cost(undone(error, gains));
 }
 
-/// The gains of all lines, and those of the lower and the upper half of them: a channel's change shows in both, a
+/// The gains of all lines, and those of the lower and the upper half of them: a channel's error shows in both, a
 /// suspension that the motion stiffens fades above itself.
 struct Body {
   Gains all;
@@ -128,33 +128,33 @@ Body fit_body(const std::vector<PlantLine>& lines) {
   return body;
 }
 
-void undo(const ChannelChange& change, Body& body) {
-  body.all = undone(change, body.all);
-  for (Gains& half : body.halves) half = undone(change, half);
+void undo(const ChannelError& error, Body& body) {
+  body.all = undone(error, body.all);
+  for (Gains& half : body.halves) half = undone(error, half);
 }
 
-/// The gain of the change by least squares over the row, the column, or all entries; none where it is too small.
-std::optional<ChannelChange> gain_change(ChannelChange change, const Gains& gains) {
+/// The gain of the error by least squares over the row, the column, or all entries; none where it is too small.
+std::optional<ChannelError> gain_error(ChannelError error, const Gains& gains) {
   Eigen::MatrixXd part = Eigen::MatrixXd::Zero(gains.A.rows(), gains.A.cols());
-  if (change.a < 0)
+  if (error.a < 0)
     part = gains.A;
-  else if (change.of_sensors)
-    part.row(change.a) = gains.A.row(change.a);
+  else if (error.of_sensors)
+    part.row(error.a) = gains.A.row(error.a);
   else
-    part.col(change.a) = gains.A.col(change.a);
+    part.col(error.a) = gains.A.col(error.a);
   const double square = (gains.weight.array() * part.array().square()).sum();
   const double c = (gains.weight.array() * part.array() * gains.A0.array()).sum() / square;
-  change.value = 1.0 / c;
-  if (!std::isfinite(change.value) || c == 0.0) return std::nullopt;
+  error.value = 1.0 / c;
+  if (!std::isfinite(error.value) || c == 0.0) return std::nullopt;
   if (c > 0.0 && std::abs(std::log(c)) < kLeastLogGain) return std::nullopt;
-  return change;
+  return error;
 }
 
-std::optional<ChannelChange> best_change(const Body& body) {
-  using Kind = ChannelChange::Kind;
-  std::vector<ChannelChange> candidates;
-  const auto try_gain = [&](const ChannelChange& change) {
-    if (const auto gain = gain_change(change, body.all)) candidates.push_back(*gain);
+std::optional<ChannelError> best_change(const Body& body) {
+  using Kind = ChannelError::Kind;
+  std::vector<ChannelError> candidates;
+  const auto try_gain = [&](const ChannelError& error) {
+    if (const auto gain = gain_error(error, body.all)) candidates.push_back(*gain);
   };
   try_gain({Kind::gain, true});
   for (const bool of_sensors : {true, false}) {
@@ -165,8 +165,8 @@ std::optional<ChannelChange> best_change(const Body& body) {
     }
   }
   double most = std::max(kLeastExplained, kLeastChangeShare * cost(body.all));
-  std::optional<ChannelChange> best;
-  for (const ChannelChange& candidate : candidates) {
+  std::optional<ChannelError> best;
+  for (const ChannelError& candidate : candidates) {
     const double gain = explained(candidate, body.all);
     if (gain <= most || std::ranges::any_of(body.halves, [&](const Gains& half) {
           return explained(candidate, half) <= 0.0;
@@ -179,12 +179,12 @@ std::optional<ChannelChange> best_change(const Body& body) {
 }
 
 /// Converts indices in A to those in the log.
-ChannelChange in_log(ChannelChange change, const std::vector<Index>& outputs,
-                     const std::vector<Index>& inputs) {
-  const std::vector<Index>& at = change.of_sensors ? outputs : inputs;
-  if (change.a >= 0) change.a = at[static_cast<std::size_t>(change.a)];
-  if (change.b >= 0) change.b = at[static_cast<std::size_t>(change.b)];
-  return change;
+ChannelError in_log(ChannelError error, const std::vector<Index>& outputs,
+                    const std::vector<Index>& inputs) {
+  const std::vector<Index>& at = error.of_sensors ? outputs : inputs;
+  if (error.a >= 0) error.a = at[static_cast<std::size_t>(error.a)];
+  if (error.b >= 0) error.b = at[static_cast<std::size_t>(error.b)];
+  return error;
 }
 
 }  // namespace
@@ -210,26 +210,25 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
       gains->weight.col(j).setZero();
   }
   const Gains recorded = body.all;
-  std::vector<ChannelChange> changes;
+  std::vector<ChannelError> errors;
   for (Index i = 0; i < recorded.A.rows() + recorded.A.cols(); ++i) {
-    const std::optional<ChannelChange> chosen = best_change(body);
+    const std::optional<ChannelError> chosen = best_change(body);
     if (!chosen) break;
     undo(*chosen, body);
-    changes.push_back(*chosen);
+    errors.push_back(*chosen);
   }
   const auto deviation = [&] {
     return kTolerance * std::sqrt(cost(body.all) / static_cast<double>(recorded.A.size()));
   };
   if (deviation() > kLargestRigidDeviation) {  // factors do not explain it; the body itself differs
-    std::erase_if(changes, [](const ChannelChange& change) {
-      return change.kind == ChannelChange::Kind::gain && change.value > 0.0;
+    std::erase_if(errors, [](const ChannelError& error) {
+      return error.kind == ChannelError::Kind::gain && error.value > 0.0;
     });
     body.all = recorded;
-    for (const ChannelChange& change : changes) body.all = undone(change, body.all);
+    for (const ChannelError& error : errors) body.all = undone(error, body.all);
   }
   check.deviation = deviation();
-  for (const ChannelChange& change : changes)
-    check.changes.push_back(in_log(change, outputs, inputs));
+  for (const ChannelError& error : errors) check.errors.push_back(in_log(error, outputs, inputs));
   return check;
 }
 
