@@ -1,8 +1,9 @@
-#include <limits>
-#include <nlohmann/json.hpp>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
 
 #include "acquisition/files/output_file.hpp"
 #include "estimation/file/json_file.hpp"
@@ -203,7 +204,12 @@ FitRecord fit_from_json(const JsonNode& node) {
   fit.weighting = node.text_or_empty("weighting");
   if (node.has("iterations"))
     fit.iterations = static_cast<int>(node.member("iterations").integer(0, 1'000'000'000));
-  fit.status = node.text_or_empty("status");
+  if (const std::string word = node.text_or_empty("status"); !word.empty()) {
+    fit.status = from_word<FitStatus>(word);
+    if (!fit.status)
+      node.member("status").fail(
+          fmt::format("must be one of {}", fmt::join(words_of<FitStatus>(), ", ")));
+  }
   fit.message = node.text_or_empty("message");
   fit.relative_rms_error =
       node.number_or("relative_rms_error", std::numeric_limits<double>::quiet_NaN());
@@ -250,10 +256,11 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
   root["fit"] = {{"cost", model.fit.cost},
                  {"weighting", model.fit.weighting},
                  {"iterations", model.fit.iterations},
-                 {"status", model.fit.status},
+                 {"status", model.fit.status_word()},
                  {"band_hz", {model.fit.band_hz[0], model.fit.band_hz[1]}},
                  {"seconds", model.fit.seconds}};
-  if (!model.fit.message.empty()) root["fit"]["message"] = model.fit.message;
+  if (!model.fit.trustworthy() && !model.fit.message.empty())
+    root["fit"]["message"] = model.fit.message;
   if (std::isfinite(model.fit.relative_rms_error))
     root["fit"]["relative_rms_error"] = model.fit.relative_rms_error;
   root["cost_history"] = model.cost_history;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
+#include "estimation/model/fit_record.hpp"
 #include "excitation/words/words.hpp"
 
 namespace stageid {
@@ -86,18 +87,6 @@ struct Submodel {
   bool is_mode() const noexcept { return integrators == 0 && denominator.size() == 3; }
   double natural_frequency_hz() const;  ///< @pre is_mode()
   double damping_ratio() const;         ///< @pre is_mode()
-};
-
-/// Outcome of a fit, as stored in the model file.
-struct FitRecord {
-  double cost = 0.0;  ///< 1/(2N) sum vec(E)^H W vec(E)
-  std::string weighting;
-  int iterations = 0;
-  std::string status;   ///< to_string(FitStatus); empty: unknown, model from another program
-  std::string message;  ///< why the fit is not trustworthy; empty: no reason known
-  double relative_rms_error = 0.0;  ///< sqrt(mean |E|^2/|G|^2) over lines and channels
-  double band_hz[2] = {0.0, 0.0};
-  double seconds = 0.0;
 };
 
 /// P(s) = sum of submodels, with delays per channel: the content of model.json.

@@ -81,28 +81,6 @@ struct FitOptions {
       limit;  ///< of the search that this fit is part of; created by automatic_fit()
 };
 
-enum class FitStatus : std::uint8_t {
-  gradient_small,
-  step_small,
-  cost_stalled,
-  iteration_limit,
-  singular,
-  undetermined,   ///< converged, but the data do not determine a requested mode or submodel
-  unexplained,    ///< converged, but the residual is clearly larger than noise and known distortion
-  faulty_data,    ///< the health check of the data found a fault
-  search_budget,  ///< the search used its budget, see SearchLimit
-  interrupted     ///< by the user, see SearchLimit
-};
-template <>
-inline constexpr std::array kWords<FitStatus> = {
-    "gradient_small", "step_small",  "cost_stalled", "iteration_limit", "singular",
-    "undetermined",   "unexplained", "faulty_data",  "search_budget",   "interrupted"};
-
-/// Whether a fit with this status can be trusted.
-bool is_trustworthy(FitStatus status) noexcept;
-/// The same for the record of a model. A model without a status (from another program) is trusted.
-bool is_trustworthy(const FitRecord& record);
-
 /// Covariances of the parameters and the response of a fit, see dense_covariances(). Parameters: denominator
 /// coefficients in the order of the submodels, free delays, vec B (channels x functions).
 struct FitCovariance {
@@ -122,12 +100,10 @@ struct ResidueRankTest {
   double probability = 1.0;  ///< probability that noise alone gives at least this
 };
 
-/// Outcome of a fit. A fit that did not converge is a result, not an error: check `status`.
+/// Outcome of a fit. A fit that did not converge is a result, not an error: check trustworthy().
 struct FitResult {
   AdditiveModel
       model;  ///< the iterate of least cost, with standard deviations if variances are known
-  FitStatus status = FitStatus::iteration_limit;
-  std::string message = "fit_additive_model was not called";
   Eigen::Index parameters = 0;           ///< free ones
   DelayModel delay = DelayModel::fixed;  ///< of these, the delays
   std::vector<double> cost;              ///< one entry per iterate, the start first
@@ -147,14 +123,14 @@ struct FitResult {
       covariance;  ///< empty unless requested; if it cannot be computed, a decision contains the reason
   /// What dense_covariances() computes those of free numerators from; empty if not kept.
   std::shared_ptr<const CovarianceParts> covariance_parts;
-  bool trustworthy() const noexcept { return is_trustworthy(status); }
+  FitStatus status() const noexcept {
+    return model.fit.status.value_or(FitStatus::iteration_limit);
+  }
+  const std::string& message() const noexcept { return model.fit.message; }
+  bool trustworthy() const noexcept { return model.fit.status && model.fit.trustworthy(); }
   bool is_held(std::size_t submodel) const noexcept {
     return std::find(held.begin(), held.end(), submodel) != held.end();
   }
-  /// Adds a reason not to trust the fit, to status, message and the record of the model. The gravest reason is the
-  /// status and the first in the message. Order: interrupt, faulty data, budget, no convergence, unexplained residual,
-  /// undetermined modes.
-  void distrust(FitStatus why, const std::string& reason);
 };
 
 }  // namespace stageid

@@ -40,7 +40,7 @@ const char* SearchLimit::message() const {
 }
 
 bool ended_by_limit(const FitResult& fit) noexcept {
-  return fit.status == FitStatus::search_budget || fit.status == FitStatus::interrupted;
+  return fit.status() == FitStatus::search_budget || fit.status() == FitStatus::interrupted;
 }
 
 }  // namespace stageid

@@ -99,7 +99,7 @@ struct FitSetup {
 FitSetup make_fit_setup(const FitRequest& request, FrfEstimate frf);
 
 /// Fits the additive model P(s) = sum of modes and rigid body to an FRF, with the defaults of `stageid fit`.
-/// A fit that did not converge or does not explain the data is a result: check FitResult::status.
+/// A fit that did not converge or does not explain the data is a result: check FitResult::trustworthy().
 /// Source: docs/theory.md, sections 5 to 10.
 /// @throws what make_fit_setup() and structured_fit() throw
 FitResult fit_model(FrfEstimate frf, const FitRequest& request = {});

@@ -59,7 +59,7 @@ class AutomaticFit {
   /// Whether modes may be misplaced: the residual still shows one.
   bool may_exchange() const {
     return selection_.exactly > 0 && !selection_.keep_modes &&
-           selection_.exactly < affordable_modes() && best_.status != FitStatus::singular &&
+           selection_.exactly < affordable_modes() && best_.status() != FitStatus::singular &&
            !at_rounding() && !limit_reached() && misses_a_mode();
   }
 
@@ -67,7 +67,7 @@ class AutomaticFit {
   void search(int surplus) {
     target_ = selection_.exactly + surplus;
     if (surplus > 0) target_ = std::min(target_, affordable_modes());
-    if (best_.status == FitStatus::singular || selection_.keep_modes) return;
+    if (best_.status() == FitStatus::singular || selection_.keep_modes) return;
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) {
       reduce();
@@ -181,7 +181,7 @@ class AutomaticFit {
     const AdditiveModel relocated =
         start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.threads));
     FitResult fit = fit_additive_model(frf_, relocated, quick_);
-    if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
+    if (fit.status() == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
       return;
     say("pole relocation: cost {:.6g} -> {:.6g}", best_.model.fit.cost, fit.model.fit.cost);
     adopt(std::move(fit));
@@ -197,7 +197,7 @@ class AutomaticFit {
     AutomaticFit search(part.frf, structure, selection_, part.options);
     search.begin_relocated_from(part.model);
     search.search(0);
-    if (search.best_.status == FitStatus::singular) return false;
+    if (search.best_.status() == FitStatus::singular) return false;
     for (const std::string& decision : search.decisions_)
       say("{} of {} lines: {}", part.frf.lines(), frf_.lines(), decision);
     quick_.delay = options_.delay = search.options_.delay;
@@ -216,7 +216,7 @@ class AutomaticFit {
     for (double before = HUGE_VAL; cost() < 0.5 * before && !at_rounding() && !limit_reached();) {
       before = cost();
       FitResult free = fit_additive_model(frf_, best_.model, while_free);
-      if (free.status == FitStatus::singular) return;
+      if (free.status() == FitStatus::singular) return;
       adopt(std::move(free));
     }
   }
@@ -360,7 +360,7 @@ class AutomaticFit {
     for (StructureMove& move : moves) {
       FitResult trial = tried(sample, move);
       const double then = sample.worth.criterion(trial);
-      if (trial.status == FitStatus::singular || !(then < sample.now)) continue;
+      if (trial.status() == FitStatus::singular || !(then < sample.now)) continue;
       better.push_back({then, std::move(move), std::move(trial)});
     }
     std::stable_sort(better.begin(), better.end(),
@@ -384,7 +384,7 @@ class AutomaticFit {
     options.delay = move.options.delay;
     options.delay_s = move.options.delay_s;
     if (!all) fit = fit_additive_model(frf_, with_all_inputs(frf_, fit.model), options);
-    if (fit.status == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
+    if (fit.status() == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
       return false;
     say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, best_.model.fit.cost,
         fit.model.fit.cost, best_.parameters, fit.parameters);
@@ -429,7 +429,7 @@ class AutomaticFit {
     if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
     if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
-    if (trial.status == FitStatus::singular) return false;
+    if (trial.status() == FitStatus::singular) return false;
     if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
     for (const ProposedMode& candidate : clear)
       say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
@@ -453,7 +453,7 @@ class AutomaticFit {
     for (const ProposedMode& candidate : candidates) {
       if (selection_.exactly == 0 && reach * candidate.gain < price) continue;
       FitResult trial = fit_with({candidate});
-      if (trial.status == FitStatus::singular) continue;
+      if (trial.status() == FitStatus::singular) continue;
       const double gain =
           static_cast<double>(frf_.lines()) * (best_.model.fit.cost - trial.model.fit.cost);
       reach = 2.0 * std::max(1.0, gain / candidate.gain);  // as the last one, with a margin

@@ -49,7 +49,7 @@ std::optional<TiedModel> parted(const FrfEstimate& frf, const TiedModel& tied, s
   still.mode_ranks.clear();
   still.uncertainty = false;
   const FitResult fit = fit_additive_model(frf, two.model, still);
-  if (fit.status == FitStatus::singular) return std::nullopt;
+  if (fit.status() == FitStatus::singular) return std::nullopt;
   const Eigen::MatrixXd& upper = fit.model.submodels[i].numerator[0];
   const Eigen::MatrixXd& lower = fit.model.submodels[i + 1].numerator[0];
 

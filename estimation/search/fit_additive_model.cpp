@@ -104,8 +104,8 @@ void fill_record(const FitOptions& options, const IterationResult& iteration, do
   record.cost = iteration.end_cost;
   record.weighting = to_string(options.weighting);
   record.iterations = iteration.iterations;
-  record.status = to_string(result.status);
-  record.message = result.trustworthy() ? "" : result.message;
+  record.status = iteration.status;
+  record.message = iteration.message;
   record.relative_rms_error = relative_rms;
   result.model.cost_history = result.cost;
 }
@@ -213,7 +213,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, const Eigen::Ma
                                    return s.role == SubmodelRole::given ||
                                           (s.denominator.size() > 1 && !s.is_mode());
                                  });
-  const bool singular = result.status == FitStatus::singular;
+  const bool singular = result.status() == FitStatus::singular;
   if (!asked_for && !singular) return;
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
   std::string reason = undetermined_numerators(problem, beta, groups);
@@ -222,7 +222,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, const Eigen::Ma
     reason = undetermined_poles(problem, beta, gn, covariance, judge_modes, result);
   }
   if (reason.empty()) return;
-  result.distrust(FitStatus::undetermined, reason);
+  result.model.fit.distrust(FitStatus::undetermined, reason);
 }
 
 }  // namespace
@@ -266,8 +266,6 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   if (options.shrink_hidden && !low_rank && iteration.status != FitStatus::singular)
     shrink_hidden(problem, beta, iteration, result);
   const double relative_rms = keep_finite(frf, problem, begun, beta, iteration);
-  result.status = iteration.status;
-  result.message = iteration.message;
   result.cost = iteration.cost;
   result.deviations = iteration.deviations;
   result.held = held_submodels(problem, beta, iteration.frozen);
@@ -275,7 +273,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   fill_model(frf, options, problem, beta, result);
   fill_record(options, iteration, relative_rms, result);
   if (options.uncertainty) {
-    if (!low_rank && result.status != FitStatus::singular)
+    if (!low_rank && result.status() != FitStatus::singular)
       covariance = free_covariance(frf, options, problem, matrices, beta, iteration,
                                    have_affordable_covariances(problem, result.model));
     result.covariance_parts = std::move(covariance.parts);

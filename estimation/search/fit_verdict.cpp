@@ -144,7 +144,7 @@ std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& op
     const FitResult single = fit_additive_model(frf, with_one_of(fit.model, i, j), plain);
     const double rise =
         2.0 * static_cast<double>(frf.lines()) * (single.model.fit.cost - fit.model.fit.cost);
-    if (single.status != FitStatus::singular &&
+    if (single.status() != FitStatus::singular &&
         rise < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i])))
       out.push_back({i, j, single.model.fit.cost});
   }
@@ -159,32 +159,33 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
   if (!evidence.low_ranks.empty()) tell(evidence.low_ranks);
   std::vector<std::string> reasons;
   // Without the delay, modes describe it; what the data say about them is of no use.
-  if (fit.status != FitStatus::singular && !evidence.delay_explains_more)
+  if (fit.status() != FitStatus::singular && !evidence.delay_explains_more)
     judge_modes(frf, evidence, fit, reasons);
   for (const std::string& reason : reasons) {
     tell(reason);
-    if (fit.trustworthy()) fit.distrust(FitStatus::undetermined, reason);
+    if (fit.trustworthy()) fit.model.fit.distrust(FitStatus::undetermined, reason);
   }
   if (!evidence.growth_ended.empty()) {
     fit.findings.push_back(evidence.growth_ended);
     if (evidence.delay_explains_more) {
       // Without the delay, a fit need not converge; that is not the reason.
-      if (fit.status == FitStatus::iteration_limit) fit.status = FitStatus::gradient_small;
-      fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+      if (fit.status() == FitStatus::iteration_limit)
+        fit.model.fit.status = FitStatus::gradient_small;
+      fit.model.fit.distrust(FitStatus::unexplained, evidence.growth_ended);
     }
   }
   if (evidence.limit) {
     fit.decisions.push_back(evidence.limit_message);
     if (*evidence.limit == FitStatus::search_budget) fit.findings.push_back(evidence.limit_message);
     // The message of its own status is less helpful.
-    if (ended_by_limit(fit)) fit.status = FitStatus::gradient_small;
-    fit.distrust(*evidence.limit, evidence.limit_message);
+    if (ended_by_limit(fit)) fit.model.fit.status = FitStatus::gradient_small;
+    fit.model.fit.distrust(*evidence.limit, evidence.limit_message);
   }
   if (!evidence.late_channels.empty()) tell(evidence.late_channels);
   if (!evidence.unexplained.empty()) {
     fit.decisions.push_back(evidence.unexplained);
     fit.findings.insert(fit.findings.begin(), evidence.unexplained);
-    fit.distrust(FitStatus::unexplained, evidence.unexplained);
+    fit.model.fit.distrust(FitStatus::unexplained, evidence.unexplained);
   }
 }
 

@@ -90,7 +90,7 @@ bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions
   start.input_delay_s.resize(0);
   start.output_delay_s.resize(0);
   const FitResult trial = fit_additive_model(frf, start, options);
-  if (trial.status == FitStatus::singular) return false;
+  if (trial.status() == FitStatus::singular) return false;
   if (!(information_criterion(frf, trial) < information_criterion(frf, now))) return false;
   by_delay_ = true;
   back_to_ = std::move(first_);

@@ -38,9 +38,9 @@ class RankedFit {
   FitResult run(const AdditiveModel& start) {
     tied_ = with_coincident_tied(start);
     fit_free();
-    if (free_.status == FitStatus::singular) return std::move(free_);
+    if (free_.status() == FitStatus::singular) return std::move(free_);
     best_ = constrained(tied_);
-    if (best_.status != FitStatus::singular && may_tie()) {
+    if (best_.status() != FitStatus::singular && may_tie()) {
       if (number_ == ModeNumber::chosen) raise();
       settle();
       if (number_ == ModeNumber::asked) make_room();
@@ -81,7 +81,7 @@ class RankedFit {
   /// Adopts a fit that is better. If the current one has not converged, a converged one may be slightly worse (BIC).
   bool adopt(const TiedModel& tied, FitResult&& trial) {
     const bool settles = trial.trustworthy() && !best_.trustworthy();
-    if (trial.status == FitStatus::singular ||
+    if (trial.status() == FitStatus::singular ||
         !(criterion(trial) < criterion(best_) + (settles ? kNothing : 0.0)))
       return false;
     if (!trial.trustworthy() && best_.trustworthy() &&

@@ -85,7 +85,7 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
   for (const StructureMove& other : moves) {
     const FitResult fit = fit_additive_model(frf, other.model, other.options);
     const double criterion = information_criterion(frf, fit);
-    if (fit.status == FitStatus::singular || !(criterion < least)) continue;
+    if (fit.status() == FitStatus::singular || !(criterion < least)) continue;
     least = criterion;
     advice = fmt::format("Try {}: one refit lowers the cost from {:.6g} to {:.6g}", other.flag,
                          same.model.fit.cost, fit.model.fit.cost);
@@ -135,7 +135,7 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
 }
 
 std::string limit_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
-  if (options.limit->was_interrupted() || fit.status == FitStatus::singular)
+  if (options.limit->was_interrupted() || fit.status() == FitStatus::singular)
     return options.limit->message();
   const double budget_s = options.limit->budget_s();
   return fmt::format(

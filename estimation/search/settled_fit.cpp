@@ -77,7 +77,7 @@ std::vector<Simpler> simpler(const FitResult& fit) {
 }
 
 bool may_converge(const FitResult& fit) {
-  return fit.status == FitStatus::iteration_limit || fit.status == FitStatus::cost_stalled;
+  return fit.status() == FitStatus::iteration_limit || fit.status() == FitStatus::cost_stalled;
 }
 
 /// Removes modes that the data do not determine, one by one, if they are not worth their parameters.
@@ -132,11 +132,8 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     fit = std::move(next);
   }
   if (!fit.trustworthy() && simpler(fit).empty() &&
-      fit.deviations < kNearly * options.deviation_tolerance) {
-    fit.status = FitStatus::gradient_small;
-    fit.model.fit.status = to_string(fit.status);
-    fit.model.fit.message.clear();
-  }
+      fit.deviations < kNearly * options.deviation_tolerance)
+    fit.model.fit.status = FitStatus::gradient_small;
   if (!fit.trustworthy()) return first;
   said = std::move(steps);
   return fit;
@@ -145,7 +142,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
 /// Holds the frequencies of suspensions that the lines do not determine, the least determined first.
 void hold_suspensions(const FrfEstimate& frf, const FitOptions& options, FitResult& fit,
                       std::vector<std::string>& said) {
-  while (fit.status != FitStatus::singular) {
+  while (fit.status() != FitStatus::singular) {
     const std::optional<std::size_t> open = least_determined(fit, SubmodelRole::suspension);
     if (!open) return;
     AdditiveModel held = fit.model;

@@ -161,8 +161,8 @@ class PoleSearch {
     FitOptions options = quick_;
     options.max_iterations = 0;
     const FitResult fit = fit_additive_model(frf_, model, options);
-    return fit.status == FitStatus::singular ? std::numeric_limits<double>::infinity()
-                                             : fit.model.fit.cost;
+    return fit.status() == FitStatus::singular ? std::numeric_limits<double>::infinity()
+                                               : fit.model.fit.cost;
   }
 
   const FrfEstimate& frf_;

@@ -207,7 +207,7 @@ bool are_affordable(const FitProblem& problem, const std::vector<IndexRange>& ra
 }
 
 bool has_deviations(const FitResult& result) {
-  return result.status != FitStatus::singular &&
+  return result.status() != FitStatus::singular &&
          std::all_of(result.model.submodels.begin(), result.model.submodels.end(),
                      [](const Submodel& s) { return !s.numerator_std.empty(); });
 }

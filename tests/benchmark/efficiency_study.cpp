@@ -257,7 +257,7 @@ int main(int argc, char** argv) {
     measure_again(stage, request, run);
     const FitResult fit = stageid::fit_additive_model(stage.frf, stage.truth, options);
     if (!fit.trustworthy() || !add(fit, modes)) {
-      fmt::print("run {}: {} ({})\n", run, to_string(fit.status), fit.message);
+      fmt::print("run {}: {} ({})\n", run, to_string(fit.status()), fit.message());
       return 1;
     }
     if (run >= request.blind_fits || request.rank > 0) continue;

@@ -124,7 +124,7 @@ int main(int argc, char** argv) {
                                    : "told",
                100.0 * excess, fit.model.submodels.size(), plant.truth.submodels.size(),
                products.back(), plant.description());
-    if (!right) fmt::print("  {}: {}\n", to_string(fit.status), fit.message);
+    if (!right) fmt::print("  {}: {}\n", to_string(fit.status()), fit.message());
     if (arguments.verbose || !right)
       for (const std::string& decision : fit.decisions) fmt::print("  | {}\n", decision);
     std::fflush(stdout);

@@ -21,7 +21,7 @@ namespace stageid {
 namespace {
 
 ExitCode fit_exit_code(const FitResult& result, bool whole) {
-  if (result.status == FitStatus::interrupted) return kInterrupted;
+  if (result.status() == FitStatus::interrupted) return kInterrupted;
   return result.trustworthy() && whole ? kDone : kNotTrustworthy;
 }
 
@@ -73,13 +73,13 @@ void fit(const FitCommandFlags& flags, Console& console) {
   for (const std::string& line : mode_table(result.model)) console.result(line);
   for (const std::string& line : delay_lines(result.model)) console.result(line);
   console.result(fmt::format("{}: {}, {} ({})", flags.output.string(),
-                             relative_error_text(result.model.fit), to_string(result.status),
-                             result.message));
+                             relative_error_text(result.model.fit), to_string(result.status()),
+                             result.message()));
   const bool whole = told || flags.covariance.empty();
   console.exit_code = fit_exit_code(result, whole);
   console.result({{"output", flags.output.string()},
-                  {"status", to_string(result.status)},
-                  {"message", result.message},
+                  {"status", to_string(result.status())},
+                  {"message", result.message()},
                   {"trustworthy", result.trustworthy()},
                   {"relative_rms_error", result.model.fit.relative_rms_error},
                   {"cost", result.cost},
@@ -96,7 +96,7 @@ void fit(const FitCommandFlags& flags, Console& console) {
   if (!result.trustworthy())
     console.warning(fmt::format(
         "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
-        flags.output.string(), result.message));
+        flags.output.string(), result.message()));
 }
 
 }  // namespace

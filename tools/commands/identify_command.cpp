@@ -234,7 +234,7 @@ class Identification {
         !std::filesystem::exists(path("model.h5")))
       return false;
     const AdditiveModel model = read_model(path("model.json"));
-    return model.fit.status != to_string(FitStatus::interrupted) &&
+    return model.fit.status != FitStatus::interrupted &&
            request_id_of(model.provenance_json) == fit_request_id(setup, frf_fingerprint);
   }
 
@@ -251,10 +251,10 @@ class Identification {
     model_variance_ = std::move(step.result.response_variance);
     add_notes(findings_beside_message(step.result));
     write_model(path("model.json"), model_);
-    if (step.result.status == FitStatus::interrupted) {
+    if (step.result.status() == FitStatus::interrupted) {
       exit_code_ = kInterrupted;
       console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
-                                   step.result.message));
+                                   step.result.message()));
     }
     finish_step("fit", step.seconds,
                 fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
@@ -307,7 +307,7 @@ class Identification {
                  {"trustworthy", verdict_.trustworthy && exit_code_ == kDone},
                  {"reasons", verdict_.reasons},
                  {"fit",
-                  {{"status", model_.fit.status},
+                  {{"status", model_.fit.status_word()},
                    {"weighting", model_.fit.weighting},
                    {"cost", model_.fit.cost},
                    {"relative_rms_error", model_.fit.relative_rms_error},

@@ -161,8 +161,8 @@ void define_fit(py::module_& module) {
   };
   property("model", [](const FitResult& r) { return r.model; });
   property("trustworthy", [](const FitResult& r) { return r.trustworthy(); });
-  property("status", [](const FitResult& r) { return to_string(r.status); });
-  property("message", [](const FitResult& r) { return unless_empty(r.message); });
+  property("status", [](const FitResult& r) { return to_string(r.status()); });
+  property("message", [](const FitResult& r) { return unless_empty(r.message()); });
   property("cost", [](const FitResult& r) { return r.cost; });
   property("decisions", [](const FitResult& r) { return r.decisions; });
   property("removal_cost", [](const FitResult& r) { return r.removal_cost; });

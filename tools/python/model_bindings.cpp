@@ -64,7 +64,7 @@ py::object fit_of(const AdditiveModel& model) {
   const auto [low_hz, high_hz] = fit.band_hz;
   return result(
       "FitRecord", "cost"_a = fit.cost, "weighting"_a = unless_empty(fit.weighting),
-      "iterations"_a = fit.iterations, "status"_a = unless_empty(fit.status),
+      "iterations"_a = fit.iterations, "status"_a = unless_empty(fit.status_word()),
       "relative_rms_error"_a = unless_nan(fit.relative_rms_error),
       "band_hz"_a = high_hz > 0.0 ? py::object(py::make_tuple(low_hz, high_hz)) : py::none());
 }

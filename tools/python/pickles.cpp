@@ -85,27 +85,25 @@ AdditiveModel model_of_state(const py::bytes& state) {
 py::tuple state_of(const FitResult& fit) {
   const FitCovariance& c = fit.covariance;
   return py::make_tuple(
-      state_of(fit.model), static_cast<int>(fit.status), fit.message, fit.parameters, fit.cost,
-      fit.decisions, fit.findings, ranks_state(fit.residue_ranks), fit.removal_cost, fit.held,
-      fit.frozen, fit.response_variance,
+      state_of(fit.model), fit.message(), fit.parameters, fit.cost, fit.decisions, fit.findings,
+      ranks_state(fit.residue_ranks), fit.removal_cost, fit.held, fit.frozen, fit.response_variance,
       py::make_tuple(c.sandwich, c.likelihood, c.response_variance, c.response_radius));
 }
 
 FitResult fit_of_state(const py::tuple& state) {
   FitResult fit;
   fit.model = model_of_state(state[0].cast<py::bytes>());
-  fit.status = static_cast<FitStatus>(state[1].cast<int>());
-  fit.message = state[2].cast<std::string>();
-  fit.parameters = state[3].cast<Eigen::Index>();
-  fit.cost = state[4].cast<std::vector<double>>();
-  fit.decisions = state[5].cast<std::vector<std::string>>();
-  fit.findings = state[6].cast<std::vector<std::string>>();
-  fit.residue_ranks = ranks_of(state[7]);
-  fit.removal_cost = state[8].cast<std::vector<double>>();
-  fit.held = state[9].cast<std::vector<std::size_t>>();
-  fit.frozen = state[10].cast<std::vector<Eigen::Index>>();
-  fit.response_variance = state[11].cast<Eigen::MatrixXd>();
-  const auto covariance = state[12].cast<py::tuple>();
+  fit.model.fit.message = state[1].cast<std::string>();
+  fit.parameters = state[2].cast<Eigen::Index>();
+  fit.cost = state[3].cast<std::vector<double>>();
+  fit.decisions = state[4].cast<std::vector<std::string>>();
+  fit.findings = state[5].cast<std::vector<std::string>>();
+  fit.residue_ranks = ranks_of(state[6]);
+  fit.removal_cost = state[7].cast<std::vector<double>>();
+  fit.held = state[8].cast<std::vector<std::size_t>>();
+  fit.frozen = state[9].cast<std::vector<Eigen::Index>>();
+  fit.response_variance = state[10].cast<Eigen::MatrixXd>();
+  const auto covariance = state[11].cast<py::tuple>();
   fit.covariance = {covariance[0].cast<Eigen::MatrixXd>(), covariance[1].cast<Eigen::MatrixXd>(),
                     covariance[2].cast<Eigen::MatrixXd>(), covariance[3].cast<Eigen::MatrixXd>()};
   return fit;
@@ -129,13 +127,13 @@ std::shared_ptr<LogReader> log_of_state(const py::tuple& state) {
   LogInfo info;
   info.sample_rate_hz = state[1].cast<double>();
   info.period_samples = state[2].cast<int>();
-  info.transient_periods = state[3].cast<int>();
-  info.excitation = channels_of(state[4]);
-  info.actuators = channels_of(state[5]);
-  info.sensors = channels_of(state[6]);
-  info.metadata_json = state[7].cast<std::string>();
+  info.transient_periods = state[2].cast<int>();
+  info.excitation = channels_of(state[3]);
+  info.actuators = channels_of(state[4]);
+  info.sensors = channels_of(state[5]);
+  info.metadata_json = state[6].cast<std::string>();
   return std::make_shared<ArrayLog>(name, std::move(info),
-                                    experiment_arrays(state[8], state[9], state[10], state[11]));
+                                    experiment_arrays(state[7], state[8], state[9], state[10]));
 }
 
 }  // namespace stageid

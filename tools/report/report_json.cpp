@@ -181,7 +181,7 @@ Json model_json(const AdditiveModel& model) {
           {"cost", model.fit.cost},
           {"weighting", model.fit.weighting},
           {"iterations", model.fit.iterations},
-          {"status", model.fit.status},
+          {"status", model.fit.status_word()},
           {"relative_rms_error", model.fit.relative_rms_error},
           {"band_hz", {model.fit.band_hz[0], model.fit.band_hz[1]}},
           {"seconds", model.fit.seconds}};

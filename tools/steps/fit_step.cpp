@@ -101,13 +101,12 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   step.result = fit_model(setup, options);
   const std::vector<Finding> health = health_of(setup.frf.provenance_json);
   const std::vector<std::string> doubts = doubts_about(setup.frf, health);
-  if (!doubts.empty() && !step.result.trustworthy()) {
-    step.result.message = fmt::format("{}; {}", fmt::join(doubts, "; "), step.result.message);
-    step.result.model.fit.message = step.result.message;
-  }
+  FitRecord& record = step.result.model.fit;
+  if (!doubts.empty() && !record.trustworthy())
+    record.message = fmt::format("{}; {}", fmt::join(doubts, "; "), record.message);
   const std::vector<std::string> faults = health_notes(health, Severity::fault);
   if (!faults.empty())
-    step.result.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
+    record.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
   step.seconds = progress.seconds();
   step.result.model.provenance_json =
       provenance(setup, step.result, frf_name, frf_fingerprint, doubts);
@@ -118,7 +117,7 @@ std::vector<std::string> findings_beside_message(const FitResult& result) {
   std::vector<std::string> findings = result.findings;
   if (!result.trustworthy())
     std::erase_if(findings, [&](const std::string& finding) {
-      return result.message.find(finding) != std::string::npos;
+      return result.message().find(finding) != std::string::npos;
     });
   return findings;
 }

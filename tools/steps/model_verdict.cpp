@@ -27,11 +27,12 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
     add(std::move(reason));
   };
   const auto judge_fit = [&] {
-    if (!is_trustworthy(fit))
-      distrust(fit.message.empty() ? "the fit ended with status " + fit.status : fit.message);
+    if (!fit.trustworthy())
+      distrust(fit.message.empty() ? "the fit ended with status " + fit.status_word()
+                                   : fit.message);
   };
   // Faults of the fitted data are in the message of the fit; those of other data come before it.
-  if (fit.status == to_string(FitStatus::faulty_data)) judge_fit();
+  if (fit.status == FitStatus::faulty_data) judge_fit();
   for (std::string& fault : health_notes(health, Severity::fault)) distrust(std::move(fault));
   judge_fit();
   // Doubts come before the residual, because they are the cause if it is too large.

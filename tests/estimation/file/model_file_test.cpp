@@ -56,8 +56,9 @@ AdditiveModel full_model() {
   model.submodels[1].verdict = ModeVerdict::weak;
   for (const Eigen::MatrixXd& B : model.submodels[1].numerator)
     model.submodels[1].numerator_std.push_back(B.cwiseAbs() / 3.0);
-  model.fit = {1.0 / 7.0,  "noise_variance", 12, "unexplained", "the residual is 5 times the noise",
-               0.01 / 3.0, {20.25, 1999.75}, 0.0};
+  model.fit = {
+      1.0 / 7.0,  "noise_variance", 12, FitStatus::unexplained, "the residual is 5 times the noise",
+      0.01 / 3.0, {20.25, 1999.75}, 0.0};
   model.cost_history = {3.0, 1.0 / 3.0, 1.0 / 7.0};
   model.provenance_json = R"({"zulu":1,"inputs":{"b.h5":"1234","a.h5":"5678"}})";
   return model;
@@ -111,6 +112,7 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
   EXPECT_EQ(read.fit.weighting, model.fit.weighting);
   EXPECT_EQ(read.fit.iterations, model.fit.iterations);
   EXPECT_EQ(read.fit.status, model.fit.status);
+  EXPECT_EQ(read.fit.message, model.fit.message);
   EXPECT_EQ(read.fit.relative_rms_error, model.fit.relative_rms_error);
   EXPECT_EQ(read.fit.band_hz[0], model.fit.band_hz[0]);
   EXPECT_EQ(read.fit.band_hz[1], model.fit.band_hz[1]);
@@ -292,6 +294,7 @@ TEST_F(ModelFile, FaultsAreNamedWithTheirPlace) {
            {"/inputs", "[]", "at least one"},
            {"/inputs/1", "7", "string"},
            {"/fit/band_hz", "[1.0]", "two"},
+           {"/fit/status", "\"perfect\"", "gradient_small, step_small"},
            {"/submodels/1/denominator", "[2.0, 0.1, 0.1]", "start with 1"},
            {"/submodels/1/denominator", "[]", "start with 1"},
            {"/submodels/1/denominator", "[1, 0.1, 0]", "end with 0"},

@@ -129,7 +129,7 @@ TEST_F(LowRankFit, ComesCloserToTheTruthAndSaysThatNoiseExplainsTheRest) {
   options_.residue_rank = 1;
   options_.rigid_body_rank = 3;
   const FitResult fit = fit_additive_model(stage_.frf, stage_.truth, options_);
-  ASSERT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LT(second_singular_value(fit.model.submodels[0].numerator[0], 3), 1e-12);
   EXPECT_EQ(fit.model.submodels[0].residue_rank, 3);
   EXPECT_EQ(fit.model.submodels[1].residue_rank, 1);
@@ -234,7 +234,7 @@ TEST(LowRankViscousFit, RecoversComplexShapes) {
   FitOptions options;
   options.residue_rank = 1;
   const FitResult fit = fit_additive_model(test::frf_of(problem), start, options);
-  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9) << fit.message;
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9) << fit.message();
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_LT(
         (fit.model.submodels[i].numerator[1] - problem.model.submodels[i].numerator[1]).norm(),

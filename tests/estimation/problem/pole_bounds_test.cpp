@@ -36,7 +36,7 @@ FitResult fit_from(const FrfEstimate& frf, double first_hz) {
 
 TEST(PoleBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
   const FitResult fit = fit_from(response_of(121.0, -0.002), 120.5);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.submodels[1].damping_ratio(), 1e-5, 1e-8);
   EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), 121.0, 0.1);
   EXPECT_FALSE(fit.model.submodels[1].damping_ratio_std) << "it is not an unknown any more";
@@ -46,7 +46,7 @@ TEST(PoleBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
 TEST(PoleBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
   // From a start inside the lines towards 1 Hz, which is seen as a slope only.
   const FitResult fit = fit_from(response_of(1.0, 0.02), 30.0);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), kLowestLineHz / 4.0, 1e-6);
   EXPECT_FALSE(fit.model.submodels[1].natural_frequency_std_hz);
   EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);

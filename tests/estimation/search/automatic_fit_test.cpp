@@ -104,7 +104,7 @@ testing::Matcher<std::vector<double>> near_hz(std::initializer_list<double> expe
 
 TEST_F(SmallStage, FindsItsModesAndSaysWhatItDid) {
   const FitResult fit = automatic_fit(frf_, {}, {}, {});
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
   EXPECT_EQ(fit.model.submodels.size(), 4U);
   EXPECT_EQ(fit.model.submodels[0].integrators, 2);
@@ -192,7 +192,7 @@ FrfEstimate comb_of(int modes) {
 // There is no largest number: a search that ended at 60 modes was called trustworthy.
 TEST(AutomaticFit, FindsManyModes) {
   const FitResult fit = fit_model(comb_of(70), {});
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_EQ(fit.model.submodels.size(), 70U);
   EXPECT_LT(fit.model.fit.cost, 0.5);
 }
@@ -205,8 +205,8 @@ TEST(AutomaticFit, ModesHiddenByNoiseAreHeldAndToldWhateverTheirNumber) {
     FitRequest request;
     request.modes = {ModesRequest::Kind::count, modes + 2, {}};
     const FitResult fit = fit_model(comb_of(modes), request);
-    EXPECT_EQ(fit.status, FitStatus::undetermined);
-    EXPECT_THAT(fit.message, testing::HasSubstr("the data do not support the modes at"));
+    EXPECT_EQ(fit.status(), FitStatus::undetermined);
+    EXPECT_THAT(fit.message(), testing::HasSubstr("the data do not support the modes at"));
     held += std::ranges::count(fit.model.submodels, true, &Submodel::frequency_held);
     int determined = 0;
     for (const Submodel& s : fit.model.submodels) {
@@ -233,7 +233,7 @@ TEST(AutomaticFit, AGivenNumberOfManyModesIsFoundExactly) {
   const FrfEstimate frf =
       response_of(frequency_hz, 0.005, Eigen::VectorXd::LinSpaced(3000, 0.7, 150.0));
   const FitResult fit = fit_model(frf, request);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
 }
 
@@ -253,7 +253,7 @@ TEST_F(SmallStage, GeneralDampingAndDirectTermAreFoundWhereTheyAre) {
   frf_.response = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
   const FitResult fit = automatic_fit(
       frf_, {.rigid_body = true, .direct_term = true, .general_damping = true}, {}, {});
-  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-7) << fit.message;
+  EXPECT_LT(fit.model.fit.relative_rms_error, 1e-7) << fit.message();
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
 }
 
@@ -282,13 +282,13 @@ TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
                     testing::HasSubstr("use --delay estimate"))));
     EXPECT_LE(frequencies(fit.model).size(), 6U);
     if (denied_s != 0.0) continue;  // such a fit need not converge
-    EXPECT_EQ(fit.status, FitStatus::unexplained) << fit.message;
-    EXPECT_EQ(fit.model.fit.status, "unexplained");
+    EXPECT_EQ(fit.status(), FitStatus::unexplained) << fit.message();
+    EXPECT_EQ(fit.status(), FitStatus::unexplained);
   }
   FitOptions options;
   options.delay = DelayModel::estimate;
   const FitResult fit = automatic_fit(frf_, {}, {}, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_TRUE(fit.findings.empty());
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
 }

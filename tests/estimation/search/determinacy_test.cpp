@@ -49,7 +49,7 @@ TEST(Determinacy, TwoSubmodelsOnOnePoleAreNamed) {
       frf, {{{0, 2, 1}, false, {199.0}, {0.02}}, {{0, 2, 1}, false, {199.0}, {0.02}}});
   EXPECT_FALSE(fit.trustworthy());
   // They remain together, or one of them takes the mode and the other is left with rounding.
-  EXPECT_THAT(fit.message,
+  EXPECT_THAT(fit.message(),
               testing::AnyOf(testing::ContainsRegex("numerators of submodel 1 .* and submodel 2 "),
                              testing::ContainsRegex("submodel [12] .l=0, n=2, m=1.*rounding")));
   expect_stable_and_finite(fit);
@@ -58,8 +58,8 @@ TEST(Determinacy, TwoSubmodelsOnOnePoleAreNamed) {
 TEST(Determinacy, AnOrderThatNoiseFreeDataDoNotHave) {
   const FrfEstimate frf = test::frf_of(test::measured(one_mode(), HoldModel::none, 0.0));
   const FitResult fit = fit_submodels(frf, {{{0, 6, 5}, false, {50.0, 201.0, 700.0}, {}}});
-  EXPECT_EQ(fit.status, FitStatus::undetermined) << fit.message;
-  EXPECT_THAT(fit.message, HasSubstr("submodel 1 (l=0, n=6, m=5"));
+  EXPECT_EQ(fit.status(), FitStatus::undetermined) << fit.message();
+  EXPECT_THAT(fit.message(), HasSubstr("submodel 1 (l=0, n=6, m=5"));
   expect_stable_and_finite(fit);
 }
 
@@ -70,7 +70,7 @@ TEST(Determinacy, ARealPoleThatIsOnlyNoiseIsNotTrusted) {
   const FitResult fit = fit_submodels(
       frf, {{{0, 2, 1}, false, {201.0}, {}}, {{0, 1, 0}, false, {80.0}, {}}}, options);
   EXPECT_FALSE(fit.trustworthy());
-  EXPECT_THAT(fit.message, HasSubstr("submodel 2 (l=0, n=1, m=0"));
+  EXPECT_THAT(fit.message(), HasSubstr("submodel 2 (l=0, n=1, m=0"));
   expect_stable_and_finite(fit);
 }
 
@@ -81,7 +81,7 @@ TEST(Determinacy, ARealPoleFarAboveTheLinesStandsAtItsBound) {
   const FitResult fit =
       fit_submodels(frf, {{{0, 2, 1}, false, {201.0}, {}}, {{0, 1, 0}, false, {900.0}, {}}});
   EXPECT_FALSE(fit.trustworthy());
-  EXPECT_THAT(fit.message, HasSubstr("submodel 2 (l=0, n=1, m=0, pole at 9990 Hz)"));
+  EXPECT_THAT(fit.message(), HasSubstr("submodel 2 (l=0, n=1, m=0, pole at 9990 Hz)"));
   EXPECT_THAT(fit.held, testing::Contains(1U));
   expect_stable_and_finite(fit);
 }
@@ -93,7 +93,7 @@ TEST(Determinacy, DataOfAnUnstablePlantAreNotFittedByAnUnstableModel) {
   for (const std::complex<double> pole : mode_poles(400.0, 0.01)) poles.push_back(-std::conj(pole));
   const FrfEstimate frf = test::frf_of(test::measured({{0, poles, 3}}, HoldModel::none, 0.0));
   const FitResult fit = fit_submodels(frf, {{{0, 4, 3}, false, {201.0, 399.0}, {}}});
-  EXPECT_FALSE(fit.trustworthy()) << fit.message;
+  EXPECT_FALSE(fit.trustworthy()) << fit.message();
   expect_stable_and_finite(fit);
 }
 

@@ -48,7 +48,7 @@ class FitMemory : public testing::Test {
     const test::HeapPeak peak;
     const FitResult result = fit();
     const double taken = static_cast<double>(peak.bytes());
-    ASSERT_TRUE(result.trustworthy()) << result.message;
+    ASSERT_TRUE(result.trustworthy()) << result.message();
     ASSERT_TRUE(result.model.submodels[1].natural_frequency_std_hz);
     EXPECT_LT(taken, made * entry_ + kBeyond * (given() + made * entry_))
         << (given() + taken) / (given() + made * entry_) << " times the data";

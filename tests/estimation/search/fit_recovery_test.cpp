@@ -108,7 +108,7 @@ TEST(FitRecovery, OfModesAndDelayBehindTheHold) {
     options.method = method;
     const FitResult fit =
         fit_additive_model(test::frf_of(problem), start_from(problem, 1.002, 1.6), options);
-    EXPECT_TRUE(fit.trustworthy()) << to_string(fit.status) << ": " << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << to_string(fit.status()) << ": " << fit.message();
     expect_recovered(fit.model, problem.model);
     for (const double delay : fit.model.input_delay_s) EXPECT_NEAR(delay, 1.37e-4, 1e-10);
     EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
@@ -124,7 +124,7 @@ TEST(FitRecovery, OfContinuousDataWithoutSampleRate) {
     options.weighting = weighting;
     const FitResult fit =
         fit_additive_model(test::frf_of(problem), start_from(problem, 1.001, 1.3), options);
-    EXPECT_TRUE(fit.trustworthy()) << to_string(weighting) << ": " << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << to_string(weighting) << ": " << fit.message();
     expect_recovered(fit.model, problem.model);
   }
 }
@@ -139,7 +139,7 @@ TEST(FitRecovery, OfGeneralViscousDampingAndOfADelayAChannel) {
   options.delay = DelayModel::per_channel;
   const FitResult fit =
       fit_additive_model(test::frf_of(problem), start_from(problem, 1.001, 1.3), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   expect_recovered(fit.model, problem.model);
   EXPECT_LT((fit.model.input_delay_s - problem.model.input_delay_s).cwiseAbs().maxCoeff(), 1e-10);
   EXPECT_LT((fit.model.output_delay_s - problem.model.output_delay_s).cwiseAbs().maxCoeff(), 1e-10);
@@ -162,7 +162,7 @@ TEST(FitRecovery, DelaysOfAllChannelsAt40DecibelWithinATenthOfAMicrosecond) {
   AdditiveModel start;
   start.submodels = stage.truth.submodels;
   const FitResult fit = fit_additive_model(stage.frf, start, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.input_delay_s.size(), 13);
   for (const double input : fit.model.input_delay_s)
     for (const double output : fit.model.output_delay_s)
@@ -185,7 +185,7 @@ TEST(FitRecovery, OfSubmodelsThatAreNoModes) {
   start.submodels[0].denominator[1] *= 1.4;
   start.submodels[1].denominator[1] *= 0.7;
   const FitResult fit = fit_additive_model(test::frf_of(problem), start, {});
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   expect_recovered(fit.model, problem.model);
   EXPECT_NEAR(fit.model.submodels[0].denominator[1], 1.0 / 50.0, 1e-9 / 50.0);
   EXPECT_NEAR(fit.model.submodels[1].denominator[1], 1.0 / 900.0, 1e-9 / 900.0);
@@ -205,7 +205,7 @@ TEST(FitRecovery, FromABadStart) {
     options.method = method;
     const FitResult fit =
         fit_additive_model(test::frf_of(problem), start_from(problem, 1.05, 10.0), options);
-    EXPECT_TRUE(fit.trustworthy()) << to_string(method) << ": " << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << to_string(method) << ": " << fit.message();
     expect_recovered(fit.model, problem.model);
     for (std::size_t i = 1; i < fit.cost.size(); ++i)
       EXPECT_LE(fit.cost[i], fit.cost[i - 1]) << "iteration " << i << " of " << to_string(method);
@@ -220,7 +220,7 @@ TEST(FitRecovery, AStartAtTheOptimumStaysPut) {
   options.hold = HoldModel::exact;
   options.delay_s = 1.37e-4;
   const FitResult fit = fit_additive_model(test::frf_of(problem), problem.model, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LE(fit.model.fit.iterations, 2);
   expect_recovered(fit.model, problem.model);
 }
@@ -233,7 +233,7 @@ TEST(FitRecovery, AFitFromItsOwnResultStaysPut) {
   for (std::complex<double>& value : problem.G.reshaped()) value *= 1.0 + 0.02 * random.circular();
   const FrfEstimate frf = test::frf_of(problem);
   const FitResult once = fit_additive_model(frf, start_from(problem, 1.002, 1.5), {});
-  ASSERT_TRUE(once.trustworthy()) << once.message;
+  ASSERT_TRUE(once.trustworthy()) << once.message();
   const FitResult twice = fit_additive_model(frf, once.model, {});
   EXPECT_TRUE(twice.trustworthy());
   EXPECT_LE(twice.model.fit.iterations, 2);
@@ -263,7 +263,7 @@ TEST(FitRecovery, TheDelayIsFoundThoughASharpModeIsOff) {
   options.hold = HoldModel::exact;
   options.delay = DelayModel::estimate;
   const FitResult fit = fit_additive_model(frf, start_from(problem, 1.0015, 1.8), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.input_delay_s[0], 1.356e-4, 1e-8);
 }
 

@@ -76,7 +76,7 @@ TEST(HiddenModes, AFitLeavesHeldPolesWhereTheyAre) {
     AdditiveModel start = placed.model;
     for (std::size_t i = 1; i < 4; ++i) start.submodels[i].denominator[1] *= 1.1;
     const FitResult fit = fit_additive_model(placed.frf, start, placed.options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
     for (std::size_t i = 1; i < 6; ++i)
       EXPECT_EQ(fit.model.submodels[i].denominator == start.submodels[i].denominator, i >= 4) << i;
   }

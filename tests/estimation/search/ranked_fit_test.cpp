@@ -88,7 +88,7 @@ TEST_F(CoincidentModes, TheDistanceFromRankOneIsChiSquareOnlyWhereTheRankIsOne) 
   double sum = 0.0;
   for (int run = 0; run < kRuns; ++run) {
     const FitResult fit = fit_additive_model(measured(), problem_.model, options_);
-    ASSERT_EQ(fit.residue_ranks.size(), 3U) << fit.message;
+    ASSERT_EQ(fit.residue_ranks.size(), 3U) << fit.message();
     EXPECT_EQ(fit.residue_ranks[0].rank, 1);
     EXPECT_EQ(fit.residue_ranks[0].parameters, 4);
     EXPECT_EQ(fit.residue_ranks[1].rank, 2);
@@ -104,7 +104,7 @@ TEST_F(CoincidentModes, OneModeOfRankTwoIsTwoOfRankOne) {
   add_mode(kPlace_hz, 2);
   options_.residue_rank = 1;
   const FitResult fit = automatic_fit(measured(), {}, {}, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.fit.cost, kNoiseCost, 0.05 * kNoiseCost);
   const auto found = modes(fit);
   ASSERT_EQ(found.size(), 2U);
@@ -130,7 +130,7 @@ TEST_F(CoincidentModes, TwoModesThatAreAskedForComeToRest) {
   const FitResult named = automatic_fit(
       frf, {}, {.modes = {{150.0, 0.01, 1}, {150.05, 0.01, 1}}, .keep_modes = true}, options_);
   for (const FitResult* fit : {&asked, &named}) {
-    EXPECT_TRUE(fit->trustworthy()) << fit->message;
+    EXPECT_TRUE(fit->trustworthy()) << fit->message();
     EXPECT_EQ(modes(*fit).size(), 2U);
     EXPECT_NEAR(fit->model.fit.cost, kNoiseCost, 0.05 * kNoiseCost);
   }
@@ -142,7 +142,7 @@ TEST_F(CoincidentModes, OfANumberThatIsAskedForTheLeastMakesRoom) {
   add_mode(260.0, 1);
   options_.residue_rank = 1;
   const FitResult fit = automatic_fit(measured(), {}, {.modes = {}, .exactly = 3}, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(modes(fit).size(), 3U);
   EXPECT_NEAR(modes(fit)[1]->natural_frequency_hz(), kPlace_hz, 0.1);
   EXPECT_NEAR(modes(fit)[2]->natural_frequency_hz(), 260.0, 0.1);
@@ -167,7 +167,7 @@ TEST_F(CoincidentModes, ACloseRankOnePairIsTakenApart) {
   start.submodels.pop_back();
   FitEvidence evidence;
   const FitResult fit = ranked_fit(frf, start, options_, evidence);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   const auto found = modes(fit);
   ASSERT_EQ(found.size(), 2U);
   std::vector<double> f = {found[0]->natural_frequency_hz(), found[1]->natural_frequency_hz()};
@@ -185,7 +185,7 @@ TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
   options_.residue_rank = 1;
   FitEvidence evidence;
   const FitResult fit = ranked_fit(measured(), start, options_, evidence);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_EQ(modes(fit).size(), 2U);
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("one mode fewer at 80")));
 }

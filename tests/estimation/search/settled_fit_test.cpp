@@ -63,7 +63,7 @@ TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
   options_.max_iterations = 3;  // enough for the two modes, which begin where they are
   ASSERT_FALSE(fit_additive_model(frf_, with_a_ghost(), options_).trustworthy());
   const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(count_modes(fit.model), 2);
   for (std::size_t i = 0; i < 2; ++i)
     EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
@@ -83,7 +83,7 @@ TEST_F(SettledFit, AModeBesideTheLinesThatIsNeededKeepsItsPlace) {
   options_.max_iterations = 3;
   ASSERT_FALSE(fit_additive_model(frf_, start, options_).trustworthy());
   const FitResult fit = settled_fit(frf_, start, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(count_modes(fit.model), 3);
   for (std::size_t i = 0; i < 2; ++i)
     EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
@@ -107,7 +107,7 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
   twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
   ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
   const FitResult fit = settled_fit(frf_, twice, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_EQ(count_modes(fit.model), 3);
   ASSERT_FALSE(fit.decisions.empty());
   EXPECT_THAT(fit.decisions.front(), HasSubstr("merged"));
@@ -118,10 +118,10 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   AdditiveModel broad = true_;
   broad.submodels.push_back(test::empty_submodel(true_, 0, test::mode_coefficients(250.0, 0.9), 1));
   const FitResult kept = fit_additive_model(frf_, broad, options_);
-  ASSERT_TRUE(kept.trustworthy()) << kept.message;
+  ASSERT_TRUE(kept.trustworthy()) << kept.message();
   ASSERT_EQ(mode_verdict(frf_, ModeNumber::chosen, kept, 2), ModeVerdict::weak);
   const FitResult fit = settled_fit(frf_, broad, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_EQ(count_modes(fit.model), 2);
   ASSERT_FALSE(fit.decisions.empty());
   EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not support"));
@@ -132,31 +132,31 @@ TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined
   FitResult fit = fit_additive_model(frf_, true_, options_);
   judge(frf_, {}, fit);
   EXPECT_TRUE(fit.findings.empty());
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
-  const FitStatus converged = fit.status;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
+  const FitStatus converged = fit.status();
   fit.held = {1};
   fit.model.submodels[0].damping_ratio_std = 2.0 * fit.model.submodels[0].damping_ratio();
   judge(frf_, {}, fit);
   ASSERT_EQ(fit.findings.size(), 1U);
   EXPECT_THAT(fit.findings[0], HasSubstr(", with a standard deviation as large), 390.0"));
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
-  EXPECT_EQ(fit.status, FitStatus::undetermined);
-  EXPECT_EQ(fit.message, fit.findings[0]);
-  EXPECT_EQ(fit.model.fit.status, "undetermined");
+  EXPECT_EQ(fit.status(), FitStatus::undetermined);
+  EXPECT_EQ(fit.message(), fit.findings[0]);
+  EXPECT_EQ(fit.status(), FitStatus::undetermined);
   EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::weak);
   EXPECT_EQ(fit.model.submodels[1].verdict, ModeVerdict::at_bound);
   fit.findings.clear();
-  fit.status = FitStatus::iteration_limit;  // the reason for not converging comes first
+  fit.model.fit.status = FitStatus::iteration_limit;  // the reason for not converging comes first
   judge(frf_, {}, fit);
   EXPECT_EQ(fit.findings.size(), 1U);
-  EXPECT_EQ(fit.status, FitStatus::iteration_limit);
+  EXPECT_EQ(fit.status(), FitStatus::iteration_limit);
   fit.findings.clear();
-  fit.status = converged;
+  fit.model.fit.status = converged;
   fit.model.fit.band_hz[1] = 300.0;  // outside the lines, a mode represents the rest of the plant
   fit.model.submodels[0].damping_ratio_std = 1e-4;
   judge(frf_, {}, fit);
   EXPECT_TRUE(fit.findings.empty());
-  EXPECT_EQ(fit.status, converged);
+  EXPECT_EQ(fit.status(), converged);
   EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::determined);
   EXPECT_EQ(fit.model.submodels[1].verdict, ModeVerdict::beside_band);
 }
@@ -168,22 +168,22 @@ TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
     return automatic_fit(frf_, {.rigid_body = false}, {.modes = {}, .exactly = modes}, options_);
   };
   const FitResult two = asked(2);
-  EXPECT_TRUE(two.trustworthy()) << two.message;
+  EXPECT_TRUE(two.trustworthy()) << two.message();
   EXPECT_TRUE(two.findings.empty());
   const FitResult three = asked(3);
-  EXPECT_EQ(three.status, FitStatus::undetermined) << three.message;
-  EXPECT_THAT(three.message, HasSubstr("do not interpret them as resonances"));
+  EXPECT_EQ(three.status(), FitStatus::undetermined) << three.message();
+  EXPECT_THAT(three.message(), HasSubstr("do not interpret them as resonances"));
   for (const ModeNumber number : {ModeNumber::chosen, ModeNumber::asked}) {
     const bool number_asked = number == ModeNumber::asked;
     FitResult weak = two;
     weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
     judge(frf_, {.number = number}, weak);
-    EXPECT_EQ(weak.status == FitStatus::undetermined, number_asked);
-    EXPECT_EQ(weak.message.find("390.0") != std::string::npos, number_asked) << weak.message;
+    EXPECT_EQ(weak.status() == FitStatus::undetermined, number_asked);
+    EXPECT_EQ(weak.message().find("390.0") != std::string::npos, number_asked) << weak.message();
     FitResult strong = two;
     strong.removal_cost[1] = 1.1 * price_of_mode(frf_, two, 3.0);
     judge(frf_, {.number = number}, strong);
-    EXPECT_TRUE(strong.trustworthy()) << strong.message;
+    EXPECT_TRUE(strong.trustworthy()) << strong.message();
   }
 }
 
@@ -192,19 +192,19 @@ TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
   halved.submodels.push_back(
       test::empty_submodel(true_, 0, test::mode_coefficients(1.003 * kTrue_hz[1], 0.0101), 1));
   FitResult fit = fit_additive_model(frf_, halved, options_);
-  fit.status = FitStatus::gradient_small;
+  fit.model.fit.status = FitStatus::gradient_small;
   judge(frf_, {.alike = alike_modes(frf_, options_, fit)}, fit);
-  EXPECT_EQ(fit.status, FitStatus::undetermined);
-  EXPECT_THAT(fit.message, HasSubstr("one mode fits as well"));
+  EXPECT_EQ(fit.status(), FitStatus::undetermined);
+  EXPECT_THAT(fit.message(), HasSubstr("one mode fits as well"));
   EXPECT_EQ(fit.model.submodels[2].verdict, ModeVerdict::coincident);
   FitResult sound = fit_additive_model(frf_, true_, options_);
   judge(frf_, {.alike = alike_modes(frf_, options_, sound)}, sound);
-  EXPECT_TRUE(sound.trustworthy()) << sound.message;
+  EXPECT_TRUE(sound.trustworthy()) << sound.message();
 }
 
 TEST_F(SettledFit, AFitThatConvergesIsLeftAlone) {
   const FitResult fit = settled_fit(frf_, true_, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_EQ(count_modes(fit.model), 2);
   EXPECT_TRUE(fit.decisions.empty());
 }

@@ -34,7 +34,7 @@ class StructureSearch : public testing::TestWithParam<std::uint64_t> {};
 TEST_P(StructureSearch, FindsTheStructureOfAPlant) {
   const test::VariedPlant plant = test::draw_varied_plant(GetParam());
   const FitResult fit = fit_model(plant.frf);
-  EXPECT_TRUE(fit.trustworthy()) << plant.description() << ": " << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << plant.description() << ": " << fit.message();
   EXPECT_NEAR(fit.model.fit.cost / cost_of_truth(plant), 1.0, 0.01) << plant.description();
   EXPECT_EQ(fit.model.submodels.size(), plant.truth.submodels.size()) << plant.description();
   EXPECT_EQ(fit.delay, plant.delay);
@@ -61,7 +61,7 @@ TEST(StructureSearchFixed, WhatIsRequestedIsNotChanged) {
   EXPECT_EQ(fit.delay, DelayModel::estimate);
   EXPECT_THAT(fit.decisions, Not(Contains(HasSubstr("structure: "))));
   EXPECT_FALSE(fit.trustworthy());
-  EXPECT_THAT(fit.message, HasSubstr("--damping general"));
+  EXPECT_THAT(fit.message(), HasSubstr("--damping general"));
 }
 
 // A free body with general damping; a suspended one with a mode of rank two; one with both; two whose suspension is first
@@ -73,7 +73,7 @@ TEST(StructureSearchFixed, ANumberOfModesLeavesTheStructureOpen) {
     request.modes.kind = ModesRequest::Kind::count;
     request.modes.count = plant.modes();
     const FitResult fit = fit_model(plant.frf, request);
-    EXPECT_TRUE(fit.trustworthy()) << seed << ": " << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << seed << ": " << fit.message();
     EXPECT_EQ(count_modes(fit.model), plant.modes()) << seed;
     EXPECT_NEAR(fit.model.fit.cost / cost_of_truth(plant), 1.0, 0.01) << seed;
   }
@@ -90,7 +90,7 @@ TEST(StructureSearchFixed, GivenModesLeaveNothingOpen) {
   EXPECT_THAT(fit.decisions, Not(Contains(HasSubstr("structure: "))));
   EXPECT_EQ(count_modes(fit.model), count_modes(plant.truth));
   EXPECT_FALSE(fit.trustworthy());
-  EXPECT_THAT(fit.message, HasSubstr("--damping general"));
+  EXPECT_THAT(fit.message(), HasSubstr("--damping general"));
 }
 
 /// A body on two soft springs far below the lines, and two modes: 2 x 2, white noise of known variance.

@@ -43,7 +43,7 @@ TEST_P(OneDenominator, GivesBackNoiseFreeModes) {
   options.delay_s = 2e-4;
   const FitResult fit =
       fit_one_denominator(test::frf_of(problem), {{0, 2 * K, 2 * K - 1}, false, {}, {}}, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 1U);
   // Digits go with the square of the condition of s^m / A, which is 5e3 for eight modes.
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
@@ -60,7 +60,7 @@ TEST_P(OneDenominator, HasTheCostAndTheDeviationsOfItsModes) {
   options.weighting = Weighting::noise_variance;
   const FitResult one = fit_one_denominator(frf, {{0, 2 * K, 2 * K - 1}, false, {}, {}}, options);
   const FitResult apart = fit_additive_model(frf, problem.model, options);
-  EXPECT_TRUE(one.trustworthy()) << one.message;
+  EXPECT_TRUE(one.trustworthy()) << one.message();
   EXPECT_NEAR(one.model.fit.cost, apart.model.fit.cost, 1e-7 * apart.model.fit.cost);
   const std::vector<PoleEstimate>& poles = one.model.submodels[0].poles;
   ASSERT_EQ(poles.size(), static_cast<std::size_t>(K));
@@ -85,7 +85,7 @@ TEST(StructuredFit, OfAutomaticOrderTakesAsManyModesAsThereAre) {
   options.weighting = Weighting::noise_variance;
   const FitResult fit =
       fit_one_denominator(test::noisy(problem, 1e-3, 8), {{}, true, {}, {}}, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 1U);
   EXPECT_EQ(fit.model.submodels[0].denominator.size(), 7U);
   EXPECT_EQ(fit.model.submodels[0].numerator.size(), 6U);
@@ -116,7 +116,7 @@ TEST(StructuredFit, FindsThePolesThatNobodyGaveBesideGivenModes) {
   FitOptions options;
   options.max_iterations = 300;
   const FitResult fit = structured_fit(test::frf_of(problem), mixed_request(), given, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
   ASSERT_EQ(fit.model.submodels.size(), 5U);
   EXPECT_NEAR(fit.model.submodels[1].poles.at(0).natural_frequency_hz, 60.0, 1e-6);
@@ -134,7 +134,7 @@ TEST(StructuredFit, ASearchBesideKeepsWhatWasGiven) {
   FitOptions options;
   options.weighting = Weighting::noise_variance;
   const FitResult fit = structured_fit(test::noisy(problem, 1e-4, 3), structure, {}, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 5U);
   EXPECT_EQ(fit.model.submodels[2].denominator.size(), 5U);
   EXPECT_NEAR(fit.model.submodels[3].natural_frequency_hz(), 420.0, 0.1);

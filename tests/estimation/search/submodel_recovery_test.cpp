@@ -71,7 +71,7 @@ TEST_P(SubmodelRecovery, ByEveryDescentMethodThroughHoldAndDelay) {
       const FitResult fit =
           fit_additive_model(test::frf_of(problem), start_of(parts, problem), options);
       EXPECT_TRUE(fit.trustworthy())
-          << to_string(hold) << ", " << to_string(method) << ": " << fit.message;
+          << to_string(hold) << ", " << to_string(method) << ": " << fit.message();
       expect_recovered(fit.model, problem.model);
       EXPECT_NEAR(fit.model.input_delay_s[0], delay_s, 1e-10);
     }
@@ -86,7 +86,7 @@ TEST_P(SubmodelRecovery, BySanathananAndKoerner) {
   options.max_iterations = 200;
   const FitResult fit =
       fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   expect_recovered(fit.model, problem.model);
 }
 
@@ -103,7 +103,7 @@ TEST_P(SubmodelRecovery, UnderWeightMatrices) {
   options.max_iterations = 200;
   const FitResult fit =
       fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   expect_recovered(fit.model, problem.model);
 }
 

@@ -34,7 +34,7 @@ FitResult fit_suspended(const FrfEstimate& frf, std::vector<double> known_hz, Fi
 TEST(Suspension, IsFoundFarBelowTheLines) {
   const test::DenseProblem problem = suspended(0.4);
   const FitResult fit = fit_suspended(test::frf_of(problem), {}, {});
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 2U);
   // The frequency affects the response by only (0.4/5)^2.
   EXPECT_NEAR(fit.model.submodels[0].natural_frequency_hz(), 0.4, 1e-6);
@@ -69,7 +69,7 @@ TEST(Suspension, IsFoundWhereItIsWorthItsParameters) {
   const test::DenseProblem problem = test::measured(
       {{0, mode_poles(0.2, 0.1), 0}, {0, mode_poles(300.0, 0.01), 0}}, HoldModel::exact, delay_s);
   const FitResult fit = fit_by_default(problem, 3e-8);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("--rigid-body suspension")));
   ASSERT_EQ(fit.model.submodels.size(), 2U);
   EXPECT_EQ(fit.model.submodels[0].role, SubmodelRole::suspension);
@@ -82,7 +82,7 @@ TEST(Suspension, IsNotFoundUnderAFreeBody) {
   const test::DenseProblem problem =
       test::measured({{2, {}, 0}, {0, mode_poles(300.0, 0.01), 0}}, HoldModel::exact, 2e-4);
   const FitResult fit = fit_by_default(problem, 1e-5);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 2U);
   EXPECT_EQ(fit.model.submodels[0].integrators, 2);
 }
@@ -92,7 +92,7 @@ TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
   options.weighting = Weighting::noise_variance;
   // (0.05/5)^2 = 1e-4 of the largest line, under noise of a tenth of the mean.
   const FitResult fit = fit_suspended(test::noisy(suspended(0.05), 0.1, 6), {}, options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_FALSE(fit.model.submodels[0].natural_frequency_std_hz);
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("do not support an estimate of the frequency")));
   EXPECT_THAT(fit.held, Contains(0U));
@@ -110,7 +110,7 @@ TEST(Suspension, ThatIsHeldLeavesSurplusModesFlagged) {
   const FitResult fit =
       structured_fit(test::noisy(suspended(0.05), 0.1, 6), structure, modes, options);
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("held")));
-  EXPECT_EQ(fit.status, FitStatus::undetermined) << fit.message;
+  EXPECT_EQ(fit.status(), FitStatus::undetermined) << fit.message();
 }
 
 TEST(Suspension, OfKnownFrequenciesKeepsThem) {
@@ -118,7 +118,7 @@ TEST(Suspension, OfKnownFrequenciesKeepsThem) {
       {{0, mode_poles(0.3, 0.1), 0}, {0, mode_poles(0.8, 0.1), 0}, {0, mode_poles(300.0, 0.01), 0}},
       HoldModel::none, 0.0);
   const FitResult fit = fit_suspended(test::frf_of(problem), {0.3, 0.8}, {});
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.submodels[0].natural_frequency_hz(), 0.3, 1e-12);
   EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), 0.8, 1e-12);
   EXPECT_NEAR(fit.model.submodels[0].damping_ratio(), 0.1, 1e-3);

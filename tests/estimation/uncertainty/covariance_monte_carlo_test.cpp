@@ -35,7 +35,7 @@ void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool te
     frf.response = noisy(random, problem, variance);
     if (tell_variance) frf.noise_variance = variance;
     const FitResult fit = fit_additive_model(frf, problem.model, options);
-    ASSERT_TRUE(fit.trustworthy()) << fit.message;
+    ASSERT_TRUE(fit.trustworthy()) << fit.message();
     for (Eigen::Index i = 0; i < 3; ++i) {
       const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i) + 1];
       values(2 * i, run) = s.natural_frequency_hz();

@@ -30,7 +30,7 @@ void expect_honest(DelayModel delay) {
   for (int run = 0; run < kRuns; ++run) {
     const FrfEstimate frf = test::noisy_frf(random, problem, problem.W.cwiseInverse());
     const FitResult fit = fit_additive_model(frf, problem.model, options);
-    ASSERT_TRUE(fit.trustworthy()) << fit.message;
+    ASSERT_TRUE(fit.trustworthy()) << fit.message();
     ASSERT_EQ(fit.model.input_delay_std_s.size(), 3);
     ASSERT_EQ(fit.model.output_delay_std_s.size(), 2);
     values.col(run) = joined(fit.model.input_delay_s, fit.model.output_delay_s);

@@ -65,7 +65,7 @@ TEST(LikelihoodFit, EndsWhereTheDenseFirstOrderConditionHolds) {
   FitOptions options = options_with(Weighting::likelihood);
   options.deviation_tolerance = 1e-7;
   const FitResult fit = fit_additive_model(m.frf, m.start(), options);
-  ASSERT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LT(fit.deviations, 1e-3);  // before the last step
   for (std::size_t i = 1; i < fit.cost.size(); ++i) EXPECT_LT(fit.cost[i], fit.cost[i - 1]);
   DenseProblem at = m.problem;
@@ -151,7 +151,7 @@ TEST(LikelihoodFit, IsTheDiagonalFitWhereNothingIsCorrelated) {
 /// over J C J^H, n_c x N.
 Eigen::MatrixXd expect_fisher_deviations(const Measurement& m) {
   const FitResult fit = fit_additive_model(m.frf, m.start(), options_with(Weighting::likelihood));
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   DenseProblem at = m.problem;
   at.model = fit.model;
   const Eigen::MatrixXd C =
@@ -198,7 +198,7 @@ TEST(LikelihoodFit, WholeMatricesOfAUserGiveTheSameModel) {
   const FitResult whole = fit_additive_model(m.frf, m.start(), options);
   const FitResult factors =
       fit_additive_model(m.frf, m.start(), options_with(Weighting::likelihood));
-  ASSERT_TRUE(whole.trustworthy()) << whole.message;
+  ASSERT_TRUE(whole.trustworthy()) << whole.message();
   EXPECT_NEAR(whole.model.fit.cost, factors.model.fit.cost, 1e-9 * factors.model.fit.cost);
   const double parameters = 4.0 * 6.0 + 6.0 + 1.0;
   const auto N = static_cast<double>(m.frf.lines());
@@ -240,7 +240,7 @@ TEST(LikelihoodFit, AutomaticFitChoosesByTheDiagonalAndEndsWithTheLikelihood) {
   const Measurement m;
   const FitResult fit =
       automatic_fit(m.frf, {.rigid_body = true}, {}, options_with(Weighting::likelihood));
-  ASSERT_TRUE(fit.trustworthy()) << fit.message;
+  ASSERT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 4U);
   EXPECT_EQ(fit.model.fit.weighting, "likelihood");
   const double expected = dense_cost(fit.model, m.frf, m.noise);
@@ -258,9 +258,9 @@ TEST(LikelihoodFit, ModesAtABoundAreHeld) {
   start.submodels.push_back(
       test::empty_submodel(m.problem.model, 0, test::mode_coefficients(4.0, 0.3), 1));
   const FitResult fit = fit_additive_model(m.frf, start, options_with(Weighting::likelihood));
-  EXPECT_TRUE(std::isfinite(fit.model.fit.cost)) << fit.message;
+  EXPECT_TRUE(std::isfinite(fit.model.fit.cost)) << fit.message();
   for (std::size_t i = 1; i < fit.cost.size(); ++i) EXPECT_LT(fit.cost[i], fit.cost[i - 1]);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message;
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
   const Submodel& held = fit.model.submodels.back();
   EXPECT_GE(held.natural_frequency_hz(), 4.0 * (1.0 - 1e-6));  // the start's own, below 20 Hz / 4
   EXPECT_LE(held.damping_ratio(), 0.9 * (1.0 + 1e-9));

@@ -32,7 +32,7 @@ Repeated repeat(Weighting weighting, int dof) {
   for (int run = 0; run < kRuns; ++run) {
     const Measurement m(static_cast<std::uint64_t>(1000 + run), dof);
     const FitResult fit = fit_additive_model(m.frf, m.problem.model, options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
     for (Eigen::Index i = 0; i < 3; ++i) {
       const auto at = static_cast<std::size_t>(i) + 1;
       const Submodel& s = fit.model.submodels[at];

@@ -49,7 +49,7 @@ Repeated repeat(Weighting weighting, int residue_rank = 1) {
   for (int run = 0; run < kRuns; ++run) {
     FrfEstimate frf = stage.measured_with(static_cast<std::uint64_t>(3000 + run));
     const FitResult fit = fit_additive_model(frf, stage.problem.model, options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
     const Eigen::VectorXd value = quantities(fit.model, false);
     if (run == 0) {
       values.resize(value.size(), kRuns);

@@ -110,7 +110,7 @@ Repeated repeat(const test::DenseProblem& problem, const FitOptions& options,
   for (int run = 0; run < kRuns; ++run) {
     const FrfEstimate frf = measured(run);
     FitResult fit = fit_additive_model(frf, problem.model, options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message;
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
     fill_shape_deviations(frf, options, fit);
     fill_covariance(frf, options, fit);
     std::vector<double> value;

@@ -86,7 +86,7 @@ class Covariance : public testing::Test {
   /// Fits, with the weights of the library and data of this variance.
   void expect_dense(Weighting weighting, const Eigen::MatrixXd& variance) const {
     const FitResult found = fit(weighting);
-    ASSERT_TRUE(found.trustworthy()) << found.message;
+    ASSERT_TRUE(found.trustworthy()) << found.message();
     expect_dense(found, make_weights(frf_, options_with(weighting)), variance);
   }
   /// sum W |E|^2 over its degrees of freedom.
@@ -144,7 +144,7 @@ TEST_F(Covariance, WithoutVariancesIsScaledByTheResidual) {
   frf_ = noisy_frf(random, problem_, 1e-4 * problem_.G.cwiseAbs2());
   frf_.noise_variance.resize(0, 0);
   const FitResult relative = fit(Weighting::relative);
-  ASSERT_TRUE(relative.trustworthy()) << relative.message;
+  ASSERT_TRUE(relative.trustworthy()) << relative.message();
   const Eigen::MatrixXd W = frf_.response.cwiseAbs2().cwiseInverse();
   expect_dense(relative, W, residual_over_degrees(relative) * W.cwiseInverse());
 }
@@ -184,7 +184,7 @@ TEST_F(Covariance, CountsTheCorrelationOfTheOutputs) {
   frf_.residual_covariance_im.colwise() =  // (2,1) before (1,2): columns are stacked
       Eigen::Vector4d(0.0, -a * b * rho.imag(), a * b * rho.imag(), 0.0);
   const FitResult found = fit(Weighting::noise_variance);
-  ASSERT_TRUE(found.trustworthy()) << found.message;
+  ASSERT_TRUE(found.trustworthy()) << found.message();
 
   const Eigen::MatrixXcd J = dense_jacobian(problem_, found);
   const Eigen::VectorXd W = problem_.W.reshaped();

@@ -132,8 +132,8 @@ std::string BlindFit::report() const {
       "{}: {} modes of {}, cost {:.6g} ({:+.3g} % of that from the truth, which is {:.6g}: {} {}), "
       "{} after {} iterations ({}), {:.2f} s\n",
       success ? "success" : "FAILURE", found_modes, true_modes, blind.model.fit.cost,
-      100.0 * excess_cost, from_truth.model.fit.cost, to_string(from_truth.status),
-      from_truth.message, to_string(blind.status), blind.model.fit.iterations, blind.message,
+      100.0 * excess_cost, from_truth.model.fit.cost, to_string(from_truth.status()),
+      from_truth.message(), to_string(blind.status()), blind.model.fit.iterations, blind.message(),
       seconds);
   for (const double f : missed_hz) text += fmt::format("  missed   {:.3f} Hz\n", f);
   for (const double f : spurious_hz) {

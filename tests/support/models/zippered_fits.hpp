@@ -57,7 +57,7 @@ inline FitTrials repeat_fits(const SampledPlant& plant, const std::vector<PlantM
     fit_options.response_variance = false;
     const AdditiveModel truth = model_with(modes, frf);
     const FitResult fit = fit_additive_model(frf, truth, fit_options);
-    if (!fit.trustworthy()) throw std::runtime_error("fit: " + fit.message);
+    if (!fit.trustworthy()) throw std::runtime_error("fit: " + fit.message());
     for (std::size_t i = 0; i < modes.size(); ++i) {
       const auto f = static_cast<Eigen::Index>(2 * i);
       const Submodel& found = fit.model.submodels[i];

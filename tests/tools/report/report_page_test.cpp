@@ -142,7 +142,7 @@ TEST(Report, NoTextCanLeaveItsPlace) {
   data.steps = {{attack, 1.0, attack}};
   data.doubts = data.notes = {attack};
   data.runs[0].name = data.runs[0].started_utc = attack;
-  data.model->fit.status = attack;
+  data.model->fit.weighting = attack;
   data.frf->excluded_channels[0] = attack;
   const std::string page = report_page(data);
   EXPECT_EQ(count(page, "<script"), count(report_page(plain), "<script"));

@@ -209,7 +209,6 @@ void make_hostile(ReportData& data) {
   data.steps.push_back({attack, 1.0, attack});
   data.runs[0].name = attack;
   data.runs[0].started_utc = attack;
-  data.model->fit.status = attack;
   data.model->fit.weighting = attack;
 }
 

@@ -53,11 +53,12 @@ TEST(Verdict, AFaultOfTheDataIsNotTrustedAndADoubtIsDoubted) {
 
 // What `fit` ends with exit code 3 for is not trusted on the page either.
 TEST(Verdict, AFitThatEndedBadlyIsNotTrusted) {
-  for (const char* status : {"iteration_limit", "cost_stalled", "singular", "undetermined",
-                             "unexplained", "faulty_data"}) {
+  for (const FitStatus status :
+       {FitStatus::iteration_limit, FitStatus::cost_stalled, FitStatus::singular,
+        FitStatus::undetermined, FitStatus::unexplained, FitStatus::faulty_data}) {
     ReportData data = sound();
     data.model->fit.status = status;
-    expect_bad(data, status);
+    expect_bad(data, to_string(status));
     data.model->fit.message = "the data have a reason";
     expect_bad(data, "the data have a reason");
   }

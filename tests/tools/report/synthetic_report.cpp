@@ -285,7 +285,7 @@ ReportData synthetic_report(const SyntheticSize& size) {
   data.model->fit = {.cost = data.model->cost_history.back(),
                      .weighting = "total_variance",
                      .iterations = 34,
-                     .status = "gradient_small",
+                     .status = FitStatus::gradient_small,
                      .message = {},
                      .relative_rms_error = data.validation->relative_rms_error,
                      .band_hz = {data.frf->frequency_hz[0], data.frf->frequency_hz[size.lines - 1]},

@@ -11,7 +11,7 @@ using testing::HasSubstr;
 
 AdditiveModel fitted_to_drifting_data() {
   AdditiveModel model;
-  model.fit.status = "gradient_small";
+  model.fit.status = FitStatus::gradient_small;
   model.provenance_json = R"({"doubts": ["a mode drifts"]})";
   return model;
 }
@@ -42,7 +42,7 @@ TEST(ModelVerdict, TrustsAModelWithDoubtsThatHolds) {
 
 TEST(ModelVerdict, SaysACauseOnceThatTheFitHasNamed) {
   AdditiveModel model = fitted_to_drifting_data();
-  model.fit.status = "unexplained";
+  model.fit.status = FitStatus::unexplained;
   model.fit.message = "a mode drifts; the residual is 9 times what noise explains";
   EXPECT_THAT(judge_model(model, {}, {}).reasons, ElementsAre(model.fit.message));
 }
