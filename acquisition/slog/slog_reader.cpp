@@ -101,10 +101,10 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
     const double* rows = piece.get() + static_cast<std::size_t>(from - row) * words;
     const auto count = static_cast<std::size_t>(end - from);
     const auto to = static_cast<std::size_t>(from - target.first);
-    const bool finite =
-        transpose_rows(rows, words, count, actuators, target.out.actuators.data() + to, stride) &
-        transpose_rows(rows + actuators, words, count, sensors, target.out.sensors.data() + to,
-                       stride);
+    bool finite =
+        transpose_rows(rows, words, count, actuators, target.out.actuators.data() + to, stride);
+    finite &= transpose_rows(rows + actuators, words, count, sensors,
+                             target.out.sensors.data() + to, stride);
     for (std::size_t r = 0; r < count; ++r) {
       std::uint64_t status = 0;
       std::memcpy(&status, rows + r * words + words - 1, sizeof status);

@@ -95,15 +95,15 @@ void LimitedStage::stop() noexcept {
 // Fast path: one pass without branches, because nearly every command is within all limits.
 void LimitedStage::apply(std::uint64_t cycle) noexcept {
   const double fresh = 1.0 - decay_;
-  int outside = 0;
+  bool outside = false;
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     const double u = wanted_[i];
     // This form counts NaN as outside.
-    const bool inside = (std::abs(u) <= largest_n_[i]) & (std::abs(u - applied_[i]) <= step_n_[i]) &
-                        (decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
-    outside |= static_cast<int>(!inside);
+    outside |= !(std::abs(u) <= largest_n_[i]);
+    outside |= !(std::abs(u - applied_[i]) <= step_n_[i]);
+    outside |= !(decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
   }
-  for (Eigen::Index i = 0; outside != 0 && i < wanted_.size(); ++i)
+  for (Eigen::Index i = 0; outside && i < wanted_.size(); ++i)
     wanted_[i] = limit_channel(i, wanted_[i], cycle);
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     applied_[i] = wanted_[i];

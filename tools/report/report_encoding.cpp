@@ -42,7 +42,7 @@ Eigen::MatrixXcd encode_each(const Eigen::MatrixXcd& values, const Expectation& 
 }
 
 float to_float(double value) {
-  constexpr double most = std::numeric_limits<float>::max();
+  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
   return static_cast<float>(std::clamp(value, -most, most));
 }
 

@@ -14,6 +14,8 @@
 namespace stageid {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 /// Largest relative frequency difference of two modes that are considered the same.
 constexpr double kFarthest = 0.05;
 
@@ -148,7 +150,6 @@ std::string truth_error_line(const TruthComparison& comparison) {
 }
 
 nlohmann::ordered_json truth_json(const TruthComparison& comparison) {
-  using Json = nlohmann::ordered_json;
   Json modes = Json::array();
   for (const ModeComparison& m : comparison.modes) {
     Json mode = {{"true_frequency_hz", m.true_frequency_hz},

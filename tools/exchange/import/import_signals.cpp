@@ -90,8 +90,10 @@ SampleRows samples_of(const ArrayList& arrays, const NamedArray& array,
   }
   if (values.empty()) arrays.fail(array.name, "is empty; expected samples");
   using Steps = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>;
-  return Eigen::Map<const SampleRows, 0, Steps>(values.data() + first, sample.extent,
-                                                channel.extent, Steps(sample.step, channel.step));
+  const auto index = [](std::size_t value) { return static_cast<Eigen::Index>(value); };
+  return Eigen::Map<const SampleRows, 0, Steps>(values.data() + first, index(sample.extent),
+                                                index(channel.extent),
+                                                Steps(index(sample.step), index(channel.step)));
 }
 
 void name_channels(const ImportMap& map, const char* key, const ImportMap::Signals& group,

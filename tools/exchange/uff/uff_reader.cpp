@@ -131,7 +131,7 @@ std::vector<double> binary_values(TextLines& lines, const DataForm& form, std::e
     std::vector<double> values;
     const char* at = rest.data();
     const auto read = [&](std::size_t bytes) {
-      values.push_back(bytes == 4 ? double{raw_number<float>(at, big_endian)}
+      values.push_back(bytes == 4 ? static_cast<double>(raw_number<float>(at, big_endian))
                                   : raw_number<double>(at, big_endian));
       at += bytes;
     };
