@@ -10,13 +10,13 @@ from browser import Browser, expect, find_browser, skipped, verdict
 READY = "document.readyState === 'complete' && window.stageidReport.shapes.figure !== null"
 
 
-def open_page(page, width=1280, part="", ready=READY, still=False):
+def open_page(page, width=1280, ready=READY, still=False):
     """A browser that shows the page, from the moment that it is ready on."""
     browser = Browser(find_browser())
     browser.resize(width, 1000)
     browser.call("Emulation.setEmulatedMedia",
                  features=[{"name": "prefers-reduced-motion", "value": "reduce" if still else "no-preference"}])
-    browser.call("Page.navigate", url=f"file://{page}{part}")
+    browser.call("Page.navigate", url=f"file://{page}")
     expect(browser.wait_for(ready, 900), "the page does not come up")
     return browser
 

@@ -15,8 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// As summaryOf() of tools/report/js/selftest.js: channel after channel, float32 where the page has
-/// it.
+/// As summaryOf() of selftest.js: channel after channel, float32 where the page has it.
 class Summary {
  public:
   explicit Summary(bool floats) : floats_(floats) {}

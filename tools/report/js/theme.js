@@ -41,8 +41,7 @@ function print(on) {
 window.addEventListener('beforeprint', () => print(true));
 window.addEventListener('afterprint', () => print(false));
 
-// Head and tables are shown at once, the plots a moment later. The self-check does not wait.
+// Head and tables are shown at once, the plots a moment later.
 function afterFirstPaint(work) {
-  if (location.hash === '#selftest') work();
-  else requestAnimationFrame(() => setTimeout(work));
+  requestAnimationFrame(() => setTimeout(work));
 }

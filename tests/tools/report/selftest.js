@@ -1,12 +1,22 @@
-// report.html#selftest checks itself and writes the findings as JSON into the element "selftest". The browser test of
-// the program reads it; anyone else can too.
+// check_report.py appends this file to the script of a page, because the functions of the page are local to its script.
+// The promise window.selfTest resolves to the findings as JSON.
 
-async function selfTest(startedMs) {
-  const builtMs = performance.now();
-  await new Promise((done) => setTimeout(done, 100));  // figures are drawn when they get their size
+window.selfTest = selfTest().finally(() => { window.selfTestEnded = true; });
+
+function delay(ms) {
+  return new Promise((done) => setTimeout(done, ms));
+}
+
+async function selfTest() {
+  const { errors } = window.stageidReport;
+  while (!window.stageidReport.shapes) {  // until the page is built
+    if (errors.length) throw new Error(errors.join('; '));
+    await delay(20);
+  }
+  await new Promise(afterFirstPaint);
+  await delay(100);  // figures are drawn when they get their size
   const findings = {
     title: document.title, verdict: content.verdict.level, sections: Array.from(document.querySelectorAll('main > section'), (s) => s.id),
-    ready_ms: Math.round(builtMs), script_ms: Math.round(builtMs - startedMs),
     width: window.innerWidth, overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
     injected: document.querySelectorAll('main img, main iframe, main script, header img, header script, [onerror]').length,
   };
@@ -30,8 +40,8 @@ async function selfTest(startedMs) {
   findings.saved = await savedCheck();
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
     .reduce((a, b) => a + b, 0);
-  findings.errors = window.stageidReport.errors;
-  document.body.append(element('script', { type: 'application/json', id: 'selftest' }, JSON.stringify(findings).replace(/</g, '\\u003c')));
+  findings.errors = errors;
+  return JSON.stringify(findings);
 }
 
 // Once per canvas: browsers warn about more.
