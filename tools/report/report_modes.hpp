@@ -24,9 +24,8 @@ struct ModeRow {
   std::optional<double> relative_frequency_error() const;
 };
 
-/// Pairs the modes of a model with true ones, one to one and in the order of frequency, such that the number of pairs
-/// is largest and the sum of |f - f_true| / f_true smallest; no pair differs by more than 2 %. Rows by
-/// frequency (that of the truth if nothing was identified).
+/// Pairs the modes of a model with true ones, see pair_with_truth(). Rows by frequency (that of the truth if nothing was
+/// identified).
 std::vector<ModeRow> mode_table(const AdditiveModel& model, std::span<const TrueMode> truth);
 
 }  // namespace stageid

@@ -19,12 +19,6 @@ using Json = nlohmann::ordered_json;
 /// Largest relative frequency difference of two modes that are considered the same.
 constexpr double kFarthest = 0.05;
 
-struct Pair {
-  double distance = 0.0;
-  std::size_t truth = 0;
-  std::size_t estimate = 0;
-};
-
 std::vector<const Submodel*> modes_of(const AdditiveModel& model) {
   std::vector<const Submodel*> modes;
   for (const Submodel& s : model.submodels)
@@ -34,20 +28,15 @@ std::vector<const Submodel*> modes_of(const AdditiveModel& model) {
 
 void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf,
            TruthComparison& out) {
-  std::vector<Pair> pairs;
-  for (std::size_t t = 0; t < out.modes.size(); ++t)
-    for (std::size_t e = 0; e < estimated.size(); ++e) {
-      const double f = out.modes[t].true_frequency_hz;
-      const double distance = std::abs(estimated[e]->natural_frequency_hz() - f) / f;
-      if (distance < kFarthest) pairs.push_back({distance, t, e});
-    }
-  std::ranges::stable_sort(pairs, {}, &Pair::distance);
-  std::vector<bool> taken(estimated.size(), false);
-  for (const Pair& pair : pairs) {
-    ModeComparison& mode = out.modes[pair.truth];
-    if (mode.found || taken[pair.estimate]) continue;
-    const Submodel& s = *estimated[pair.estimate];
-    taken[pair.estimate] = true;
+  std::vector<double> true_hz;
+  for (const ModeComparison& mode : out.modes) true_hz.push_back(mode.true_frequency_hz);
+  std::vector<double> estimated_hz;
+  for (const Submodel* s : estimated) estimated_hz.push_back(s->natural_frequency_hz());
+  const auto partner = pair_with_truth(true_hz, estimated_hz);
+  for (std::size_t t = 0; t < partner.size(); ++t) {
+    if (!partner[t]) continue;
+    ModeComparison& mode = out.modes[t];
+    const Submodel& s = *estimated[*partner[t]];
     mode.found = true;
     mode.frequency_hz = s.natural_frequency_hz();
     mode.damping = s.damping_ratio();
@@ -57,9 +46,10 @@ void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf
   // Modes outside the lines represent the rest of the plant there: suspension, modes above the band.
   const double low_hz = frf.frequency_hz[0];
   const double high_hz = frf.frequency_hz[frf.lines() - 1];
-  for (std::size_t e = 0; e < estimated.size(); ++e) {
-    const double f = estimated[e]->natural_frequency_hz();
-    if (!taken[e]) (f < low_hz || f > high_hz ? out.outside_hz : out.extra_hz).push_back(f);
+  for (std::size_t e = 0; e < estimated_hz.size(); ++e) {
+    const double f = estimated_hz[e];
+    if (std::ranges::find(partner, std::optional(e)) == partner.end())
+      (f < low_hz || f > high_hz ? out.outside_hz : out.extra_hz).push_back(f);
   }
 }
 
@@ -84,6 +74,30 @@ std::string deviation(double value, double std) {
 }
 
 }  // namespace
+
+std::vector<std::optional<std::size_t>> pair_with_truth(const std::vector<double>& true_hz,
+                                                        const std::vector<double>& estimated_hz) {
+  struct Pair {
+    double distance = 0.0;
+    std::size_t truth = 0;
+    std::size_t estimate = 0;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t t = 0; t < true_hz.size(); ++t)
+    for (std::size_t e = 0; e < estimated_hz.size(); ++e) {
+      const double distance = std::abs(estimated_hz[e] - true_hz[t]) / true_hz[t];
+      if (distance < kFarthest) pairs.push_back({distance, t, e});
+    }
+  std::ranges::stable_sort(pairs, {}, &Pair::distance);
+  std::vector<std::optional<std::size_t>> partner(true_hz.size());
+  std::vector<bool> taken(estimated_hz.size(), false);
+  for (const Pair& pair : pairs) {
+    if (partner[pair.truth] || taken[pair.estimate]) continue;
+    partner[pair.truth] = pair.estimate;
+    taken[pair.estimate] = true;
+  }
+  return partner;
+}
 
 double ModeComparison::frequency_deviation() const {
   return frequency_std_hz > 0.0 ? (frequency_hz - true_frequency_hz) / frequency_std_hz : 0.0;

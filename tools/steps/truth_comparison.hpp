@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,12 @@
 
 namespace stageid {
 
-/// A mode of the simulated plant and the nearest estimated one.
+/// Pairs true modes with estimated ones, one to one, the nearest first; every pair differs by less than 5 %.
+/// @returns per true mode the index of its estimated one, if there is one
+std::vector<std::optional<std::size_t>> pair_with_truth(const std::vector<double>& true_hz,
+                                                        const std::vector<double>& estimated_hz);
+
+/// A mode of the simulated plant and its estimated one, see pair_with_truth().
 struct ModeComparison {
   double true_frequency_hz = 0.0;
   double true_damping = 0.0;
@@ -32,8 +38,8 @@ struct TruthComparison {
   double normalized_error = 0.0;  ///< sqrt(sum |P - G|^2 / sum |G|^2)
 };
 
-/// Compares a model with the exact plant of a simulated stage: flexible out-of-plane modes below the last line (one to
-/// one, the nearest pairs first), and the response on the lines of `frf`, as measured in the loop.
+/// Compares a model with the exact plant of a simulated stage: flexible out-of-plane modes below the last line, and the
+/// response on the lines of `frf`, as measured in the loop.
 /// @param frf with the lines, channels and compensation to which the model was fitted.
 TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate& frf,
                                    const WaferStageSpec& stage);

@@ -26,8 +26,8 @@ TrueMode truth(double frequency_hz, double damping = 0.01) {
   return {.natural_frequency_hz = frequency_hz, .damping_ratio = damping};
 }
 
-TEST(ModeTable, PairsAClosePairInOrder) {
-  // 200.9 is nearer to the true 201.0 than 200.4 is; both true modes must still get their partner.
+TEST(ModeTable, BothModesOfAClosePairGetTheirPartner) {
+  // 200.4 is within the limit of both true modes.
   const auto rows =
       mode_table(model_of({mode(200.9), mode(200.4)}), std::vector{truth(201.0), truth(200.0)});
   ASSERT_EQ(rows.size(), 2u);

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <optional>
 
 #include "estimation/modal/validation.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace test_truth_comparison {
+
+using Partners = std::vector<std::optional<std::size_t>>;
 
 Submodel mode(double frequency_hz, double damping, const Eigen::MatrixXd& B0) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
@@ -106,6 +109,18 @@ TEST(TruthComparison, MatchesOneToOneAndNamesTheRest) {
   EXPECT_NEAR(truth.extra_hz[0], 81.0, 1e-9);
   const std::vector<std::string> table = truth_table(truth);
   EXPECT_NE(table.back().find("200.0000 Hz"), std::string::npos);
+}
+
+// In order of frequency, 100.9 would belong to 100.
+TEST(TruthComparison, TheNearestModesArePairedFirst) {
+  EXPECT_EQ(pair_with_truth({100.0, 101.0}, {100.9, 103.0}), (Partners{1, 0}));
+  EXPECT_EQ(pair_with_truth({100.0}, {101.0, 100.9}), Partners{1});
+}
+
+TEST(TruthComparison, ModesThatDifferByFivePercentAreNotPaired) {
+  EXPECT_EQ(pair_with_truth({100.0, 200.0}, {104.9, 210.1}), (Partners{0, std::nullopt}));
+  EXPECT_EQ(pair_with_truth({100.0}, {}), Partners{std::nullopt});
+  EXPECT_EQ(pair_with_truth({}, {100.0}), Partners{});
 }
 
 TEST(TruthComparison, AModeThatIsMissingIsSaid) {
