@@ -14,15 +14,15 @@ namespace {
 
 using Reasons = std::vector<std::string>;
 
-/// @returns whether the model is not trustworthy.
+/// @returns whether the model is trustworthy.
 bool judge_fit(const ReportData& data, Reasons& reasons) {
-  const ModelVerdict verdict = judge_model(*data.model, {}, data.validation);
+  const ModelVerdict verdict = judge_model(*data.model, data.findings, data.validation);
   for (const std::string& reason : verdict.reasons) {
-    // Doubts of the data are already in the findings, without their remedy.
+    // Findings of the data are already reasons, without their remedy.
     const auto said = [&](const std::string& other) { return reason.starts_with(other); };
     if (std::ranges::none_of(reasons, said)) reasons.push_back(reason);
   }
-  return !verdict.trustworthy;
+  return verdict.trustworthy;
 }
 
 void judge_modes(const ReportData& data, Reasons& reasons) {
@@ -47,17 +47,13 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   }
 }
 
-/// @returns whether one of the findings is a fault.
-bool judge_findings(const ReportData& data, Reasons& reasons) {
-  bool error = false;
+void add_findings(const ReportData& data, Reasons& reasons) {
   for (const Finding& finding : data.findings) {
     if (finding.severity == Severity::unchecked) continue;
-    error = error || finding.severity == Severity::fault;
     reasons.push_back(fmt::format("{}{}{}{}", finding.channel, finding.channel.empty() ? "" : ": ",
                                   finding.what,
                                   finding.figure.empty() ? "" : " (" + finding.figure + ")"));
   }
-  return error;
 }
 
 void judge_runs(const ReportData& data, Reasons& reasons) {
@@ -76,15 +72,16 @@ void judge_runs(const ReportData& data, Reasons& reasons) {
 
 Verdict judge(const ReportData& data) {
   Verdict verdict;
-  bool error = judge_findings(data, verdict.reasons);
+  bool trustworthy = !any_fault(data.findings);
+  add_findings(data, verdict.reasons);
   verdict.reasons.insert(verdict.reasons.end(), data.doubts.begin(), data.doubts.end());
   judge_runs(data, verdict.reasons);
   if (data.model) {
-    error = judge_fit(data, verdict.reasons) || error;
+    trustworthy = judge_fit(data, verdict.reasons);
     judge_modes(data, verdict.reasons);
   }
 
-  if (error) {
+  if (!trustworthy) {
     verdict.level = Verdict::Level::bad;
     verdict.text = "Not to be trusted";
   } else if (!verdict.reasons.empty()) {
