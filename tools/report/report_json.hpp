@@ -19,7 +19,7 @@ struct PageContent {
   std::vector<Block> blocks;
 };
 
-/// @pre shapes were checked by report_page()
+/// @pre as report_page(), which checks that the parts belong together
 PageContent page_content(const ReportData& data);
 
 }  // namespace stageid::report

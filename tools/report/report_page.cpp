@@ -21,49 +21,24 @@ void check_shape(const char* name, const Matrix& matrix, Eigen::Index rows, Eige
     throw std::invalid_argument(fmt::format("{}: contains values that are not finite", name));
 }
 
-void check_variance(const char* name, const Eigen::MatrixXd& variance, Eigen::Index rows,
-                    Eigen::Index columns) {
-  check_shape(name, variance, rows, columns);
-  if (variance.size() > 0 && variance.minCoeff() < 0.0)
-    throw std::invalid_argument(fmt::format("{}: negative", name));
-}
-
+/// Each file was checked when it was read; here, those that do not belong together are refused.
 void check_data(const ReportData& data) {
   if (!data.frf) {
-    const bool other = data.comparison && (data.comparison->response.size() > 0 ||
-                                           data.comparison->model_response.size() > 0);
-    if (data.nonlinearity || data.model_response.size() > 0 || data.cmif_curves.size() > 0 ||
-        data.validation_frf || other)
+    if (data.validation_frf)
       throw std::invalid_argument(
-          "report: model_response, cmif_curves, validation_frf, nonlinearity and the responses of "
-          "a comparison need an frf with the same lines");
+          "report: the held-back response needs the fitted one; add its file");
     return;
   }
   const FrfEstimate& frf = *data.frf;
-  check(frf);
   const Eigen::Index channels = frf.n_outputs() * frf.n_inputs();
   check_shape("model_response", data.model_response, channels, frf.lines());
-  check_variance("model_variance", data.model_variance, channels, frf.lines());
-  check_variance("cmif_curves", data.cmif_curves, std::min(frf.n_outputs(), frf.n_inputs()),
-                 frf.lines());
-  if (data.comparison) {
-    check_shape("comparison.response", data.comparison->response, channels, frf.lines());
+  check_shape("model_variance", data.model_variance, channels, frf.lines());
+  if (data.model_variance.size() > 0 && data.model_variance.minCoeff() < 0.0)
+    throw std::invalid_argument("model_variance: negative");
+  if (data.comparison)
     check_shape("comparison.model_response", data.comparison->model_response, channels,
                 frf.lines());
-  }
-  if (data.nonlinearity) {
-    const Eigen::Index bands = data.nonlinearity->band_hz.rows();
-    check_shape("nonlinearity.p_value", data.nonlinearity->p_value, channels, bands);
-    check_shape("nonlinearity.distortion", data.nonlinearity->distortion, channels, bands);
-  }
-  if (data.validation) {
-    const Eigen::VectorXd& error =
-        data.validation->channel_error;  // NaN: the channel does not respond
-    check_shape("validation.channel_error",
-                error.array().isNaN().select(0.0, error).matrix().eval(), channels, 1);
-  }
   if (!data.validation_frf) return;
-  check(*data.validation_frf);
   check_shape("validation_frf", data.validation_frf->response, channels, frf.lines());
   if (data.validation_frf->frequency_hz != frf.frequency_hz)
     throw std::invalid_argument("validation_frf: its lines differ from those of frf");

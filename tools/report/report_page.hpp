@@ -88,7 +88,9 @@ struct ReportData {
 
 /// Writes one self-contained page, atomically: no network, no other file. Equal data give equal bytes. All external
 /// names and texts are escaped.
-/// @throws std::invalid_argument if shapes do not match: "model_response: 52 x 100, but ...".
+/// @pre The responses pass check(); CMIF curves, nonlinearity and validation were computed from them.
+/// @throws std::invalid_argument if responses, model and variance do not belong together: "model_response: got 52 x 100;
+/// expected ...".
 /// @throws FileError
 void write_report(const std::filesystem::path& file, const ReportData& data);
 

@@ -228,17 +228,12 @@ TEST(Report, RefusesShapesThatDoNotAgree) {
               HasSubstr("model_variance: got 6 x 49"));
   EXPECT_THAT(refusal([](ReportData& d) { d.model_variance(1, 1) = -1.0; }),
               HasSubstr("model_variance: negative"));
-  EXPECT_THAT(refusal([](ReportData& d) { d.cmif_curves.conservativeResize(3, 50); }),
-              HasSubstr("cmif_curves: got 3 x 50; expected 2 x 50"));
   EXPECT_THAT(refusal([](ReportData& d) { d.model_response(0, 0) = std::nan(""); }),
               HasSubstr("model_response: contains values that are not finite"));
-  EXPECT_THAT(refusal([](ReportData& d) { d.validation->channel_error.resize(4); }),
-              HasSubstr("validation.channel_error"));
   EXPECT_THAT(refusal([](ReportData& d) { d.validation_frf->frequency_hz[3] += 1e-3; }),
               HasSubstr("validation_frf: its lines"));
-  EXPECT_THAT(refusal([](ReportData& d) { d.frf.reset(); }), HasSubstr("need an frf"));
-  EXPECT_THAT(refusal([](ReportData& d) { d.frf->response(0, 0) = std::nan(""); }),
-              HasSubstr("not finite"));
+  EXPECT_THAT(refusal([](ReportData& d) { d.frf.reset(); }),
+              HasSubstr("the held-back response needs the fitted one"));
   EXPECT_EQ(refusal([](ReportData&) {}), "no error");
 }
 
