@@ -141,8 +141,7 @@ class LoopTransfers {
 };
 
 double limit_of(const Eigen::VectorXd& limits, std::size_t i) {
-  return limits.size() == 0 ? std::numeric_limits<double>::infinity()
-                            : limits[static_cast<Index>(i)];
+  return limits.size() == 0 ? kUnlimited : limits[static_cast<Index>(i)];
 }
 
 double reserve_of(const Eigen::VectorXd& mean_square, std::size_t i) {

@@ -67,7 +67,7 @@ void take_limits(const StageFile& file, WaferStageSpec& spec) {
     return sensor.hard_window_m > 0.0 ? sensor.hard_window_m : 2.0 * sensor.window_m;
   });
   spec.limits.deviation_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
-    if (is_acceleration(sensor.channel)) return kNoLimit;  // not predicted
+    if (is_acceleration(sensor.channel)) return kUnlimited;  // not predicted
     return sensor.deviation_m > 0.0 ? sensor.deviation_m : 0.5 * sensor.window_m;
   });
   spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);

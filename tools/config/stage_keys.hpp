@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,18 +11,16 @@
 
 namespace stageid {
 
-inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-
 struct ChannelConfig {
   Channel channel;
-  double limit_n = kNoLimit;
-  double slew_n_s = kNoLimit;
-  double thermal_rms_n = kNoLimit;
+  double limit_n = kUnlimited;
+  double slew_n_s = kUnlimited;
+  double thermal_rms_n = kUnlimited;
   double bias_n = 0.0;
-  double window_m = kNoLimit;
+  double window_m = kUnlimited;
   double hard_window_m = 0.0;  // 0: derived
   double deviation_m = 0.0;    // 0: derived
-  double speed_m_s = kNoLimit;
+  double speed_m_s = kUnlimited;
 };
 
 struct InPlaneModeConfig {

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
@@ -63,7 +62,7 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
                              request.velocity_m_s);
   for (Eigen::Index i = 0; i < velocity_m_s.size(); ++i)
     if (is_acceleration(stage.info.sensors[static_cast<std::size_t>(i)]))
-      velocity_m_s[i] = std::numeric_limits<double>::infinity();
+      velocity_m_s[i] = kUnlimited;
   try {
     BoundedLoop loop = bounded_loop(outline.grid(), config.experiment, stage, prior,
                                     config.frf.outputs, velocity_m_s);
