@@ -18,87 +18,41 @@ constexpr double kBlindPoles = 0.05;     // of the sample rate, if the loop's ba
 constexpr double kLeastResponse = 0.25;  // a stage with a smaller response cannot be braked
 constexpr double kErrorThatTells = 0.1;  // of deviation_m: if less, the response is as expected
 
-void require_size(Eigen::Index size, std::size_t channels, const char* name) {
-  require(size == static_cast<Eigen::Index>(channels), "limits: {} has {} entries for {} channels",
-          name, size, channels);
-}
-
 }  // namespace
 
-Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& otherwise,
-                           const char* name) {
-  if (given.size() == 0) return otherwise;
-  require_size(given.size(), static_cast<std::size_t>(otherwise.size()), name);
-  for (Eigen::Index i = 0; i < given.size(); ++i)
-    require(given[i] > 0.0, "limits: {}, entry {}: {} is not positive", name, i + 1, given[i]);
-  return given.array();
-}
-
 LimitGuard::LimitGuard(const StageLimits& limits, const StageInfo& info)
-    : period_s_(1.0 / info.sample_rate_hz) {
+    : limits_(complete_limits(limits, info)), period_s_(1.0 / info.sample_rate_hz) {
   const auto sensors = static_cast<Eigen::Index>(info.sensors.size());
-  const auto actuators = static_cast<Eigen::Index>(info.actuators.size());
-  const RigidMotion& motion = limits.motion;
-  model_known_ = motion.acceleration_per_n.size() > 0;
-  const Eigen::ArrayXd unlimited = Eigen::ArrayXd::Constant(sensors, kUnlimited);
-  window_m_ = positive_or(limits.position_window_m, unlimited, "position_window_m");
-  hard_window_m_ = positive_or(limits.hard_window_m, 2.0 * window_m_, "hard_window_m");
-  deviation_m_ =
-      model_known_ ? positive_or(limits.deviation_m, 0.5 * window_m_, "deviation_m") : unlimited;
-  speed_limit_m_s_ = positive_or(limits.speed_m_s, unlimited, "speed_m_s");
-  for (Eigen::Index i = 0; i < sensors; ++i)
-    require(hard_window_m_[i] >= window_m_[i],
-            "limits: hard_window_m, entry {}: {} is below window_m, {}", i + 1, hard_window_m_[i],
-            window_m_[i]);
-
-  const double repeats = limits.stuck_sensor_s * info.sample_rate_hz;
-  require(repeats == 0.0 || (repeats >= 2.0 && repeats < 1e9),
-          "limits: stuck_sensor_s is {} s at {} Hz; must be 0 or at least two samples",
-          limits.stuck_sensor_s, info.sample_rate_hz);
-  repeats_allowed_ = static_cast<std::uint32_t>(std::llround(repeats));
+  const RigidMotion& motion = limits_.motion;
+  repeats_allowed_ =
+      static_cast<std::uint32_t>(std::llround(limits_.stuck_sensor_s * info.sample_rate_hz));
 
   stopping_s2_m_.setZero(sensors);
   double pole_rad_s = kBlindPoles * info.sample_rate_hz;
   Eigen::Index delay_samples = 0;
-  if (model_known_) {
-    require_size(motion.acceleration_per_n.rows(), info.sensors.size(), "motion");
-    require_size(motion.acceleration_per_n.cols(), info.actuators.size(), "motion");
-    require_size(motion.force_per_acceleration.rows(), info.actuators.size(), "motion");
-    require_size(motion.force_per_acceleration.cols(), info.sensors.size(), "motion");
-    require(motion.bandwidth_rad_s > 0.0 && std::isfinite(motion.bandwidth_rad_s),
-            "limits: the bandwidth of the motion must be positive");
-    acceleration_per_n_ = motion.acceleration_per_n;
-    force_per_acceleration_ = motion.force_per_acceleration;
-    contradiction_ = motion.contradiction;
-    if (contradiction_.size() > 0) {
-      require_size(contradiction_.rows(), info.sensors.size(), "motion");
-      require_size(contradiction_.cols(), info.sensors.size(), "motion");
-    }
+  if (motion.known()) {
     pole_rad_s = kObserverPoles * motion.bandwidth_rad_s;
-    if (limits.actuator_n.size() == actuators) {
-      const Eigen::ArrayXd a =
-          kForceForStopping * (acceleration_per_n_.cwiseAbs() * limits.actuator_n).array();
-      stopping_s2_m_ = (a > 0.0).select(0.5 / a, 0.0);
-    }
+    const Eigen::ArrayXd a =
+        kForceForStopping * (motion.acceleration_per_n.cwiseAbs() * limits_.actuator_n).array();
+    // Without limits, 0 times infinity is NaN, which is not positive either.
+    stopping_s2_m_ = (a > 0.0).select(0.5 / a, 0.0);
     brake_gains_ =
         observer_gains(kBrakeObserverPoles * motion.bandwidth_rad_s, info.sample_rate_hz);
-    bandwidth_rad_s_ = motion.bandwidth_rad_s;
     brake_samples_ = static_cast<std::uint64_t>(
         std::ceil(kBrakeTimeConstants / motion.bandwidth_rad_s * info.sample_rate_hz));
     const double delay = info.transport_delay_s * info.sample_rate_hz;
     delay_samples = static_cast<Eigen::Index>(std::floor(delay));
     late_fraction_ = delay - std::floor(delay);
-  } else {
-    acceleration_per_n_.setZero(sensors, actuators);
   }
-  room_m_ = (stopping_s2_m_ > 0.0).select(0.5 * (window_m_ + hard_window_m_), kUnlimited);
+  const Eigen::ArrayXd middle_m = 0.5 * (limits_.position_window_m + limits_.hard_window_m);
+  room_m_ = (stopping_s2_m_ > 0.0).select(middle_m, kUnlimited);
   gains_ = observer_gains(pole_rad_s, info.sample_rate_hz);
   forget_ = std::exp(-pole_rad_s / info.sample_rate_hz);
-  weight_m2_ = (1.0 - forget_) / deviation_m_.square();
+  weight_m2_ = (1.0 - forget_) / limits_.deviation_m.array().square();
 
   accelerations_.setZero(sensors, delay_samples + 2);
   acting_.setZero(sensors);
-  force_.setZero(actuators);
+  force_.setZero(limits_.actuator_n.size());
   wanted_acceleration_.setZero(sensors);
   measured_.setZero(sensors);
   contradicting_.setZero(sensors);
@@ -123,8 +77,9 @@ LimitGuard::Gains LimitGuard::observer_gains(double pole_rad_s, double rate_hz) 
 }
 
 void LimitGuard::carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples) {
-  if (load.size() == 0 || ramp_samples == 0 || !model_known_) return;
-  require_size(load.size(), static_cast<std::size_t>(force_.size()), "load");
+  if (load.size() == 0 || ramp_samples == 0 || !limits_.motion.known()) return;
+  require(load.size() == force_.size(), "limits: load has {} entries for {} channels", load.size(),
+          force_.size());
   load_ = load;
   load_samples_ = ramp_samples;
 }
@@ -136,7 +91,8 @@ void LimitGuard::start(const Inputs& first) noexcept {
     p_[i] = std::isfinite(y) ? y : 0.0;
   }
   measured_ = p_.matrix();
-  if (contradiction_.size() > 0) contradicting_at_start_.noalias() = contradiction_ * measured_;
+  if (limits_.motion.contradiction.size() > 0)
+    contradicting_at_start_.noalias() = limits_.motion.contradiction * measured_;
   for (Eigen::ArrayXd* state : {&v_, &d_, &force_p_, &force_v_, &force_d_, &last_error_m_})
     state->setZero();
   last_y_.setConstant(std::numeric_limits<double>::quiet_NaN());  // compares unequal to any value
@@ -150,7 +106,7 @@ void LimitGuard::start(const Inputs& first) noexcept {
 }
 
 void LimitGuard::predict(const Eigen::ArrayXd& u) noexcept {
-  if (model_known_) find_acceleration(u);
+  if (limits_.motion.known()) find_acceleration(u);
   const double t = period_s_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double a = acting_[i] * force_scale_;
@@ -170,7 +126,7 @@ void LimitGuard::find_acceleration(const Eigen::ArrayXd& u) noexcept {
     force_ -= carried_share() * load_;
   }
   newest_ = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
-  acting_.noalias() = acceleration_per_n_ * force_;
+  acting_.noalias() = limits_.motion.acceleration_per_n * force_;
   accelerations_.col(newest_) = acting_.array();
   // The ring has d + 2 columns: the newest is followed by the oldest, u[n-d-1], and by u[n-d].
   const Eigen::Index oldest = newest_ + 1 == accelerations_.cols() ? 0 : newest_ + 1;
@@ -196,7 +152,7 @@ LimitGuard::Finding LimitGuard::inspect(Inputs& inputs) noexcept {
     }
     last_y_[i] = y;
   }
-  if (contradiction_.size() > 0 && !sensor_failed_) compare_sensors(inputs, finding);
+  if (limits_.motion.contradiction.size() > 0 && !sensor_failed_) compare_sensors(inputs, finding);
   if (!open_)
     response_ = 1.0 - error_by_force_ / (force_by_force_ + kErrorThatTells * kErrorThatTells);
   return finding;
@@ -206,8 +162,8 @@ LimitGuard::Finding LimitGuard::inspect(Inputs& inputs) noexcept {
 void LimitGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
                               Finding& finding) noexcept {
   const double error = y - p_[i];
-  const bool far = std::abs(error) > deviation_m_[i];
-  const bool was_near = std::abs(last_error_m_[i]) < 0.5 * deviation_m_[i];
+  const bool far = std::abs(error) > limits_.deviation_m[i];
+  const bool was_near = std::abs(last_error_m_[i]) < 0.5 * limits_.deviation_m[i];
   last_error_m_[i] = error;
   if (repeats_allowed_ > 0 && y == last_y_[i]) {
     ++repeats_[i];  // no new information: predict without correction
@@ -219,10 +175,11 @@ void LimitGuard::judge_motion(Eigen::Index i, double y, std::uint64_t cycle,
   repeats_[i] = 0;
   if (far && !open_) {
     if (was_near) {
-      finding.add(sensor_failure(i, LimitKind::sensor_jump, error, deviation_m_[i], cycle), false);
+      finding.add(sensor_failure(i, LimitKind::sensor_jump, error, limits_.deviation_m[i], cycle),
+                  false);
       return;
     }
-    finding.add(violation(LimitKind::deviation, i, error, deviation_m_[i], cycle), false);
+    finding.add(violation(LimitKind::deviation, i, error, limits_.deviation_m[i], cycle), false);
   }
   correct(i, error);
 }
@@ -232,13 +189,14 @@ void LimitGuard::compare_sensors(const Inputs& inputs, Finding& finding) noexcep
   const std::uint64_t all = all_bits(static_cast<std::size_t>(p_.size()));
   if ((inputs.valid & all) != all) return;
   measured_ = last_y_.matrix();
-  contradicting_.noalias() = contradiction_ * measured_;
+  contradicting_.noalias() = limits_.motion.contradiction * measured_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double difference = contradicting_[i] - contradicting_at_start_[i];
-    if (!(std::abs(difference) > deviation_m_[i])) continue;
+    if (!(std::abs(difference) > limits_.deviation_m[i])) continue;
     sensor_failed_ = true;  // it is unknown which one
-    finding.add(violation(LimitKind::contradiction, i, difference, deviation_m_[i], inputs.cycle),
-                false);
+    finding.add(
+        violation(LimitKind::contradiction, i, difference, limits_.deviation_m[i], inputs.cycle),
+        false);
     return;
   }
 }
@@ -248,14 +206,14 @@ void LimitGuard::judge_place(Eigen::Index i, double y, std::uint64_t cycle,
                              Finding& finding) noexcept {
   const double v = speed(i);
   const double rest_m = y + v * std::abs(v) * stopping_s2_m_[i];
-  if (std::abs(y) > hard_window_m_[i])
-    finding.add(violation(LimitKind::hard_position, i, y, hard_window_m_[i], cycle), false);
-  else if (std::abs(v) > speed_limit_m_s_[i])
-    finding.add(violation(LimitKind::speed, i, v, speed_limit_m_s_[i], cycle), false);
+  if (std::abs(y) > limits_.hard_window_m[i])
+    finding.add(violation(LimitKind::hard_position, i, y, limits_.hard_window_m[i], cycle), false);
+  else if (std::abs(v) > limits_.speed_m_s[i])
+    finding.add(violation(LimitKind::speed, i, v, limits_.speed_m_s[i], cycle), false);
   else if (std::abs(rest_m) > room_m_[i])
     finding.add(violation(LimitKind::stopping_distance, i, rest_m, room_m_[i], cycle), false);
-  if (std::abs(y) > window_m_[i])
-    finding.add(violation(LimitKind::position, i, y, window_m_[i], cycle), true);
+  if (std::abs(y) > limits_.position_window_m[i])
+    finding.add(violation(LimitKind::position, i, y, limits_.position_window_m[i], cycle), true);
 }
 
 LimitViolation LimitGuard::sensor_failure(Eigen::Index i, LimitKind kind, double value,
@@ -288,7 +246,8 @@ bool LimitGuard::begin_brake() noexcept {
     force_scale_ = response_;
   }
   brake_divisor_ = std::copysign(std::max(1.0, std::abs(force_scale_)), force_scale_);
-  if (force_per_acceleration_.size() == 0 || std::abs(force_scale_) < kLeastResponse) return false;
+  if (limits_.motion.force_per_acceleration.size() == 0 || std::abs(force_scale_) < kLeastResponse)
+    return false;
   choose_brake_rate();
   brake_samples_left_ = brake_samples_;
   return true;
@@ -296,18 +255,18 @@ bool LimitGuard::begin_brake() noexcept {
 
 // With a force proportional to the speed v, a brake of rate w needs the distance v / w.
 void LimitGuard::choose_brake_rate() noexcept {
-  double needed_rad_s = kBrakeRate * bandwidth_rad_s_;
+  double needed_rad_s = kBrakeRate * limits_.motion.bandwidth_rad_s;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
     const double room_m = room_m_[i] - std::abs(p_[i]);
     if (p_[i] * v_[i] > 0.0)
       needed_rad_s = std::max(needed_rad_s, std::abs(v_[i]) / std::max(room_m, 0.0));
   }
-  brake_rate_rad_s_ = std::min(needed_rad_s, kLargestBrakeRate * bandwidth_rad_s_);
+  brake_rate_rad_s_ = std::min(needed_rad_s, kLargestBrakeRate * limits_.motion.bandwidth_rad_s);
 }
 
 void LimitGuard::brake(Eigen::ArrayXd& u) noexcept {
   wanted_acceleration_ = -(brake_rate_rad_s_ * v_ + d_).matrix() / brake_divisor_;
-  force_.noalias() = force_per_acceleration_ * wanted_acceleration_;
+  force_.noalias() = limits_.motion.force_per_acceleration * wanted_acceleration_;
   if (load_.size() > 0) force_ += carried_share() * load_;
   u = force_.array();
   --brake_samples_left_;

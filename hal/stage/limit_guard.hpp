@@ -9,11 +9,6 @@
 
 namespace stageid {
 
-/// The limits of all channels, `otherwise` if none are given. @throws std::invalid_argument for a wrong size or an
-/// entry that is not positive
-Eigen::ArrayXd positive_or(const Eigen::VectorXd& given, const Eigen::ArrayXd& otherwise,
-                           const char* name);
-
 /// Judges after every measurement whether the loop may remain closed. If not, brakes the stage.
 ///
 /// For each sensor an observer predicts position p, speed v and unexplained acceleration d from the
@@ -48,8 +43,7 @@ class LimitGuard {
     }
   };
 
-  /// @throws std::invalid_argument if a vector or matrix of the limits has the wrong size, or an
-  /// entry is not positive.
+  /// @throws std::invalid_argument from complete_limits()
   LimitGuard(const StageLimits& limits, const StageInfo& info);
 
   /// A constant load, e.g. the weight, that the commands take over in their first `ramp_samples`: this part of them
@@ -68,6 +62,9 @@ class LimitGuard {
   bool braking() const noexcept { return brake_samples_left_ > 0; }
   /// Forces for the next interval of a brake.
   void brake(Eigen::ArrayXd& u) noexcept;
+
+  /// As completed by complete_limits().
+  const StageLimits& limits() const noexcept { return limits_; }
 
   /// Number of samples within which a sound loop's commands return to their limits.
   std::uint64_t settling_samples() const noexcept { return brake_samples_; }
@@ -104,26 +101,18 @@ class LimitGuard {
     return open_ ? v_[sensor] : v_[sensor] + (response_ - 1.0) * force_v_[sensor];
   }
 
+  StageLimits limits_;  // of every channel
   double period_s_ = 0.0;
-  bool model_known_ = false;
   Gains gains_;
   Gains brake_gains_;
   double forget_ = 0.0;
-  double bandwidth_rad_s_ = 0.0;
   double brake_rate_rad_s_ = 0.0;
   std::uint64_t brake_samples_ = std::numeric_limits<std::uint64_t>::max();
   std::uint32_t repeats_allowed_ = 0;  // of a sensor's value; 0: unlimited
-  Eigen::ArrayXd window_m_;
-  Eigen::ArrayXd hard_window_m_;
-  Eigen::ArrayXd deviation_m_;
-  Eigen::ArrayXd weight_m2_;  // of an error in the response
-  Eigen::ArrayXd speed_limit_m_s_;
-  Eigen::ArrayXd stopping_s2_m_;  // 1 / (2 a) with the available forces; 0: unknown
-  Eigen::ArrayXd room_m_;         // within which the stage must be able to stop
-  Eigen::MatrixXd acceleration_per_n_;
-  Eigen::MatrixXd force_per_acceleration_;
-  Eigen::MatrixXd contradiction_;
-  double late_fraction_ = 0.0;  // part of a sample in which the older of two commands acts
+  Eigen::ArrayXd weight_m2_;           // of an error in the response
+  Eigen::ArrayXd stopping_s2_m_;       // 1 / (2 a) with the available forces; 0: unknown
+  Eigen::ArrayXd room_m_;              // within which the stage must be able to stop
+  double late_fraction_ = 0.0;         // part of a sample in which the older of two commands acts
 
   // sensors x samples of delay: ring of the accelerations by pending commands.
   Eigen::ArrayXXd accelerations_;

@@ -20,23 +20,16 @@ std::unique_ptr<CyclicStage> checked(std::unique_ptr<CyclicStage> stage) {
 
 }  // namespace
 
-LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits)
-    : stage_(checked(std::move(stage))),
-      limits_(std::move(limits)),
-      guard_(limits_, stage_->info()) {
-  const StageInfo& info = stage_->info();
-  const Eigen::ArrayXd unlimited =
-      Eigen::ArrayXd::Constant(static_cast<Eigen::Index>(info.actuators.size()), kUnlimited);
-  largest_n_ = positive_or(limits_.actuator_n, unlimited, "actuator_n");
-  step_n_ = positive_or(limits_.slew_n_s, unlimited, "slew_n_s") / info.sample_rate_hz;
-  mean_square_limit_n2_ = positive_or(limits_.thermal_rms_n, unlimited, "thermal_rms_n").square();
-  require(limits_.thermal_time_constant_s > 0.0 && std::isfinite(limits_.thermal_time_constant_s),
-          "limits: thermal_time_constant_s must be positive; got {}",
-          limits_.thermal_time_constant_s);
-  decay_ = std::exp(-1.0 / (info.sample_rate_hz * limits_.thermal_time_constant_s));
-  wanted_.setZero(largest_n_.size());
-  applied_.setZero(largest_n_.size());
-  mean_square_.setZero(largest_n_.size());
+LimitedStage::LimitedStage(std::unique_ptr<CyclicStage> stage, const StageLimits& limits)
+    : stage_(checked(std::move(stage))), guard_(limits, stage_->info()) {
+  const StageLimits& all = guard_.limits();
+  const double rate_hz = info().sample_rate_hz;
+  decay_ = std::exp(-1.0 / (rate_hz * all.thermal_time_constant_s));
+  step_n_ = all.slew_n_s / rate_hz;
+  mean_square_limit_n2_ = all.thermal_rms_n.array().square();
+  wanted_.setZero(step_n_.size());
+  applied_.setZero(step_n_.size());
+  mean_square_.setZero(step_n_.size());
 }
 
 void LimitedStage::carry(const MotionControllerSpec& controller) {
@@ -94,12 +87,13 @@ void LimitedStage::stop() noexcept {
 
 // Fast path: one pass without branches, because nearly every command is within all limits.
 void LimitedStage::apply(std::uint64_t cycle) noexcept {
+  const Eigen::VectorXd& largest_n = guard_.limits().actuator_n;
   const double fresh = 1.0 - decay_;
   bool outside = false;
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     const double u = wanted_[i];
     // This form counts NaN as outside.
-    outside |= !(std::abs(u) <= largest_n_[i]);
+    outside |= !(std::abs(u) <= largest_n[i]);
     outside |= !(std::abs(u - applied_[i]) <= step_n_[i]);
     outside |= !(decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
   }
@@ -119,7 +113,7 @@ double LimitedStage::limit_channel(Eigen::Index channel, double wanted,
     report_command({LimitKind::not_finite, number, wanted, 0.0, cycle});
     wanted = last;
   }
-  const double largest = largest_n_[channel];
+  const double largest = guard_.limits().actuator_n[channel];
   if (std::abs(wanted) > largest)
     report_command({LimitKind::actuator, number, wanted, largest, cycle});
 

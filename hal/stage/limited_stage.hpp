@@ -36,9 +36,8 @@ struct Emergency {
 /// More serious outcomes of the back end (fault, bus off, link down) replace these outcomes.
 class LimitedStage final : public CyclicStage {
  public:
-  /// @throws std::invalid_argument if a limit vector has the wrong size or an entry is not
-  /// positive.
-  LimitedStage(std::unique_ptr<CyclicStage> stage, StageLimits limits);
+  /// @throws std::invalid_argument without a stage or its sample rate, and from complete_limits()
+  LimitedStage(std::unique_ptr<CyclicStage> stage, const StageLimits& limits);
 
   /// The feed-forward of the controller is not expected to move the stage, see LimitGuard::carry().
   void carry(const MotionControllerSpec& controller);
@@ -66,7 +65,6 @@ class LimitedStage final : public CyclicStage {
   void report_command(const LimitViolation& violation) noexcept;
 
   std::unique_ptr<CyclicStage> stage_;
-  StageLimits limits_;
   LimitGuard guard_;
   LimitViolation violation_;
   Emergency emergency_;
@@ -74,7 +72,6 @@ class LimitedStage final : public CyclicStage {
   Loop loop_ = Loop::closed;
   double decay_ = 1.0;  // a, per sample
   // Limits per sample, infinite if unlimited.
-  Eigen::ArrayXd largest_n_;
   Eigen::ArrayXd step_n_;
   Eigen::ArrayXd mean_square_limit_n2_;
   Eigen::ArrayXd wanted_;

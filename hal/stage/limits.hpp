@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "hal/stage/stage.hpp"
+
 namespace stageid {
 
 /// The rigid motion of a stage as its controller assumes it, without identification. Empty matrices: unknown.
@@ -12,6 +14,8 @@ struct RigidMotion {
   Eigen::MatrixXd force_per_acceleration;  ///< actuators x sensors, kg; of the braked axes
   Eigen::MatrixXd contradiction;  ///< sensors x sensors: part of y that no rigid motion explains
   double bandwidth_rad_s = 0.0;   ///< of the slowest axis
+
+  bool known() const noexcept { return acceleration_per_n.size() > 0; }
 };
 
 /// The bound of what has no limit.
@@ -31,6 +35,11 @@ struct StageLimits {
   double stuck_sensor_s = 0.0;  ///< longest time that a sensor may repeat one value; 0: unlimited
   RigidMotion motion;           ///< for predictions and for the brake
 };
+
+/// The limits with an entry for every channel: a missing vector is replaced by its default, or by kUnlimited. Without a
+/// known motion nothing is predicted, so deviation_m is kUnlimited.
+/// @throws std::invalid_argument if a vector or matrix has the wrong size, or a value is out of range
+StageLimits complete_limits(const StageLimits& limits, const StageInfo& info);
 
 enum class LimitKind : std::uint8_t {
   none,

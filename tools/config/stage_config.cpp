@@ -8,7 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/stage/limit_guard.hpp"
+#include "hal/stage/limits.hpp"
 #include "tools/config/config_reader.hpp"
 #include "tools/config/loop_controller.hpp"
 #include "tools/config/stage_keys.hpp"
@@ -158,10 +158,9 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
     if (file.can.config.present)
       config.can = complete_can(file.can, config.spec.info, config.spec.limits);
     if (config.spec.has_plant()) {
-      const LimitedStage stage(std::make_unique<SimulatedStage>(config.spec), config.spec.limits);
-    } else {
-      const LimitGuard guard(config.spec.limits, config.spec.info);
+      const SimulatedStage stage(config.spec);
     }
+    complete_limits(config.spec.limits, config.spec.info);
     const MotionController controller(config.spec.controller);
   } catch (const std::invalid_argument& error) {
     throw FormatError(path, "", error.what());
