@@ -34,7 +34,7 @@ ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) 
   ClosedLoop loop;
   for (const double frequency_hz : plan.grid().frequency_hz()) {
     const Eigen::MatrixXcd G =
-        sampled_response(modes, stage.delay_s, info.sample_rate_hz, frequency_hz);
+        sampled_response(modes, stage.info.delay_s, info.sample_rate_hz, frequency_hz);
     const Eigen::MatrixXcd K = controller.response(frequency_hz);
     const Eigen::MatrixXcd return_difference = Eigen::MatrixXcd::Identity(n_u, n_u) - K * G;
     loop.to_u.push_back(solve(return_difference, selection.cast<std::complex<double>>()));

@@ -112,7 +112,7 @@ PluginStage::PluginStage(StageInfo info, const PluginSpec& spec, double pace)
                     description.maximum_rate_hz, info_.sample_rate_hz));
   info_.backend = "plugin";
   if (description.maximum_rate_hz > 0.0) info_.maximum_rate_hz = description.maximum_rate_hz;
-  if (description.transport_delay_s > 0.0) info_.transport_delay_s = description.transport_delay_s;
+  if (description.transport_delay_s > 0.0) info_.delay_s = description.transport_delay_s;
   info_.clock = description.virtual_time != 0 ? Clock::virtual_time : Clock::wall;
   info_.pace = info_.clock == Clock::wall && pace > 0.0 ? pace : 1.0;
   info_.stamps = info_.clock == Clock::wall;

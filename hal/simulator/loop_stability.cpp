@@ -63,8 +63,8 @@ class SampledLoop {
   SampledLoop(const WaferStageSpec& spec, ControllerStateSpace controller)
       : controller_(std::move(controller)) {
     const double period_s = 1.0 / spec.info.sample_rate_hz;
-    const double whole = std::floor(spec.delay_s / period_s);
-    fraction_ = spec.delay_s / period_s - whole;
+    const double whole = std::floor(spec.info.delay_s / period_s);
+    fraction_ = spec.info.delay_s / period_s - whole;
     held_ = static_cast<Index>(whole) + 1;
     const ControllerStateSpace& k = controller_;
     MatrixXd outputs(k.d.rows(), k.a.cols() + k.d.cols());
@@ -215,9 +215,9 @@ LoopStability loop_stability(const WaferStageSpec& spec) {
   out.pole_hz = std::abs(std::arg(poles[outermost])) / kTwoPi * spec.info.sample_rate_hz;
   const std::vector<PlantMode> modes = wafer_stage_modes(spec);
   for (const double f : test_frequencies(spec)) {
-    const double size =
-        largest_sensitivity(-sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, f) *
-                            controller.response(f));
+    const double size = largest_sensitivity(
+        -sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, f) *
+        controller.response(f));
     if (!(size > out.largest_sensitivity)) continue;
     out.largest_sensitivity = size;
     out.sensitivity_hz = f;

@@ -28,7 +28,6 @@ StageInfo info_of(const WaferStageSpec& spec) {
   StageInfo info = spec.info;
   if (info.backend.empty()) info.backend = "sim";
   if (info.maximum_rate_hz == 0.0) info.maximum_rate_hz = info.sample_rate_hz;
-  info.transport_delay_s = spec.delay_s;
   info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
   if (spec.pace > 0.0) info.pace = spec.pace;
   return info;
@@ -44,7 +43,7 @@ struct SimulatedStage::State {
   explicit State(const WaferStageSpec& checked)
       : spec(checked),
         info(info_of(checked)),
-        plant(wafer_stage_modes(checked), checked.delay_s, checked.info.sample_rate_hz),
+        plant(wafer_stage_modes(checked), checked.info.delay_s, checked.info.sample_rate_hz),
         noise(noise_of(checked)),
         pacer(checked.info.sample_rate_hz, checked.pace),
         faults(checked.faults, checked.info),

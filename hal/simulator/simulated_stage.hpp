@@ -46,8 +46,6 @@ struct WaferStageSpec {
   std::vector<double> flexible_damping;  ///< one per mode, the last repeats
   std::vector<PlantMode> in_plane_modes;
 
-  double delay_s =
-      0.0;  ///< computation delay: u[n] is held from t_n + delay_s on; any number of samples
   double sensor_noise_m = 0.0;           ///< rms of the white part
   double sensor_noise_coloured_m = 0.0;  ///< rms of the coloured floor (first-order low pass)
   double sensor_noise_corner_hz = 1.0;

@@ -83,7 +83,7 @@ void require_valid(const WaferStageSpec& spec) {
   check_plant(spec);
   check_channels("actuators", spec.info.actuators, spec);
   check_channels("sensors", spec.info.sensors, spec);
-  not_negative("delay_s", spec.delay_s);
+  not_negative("delay_s", spec.info.delay_s);
   not_negative("noise sensor_m", spec.sensor_noise_m);
   not_negative("noise sensor_coloured_m", spec.sensor_noise_coloured_m);
   positive("noise sensor_corner_hz", spec.sensor_noise_corner_hz);

@@ -40,7 +40,7 @@ LimitGuard::LimitGuard(const StageLimits& limits, const StageInfo& info)
         observer_gains(kBrakeObserverPoles * motion.bandwidth_rad_s, info.sample_rate_hz);
     brake_samples_ = static_cast<std::uint64_t>(
         std::ceil(kBrakeTimeConstants / motion.bandwidth_rad_s * info.sample_rate_hz));
-    const double delay = info.transport_delay_s * info.sample_rate_hz;
+    const double delay = info.delay_s * info.sample_rate_hz;
     delay_samples = static_cast<Eigen::Index>(std::floor(delay));
     late_fraction_ = delay - std::floor(delay);
   }

@@ -57,7 +57,8 @@ struct StageInfo {
   std::string backend;  ///< "sim", "can", "modbus", "replay"
   double sample_rate_hz = 0.0;
   double maximum_rate_hz = 0.0;
-  double transport_delay_s = 0.0;  ///< declared, from computed command to changed output
+  /// From the computed command to the changed output: u[n] is held from t_n + delay_s on.
+  double delay_s = 0.0;
   Clock clock = Clock::virtual_time;
   double pace = 1.0;       ///< stage seconds per second of its clock; not 1 only in simulations
   bool stamps = false;     ///< Inputs have t_arrival_ns and stamp_ns

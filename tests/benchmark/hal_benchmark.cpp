@@ -16,7 +16,7 @@ using namespace stageid;
 
 void plant_step(benchmark::State& state) {
   const WaferStageSpec spec = test::wafer_stage_spec();
-  ModalPlant plant(wafer_stage_modes(spec), spec.delay_s, spec.info.sample_rate_hz);
+  ModalPlant plant(wafer_stage_modes(spec), spec.info.delay_s, spec.info.sample_rate_hz);
   std::vector<double> u(17, 0.1);
   std::vector<double> y(7);
   for (auto _ : state) {

@@ -116,7 +116,6 @@ void complete_spec(StageConfig& config, const StageFile& file) {
   WaferStageSpec& spec = config.spec;
   spec.info.backend = to_string(config.backend);
   spec.info.maximum_rate_hz = spec.info.sample_rate_hz;
-  spec.info.transport_delay_s = spec.delay_s;
   spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
   if (spec.has_plant()) {
     std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);

@@ -66,7 +66,7 @@ NominalStage nominal_stage(const WaferStageSpec& spec) {
   if (!spec.has_plant()) return nominal;
   std::vector<PlantMode> rigid = wafer_stage_modes(spec);
   rigid.resize(kRigidAxes);
-  nominal.rigid_body = [rigid, delay_s = spec.delay_s,
+  nominal.rigid_body = [rigid, delay_s = spec.info.delay_s,
                         rate_hz = spec.info.sample_rate_hz](double frequency_hz) {
     return sampled_response(rigid, delay_s, rate_hz, frequency_hz);
   };

@@ -317,7 +317,7 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   config.backend = static_cast<Backend>(backend);
   v.number("sample_rate_hz", s.info.sample_rate_hz, positive("Hz"), kRequired,
            "sample rate of the loop");
-  v.number("delay_s", s.delay_s, not_negative("s"), kOptional,
+  v.number("delay_s", s.info.delay_s, not_negative("s"), kOptional,
            "delay from the computed command to the change of the hold; any number of samples");
   items(v, "actuators", describe_actuator, f.actuators, {1, 64}, kRequired,
         "in the order of the log");

@@ -153,7 +153,7 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
 
   std::optional<LowFrequencyPlant> low;
   if (asked_hz[0] < frf.frequency_hz[0]) {
-    low.emplace(frf, stage.transport_delay_s + 0.5 / stage.sample_rate_hz,
+    low.emplace(frf, stage.delay_s + 0.5 / stage.sample_rate_hz,
                 rigid_body_jacobian(chosen(stage.sensors, sensors)),
                 rigid_body_jacobian(chosen(stage.actuators, actuators)));
     prior.extrapolated_below_hz = frf.frequency_hz[0];

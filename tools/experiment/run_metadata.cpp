@@ -19,7 +19,7 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
       {"backend", to_string(backend)},
       {"measurement_id", config.measurement_id},
       {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},
-      {"transport_delay_s", config.stage.spec.info.transport_delay_s},
+      {"transport_delay_s", config.stage.spec.info.delay_s},
       {"configuration_file", config.file.filename().string()},
       {"configuration", config.text},
       {"stage_file", config.stage.file.filename().string()},

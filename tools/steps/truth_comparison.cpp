@@ -59,7 +59,7 @@ Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const WaferStageSpec& st
   Eigen::MatrixXcd G(frf.n_outputs() * frf.n_inputs(), frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd whole =
-        sampled_response(modes, stage.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k]);
+        sampled_response(modes, stage.info.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k]);
     for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
       for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
         G(i + frf.n_outputs() * j, k) =

@@ -37,8 +37,8 @@ System plant_system(const WaferStageSpec& spec) {
   const auto inputs = static_cast<Index>(spec.info.actuators.size());
   const auto outputs = static_cast<Index>(spec.info.sensors.size());
   const double period_s = 1.0 / spec.info.sample_rate_hz;
-  const auto whole = static_cast<Index>(std::floor(spec.delay_s / period_s));
-  const double fraction = spec.delay_s / period_s - static_cast<double>(whole);
+  const auto whole = static_cast<Index>(std::floor(spec.info.delay_s / period_s));
+  const double fraction = spec.info.delay_s / period_s - static_cast<double>(whole);
 
   const Index n = 2 * count + inputs * (whole + 1);
   System s{MatrixXd::Zero(n, n), MatrixXd::Zero(n, inputs), MatrixXd::Zero(outputs, n),

@@ -70,7 +70,7 @@ TEST(ClosedLoop, HasASensitivityPeakBelowTwoAndAHalf) {
   double peak = 0.0;
   for (const double f : grid) {
     if (f <= 0.0) continue;
-    const Eigen::MatrixXcd G = sampled_response(modes, spec.delay_s, 1e4, f);
+    const Eigen::MatrixXcd G = sampled_response(modes, spec.info.delay_s, 1e4, f);
     const Eigen::MatrixXcd loop = Eigen::MatrixXcd::Identity(7, 7) - G * controller.response(f);
     // sigma_max(S) = 1 / sigma_min(I - G K)
     peak = std::max(peak, 1.0 / svd(loop, 0).singularValues().minCoeff());
@@ -85,7 +85,7 @@ TEST(ClosedLoop, CrossesOverBetweenThirtyAndSixtyHertzOutOfPlane) {
   const auto modes = wafer_stage_modes(spec);
   const MotionController controller(spec.controller);
   const auto loop_gain = [&](Eigen::Index axis, double f) {
-    const Eigen::MatrixXcd G = sampled_response(modes, spec.delay_s, 1e4, f);
+    const Eigen::MatrixXcd G = sampled_response(modes, spec.info.delay_s, 1e4, f);
     const Eigen::MatrixXcd L = spec.controller.sensor_decoupling * G * controller.response(f);
     // T_y G K = -(T_y G T_u) C T_y: back to the axis through the pseudo-inverse of T_y.
     const Eigen::MatrixXd back = pseudo_inverse(spec.controller.sensor_decoupling);

@@ -135,13 +135,13 @@ TEST(ModalPlant, ReachesTheClosedFormFrequencyResponse) {
   const double rate_hz = 1e4;
   constexpr int kPeriod = 1000;
   constexpr int kPeriods = 3;  // slowest decay 0.3 * 2 pi 100 Hz: exp(-38) after two periods
-  ModalPlant plant(modes, spec.delay_s, rate_hz);
+  ModalPlant plant(modes, spec.info.delay_s, rate_hz);
   for (const int line : {1, 7, 20, 83, 199, 320, 499}) {
     const Eigen::Index input = line % 17;
     const Eigen::VectorXcd y = test::measured_response(
         plant, VectorXd::Unit(plant.actuators(), input), {line, kPeriod, kPeriods});
     const Eigen::VectorXcd exact =
-        sampled_response(modes, spec.delay_s, rate_hz, line * rate_hz / kPeriod).col(input);
+        sampled_response(modes, spec.info.delay_s, rate_hz, line * rate_hz / kPeriod).col(input);
     EXPECT_LT((y - exact).norm(), 1e-9 * exact.norm()) << "line " << line;
   }
 }
@@ -203,8 +203,8 @@ TEST(ModalPlant, MovesAFreeMassByNewtonsLaw) {
 
 TEST(ModalPlant, ResetForgetsEverything) {
   const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  ModalPlant used(wafer_stage_modes(spec), spec.delay_s, 1e4);
-  ModalPlant fresh(wafer_stage_modes(spec), spec.delay_s, 1e4);
+  ModalPlant used(wafer_stage_modes(spec), spec.info.delay_s, 1e4);
+  ModalPlant fresh(wafer_stage_modes(spec), spec.info.delay_s, 1e4);
   const VectorXd u = VectorXd::LinSpaced(17, -1.0, 1.0);
   for (int n = 0; n < 7; ++n) used.step(u.data());
   used.add_modal_force(2, 1.0);

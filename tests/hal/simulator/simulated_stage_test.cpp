@@ -54,11 +54,11 @@ TEST(SimulatedStage, RepeatsARunExactlyWhateverWasRunBefore) {
 
 TEST(SimulatedStage, TellsWhatItIs) {
   WaferStageSpec spec = test::small_stage_spec();
-  spec.delay_s = 1.5e-3;
+  spec.info.delay_s = 1.5e-3;
   spec.info.backend.clear();
   const SimulatedStage stage(spec);
   EXPECT_EQ(stage.info().backend, "sim");
-  EXPECT_EQ(stage.info().transport_delay_s, 1.5e-3);
+  EXPECT_EQ(stage.info().delay_s, 1.5e-3);
   EXPECT_EQ(stage.info().maximum_rate_hz, 1e3);
   EXPECT_EQ(stage.info().clock, Clock::virtual_time);
   EXPECT_EQ(wafer_stage_modes(spec).size(), 7U);
@@ -222,8 +222,8 @@ TEST(SimulatedStage, RefusesABadSpecNamingTheField) {
   refuse("in_plane_modes", [](WaferStageSpec& s) {
     s.in_plane_modes = {{10.0, 0.1, Eigen::VectorXd::Ones(2), Eigen::VectorXd::Ones(2)}};
   });
-  refuse("delay_s", [](WaferStageSpec& s) { s.delay_s = -1e-6; });
-  refuse("delay", [](WaferStageSpec& s) { s.delay_s = 1e6; });
+  refuse("delay_s", [](WaferStageSpec& s) { s.info.delay_s = -1e-6; });
+  refuse("delay", [](WaferStageSpec& s) { s.info.delay_s = 1e6; });
   refuse("sensor_m", [](WaferStageSpec& s) { s.sensor_noise_m = -1.0; });
   refuse("sensor_coloured_m", [&](WaferStageSpec& s) { s.sensor_noise_coloured_m = nan; });
   refuse("sensor_corner_hz", [](WaferStageSpec& s) { s.sensor_noise_corner_hz = 0.0; });

@@ -115,7 +115,7 @@ Eigen::MatrixXcd exact_response(const JudgementStage& stage, const TroublePlan& 
   Eigen::MatrixXcd exact(frf.response.rows(), frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     Eigen::MatrixXcd G =
-        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
+        sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, frf.frequency_hz[k]);
     if (nonlinear) {
       Eigen::Index at = 0;
       (grid_hz.array() - frf.frequency_hz[k]).abs().minCoeff(&at);
@@ -170,7 +170,7 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const Judgement
   result["extra"] = truth.extra_hz;
   if (model.input_delay_std_s.size() > 0 && model.input_delay_std_s[0] > 0.0)
     result["delay_deviation"] =
-        (model.input_delays_s()[0] - spec.delay_s) / model.input_delay_std_s[0];
+        (model.input_delays_s()[0] - spec.info.delay_s) / model.input_delay_std_s[0];
 
   result["df"] = std::move(df);
   result["dz"] = std::move(dz);

@@ -48,7 +48,8 @@ class Loop {
   Loop(const JudgementStage& stage, const TroublePlan& plan)
       : stage_(stage),
         plan_(plan),
-        plant_(wafer_stage_modes(stage.spec), stage.spec.delay_s, stage.spec.info.sample_rate_hz),
+        plant_(wafer_stage_modes(stage.spec), stage.spec.info.delay_s,
+               stage.spec.info.sample_rate_hz),
         controller_(stage.spec.controller),
         noise_(white_noise_of(stage.spec)),
         coloured_(stage.noise),

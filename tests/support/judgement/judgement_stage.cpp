@@ -100,7 +100,7 @@ void draw_body(RandomNumbers& random, const Sizes& sizes, WaferStageSpec& spec) 
   place_vertical(random, "a", "N", sizes.actuators - plane_actuators, sizes.sensors == 2, spec,
                  spec.info.actuators);
   place_in_plane(random, "a", "N", plane_actuators, spec, spec.info.actuators);
-  spec.delay_s = random.uniform(0.3, 1.7) / spec.info.sample_rate_hz;
+  spec.info.delay_s = random.uniform(0.3, 1.7) / spec.info.sample_rate_hz;
 }
 
 /// `count` frequencies of the band, at least three half-power widths apart, and one or two above it.
@@ -155,7 +155,7 @@ MotionControllerSpec controller(const WaferStageSpec& spec, const Sizes& sizes,
 /// Samples until a kick at all actuators has decayed to kDecayed of its largest motion, in the sensors and in each
 /// flexible mode; -1: it does not within `most`.
 int settling_samples(const WaferStageSpec& spec, int most) {
-  ModalPlant plant(wafer_stage_modes(spec), spec.delay_s, spec.info.sample_rate_hz);
+  ModalPlant plant(wafer_stage_modes(spec), spec.info.delay_s, spec.info.sample_rate_hz);
   MotionController loop(spec.controller);
   Eigen::VectorXd y(plant.sensors());
   Eigen::VectorXd u(plant.actuators());
@@ -199,7 +199,7 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   std::vector<double> magnitudes;
   for (Eigen::Index k = 0; k < frequency_hz.size(); k += 5) {
     const Eigen::MatrixXcd g =
-        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, frequency_hz[k]);
+        sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, frequency_hz[k]);
     for (Eigen::Index c = 0; c < g.size(); ++c) magnitudes.push_back(std::abs(g(c)));
   }
   std::sort(magnitudes.begin(), magnitudes.end());
@@ -237,8 +237,8 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   if (stage.noise.colour == NoiseColour::drift) stage.noise.reference_hz = 1.5 * stage.band_low_hz;
   // Half of the stages feel forces too: as much as the sensors' noise at 30 % of the band.
   if (random.uniform() < 0.5) {
-    const Eigen::MatrixXcd g =
-        sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, 0.3 * stage.band_high_hz);
+    const Eigen::MatrixXcd g = sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz,
+                                                0.3 * stage.band_high_hz);
     spec.force_noise_n = white / std::sqrt(g.cwiseAbs2().rowwise().sum().mean());
   }
 }
@@ -253,7 +253,8 @@ double heave_motion(const JudgementStage& stage) {
   const auto axes = static_cast<Eigen::Index>(spec.info.actuators.size());
   double power = 0.0;
   for (const double hz : frequency_hz) {
-    const Eigen::MatrixXcd g = sampled_response(modes, spec.delay_s, spec.info.sample_rate_hz, hz);
+    const Eigen::MatrixXcd g =
+        sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, hz);
     const Eigen::MatrixXcd u =
         (Eigen::MatrixXcd::Identity(axes, axes) - loop.response(hz) * g).inverse();
     const double omega = 2.0 * kPi * hz;
@@ -291,7 +292,7 @@ std::string JudgementStage::nominal_text() const {
   std::string text = fmt::format(
       "format: stageid-stage\nname: {}\nbackend: sim\nsample_rate_hz: {}\ndelay_s: "
       "{}\nactuators:\n",
-      spec.info.name, spec.info.sample_rate_hz, spec.delay_s);
+      spec.info.name, spec.info.sample_rate_hz, spec.info.delay_s);
   for (const Channel& c : spec.info.actuators)
     text += channel_text(c, "limit_n: 1000, thermal_rms_n: 1000");
   text += "sensors:\n";

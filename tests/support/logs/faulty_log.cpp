@@ -51,10 +51,10 @@ class Loop {
   Loop(const FaultyLogRequest& request, const PlantedFault& fault)
       : request_(request),
         fault_(fault),
-        plant_(wafer_stage_modes(request.plant), request.plant.delay_s,
+        plant_(wafer_stage_modes(request.plant), request.plant.info.delay_s,
                request.plant.info.sample_rate_hz),
         late_(wafer_stage_modes(request.plant),
-              request.plant.delay_s + (fault.kind == Kind::wired_skew ? fault.value : 0.0),
+              request.plant.info.delay_s + (fault.kind == Kind::wired_skew ? fault.value : 0.0),
               request.plant.info.sample_rate_hz),
         controller_(request.configured.controller),
         y_(plant_.sensors()),
@@ -177,7 +177,7 @@ WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nomi
   for (double& frequency_hz : spec.suspension_hz) frequency_hz *= off(0.2);
   spec.first_mode_hz = random.uniform(150.0, 220.0);
   for (double& damping : spec.flexible_damping) damping *= random.uniform(0.7, 2.0);
-  spec.delay_s *= off(0.05);
+  spec.info.delay_s *= off(0.05);
   spec.sensor_noise_m = 1e-9 * std::exp(random.uniform(std::log(0.3), std::log(3.0)));
   return spec;
 }

@@ -28,7 +28,7 @@ inline WaferStageSpec stop_stage_spec(double controller_gain = 1.0) {
   spec.info.sample_rate_hz = 10e3;
   spec.info.actuators = {{"f", "N", {0, 0, 0}, {0, 0, 1}}};
   spec.info.sensors = {{"s", "m", {0, 0, 0}, {0, 0, 1}}};
-  spec.info.transport_delay_s = spec.delay_s = 130e-6;
+  spec.info.delay_s = 130e-6;
   spec.mass_kg = kStopMass;
   spec.inertia_kg_m2[0] = spec.inertia_kg_m2[1] = spec.inertia_kg_m2[2] = 1.0;
   spec.suspension_hz[2] = 0.3;

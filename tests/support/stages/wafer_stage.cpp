@@ -64,7 +64,7 @@ void set_plant(WaferStageSpec& spec) {
       {820.0, 0.010, shape(17, 13, {0.10, -0.10, 0.04, 0.05}), shape(7, 4, {0.10, -0.10, 0.04})},
       {1240.0, 0.008, shape(17, 15, {0.12, 0.11}), shape(7, 4, {0.02, 0.02, -0.12})},
       {1730.0, 0.008, shape(17, 13, {0.12, 0.13}), shape(7, 4, {-0.13, -0.12})}};
-  spec.delay_s = 130e-6;
+  spec.info.delay_s = 130e-6;
 }
 
 void set_limits(WaferStageSpec& spec) {

@@ -121,7 +121,7 @@ TEST(Configs, TheWaferStageIsTheOneThatTheLibrariesAreTestedWith) {
   expect_same_channels(file.info.actuators, code.info.actuators);
   expect_same_channels(file.info.sensors, code.info.sensors);
   EXPECT_EQ(file.info.sample_rate_hz, code.info.sample_rate_hz);
-  EXPECT_EQ(file.delay_s, code.delay_s);
+  EXPECT_EQ(file.info.delay_s, code.info.delay_s);
   EXPECT_EQ(file.limits.actuator_n, code.limits.actuator_n);
   EXPECT_EQ(file.limits.slew_n_s, code.limits.slew_n_s);
   EXPECT_EQ(file.limits.thermal_rms_n, code.limits.thermal_rms_n);

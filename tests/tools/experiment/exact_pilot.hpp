@@ -18,7 +18,7 @@ inline FrfEstimate exact_pilot(const WaferStageSpec& stage, const Eigen::VectorX
   frf.response.resize(frf.n_outputs() * frf.n_inputs(), frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     frf.response.col(k) =
-        sampled_response(modes, stage.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k])
+        sampled_response(modes, stage.info.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k])
             .reshaped();
   return frf;
 }

@@ -28,7 +28,7 @@ AdditiveModel exact_model(const WaferStageSpec& stage) {
   model.outputs = {{"s1"}, {"m"}};
   model.sample_rate_hz = stage.info.sample_rate_hz;
   model.hold = HoldModel::exact;
-  model.input_delay_s = Eigen::VectorXd::Constant(2, stage.delay_s);
+  model.input_delay_s = Eigen::VectorXd::Constant(2, stage.info.delay_s);
   model.output_delay_s = Eigen::VectorXd::Zero(1);
   for (const PlantMode& m : wafer_stage_modes(stage))
     model.submodels.push_back(mode(m.natural_frequency_hz, m.damping_ratio,
@@ -49,7 +49,7 @@ FrfEstimate lines(const AdditiveModel& model) {
 
 WaferStageSpec small_stage() {
   WaferStageSpec stage = test::small_stage_spec();
-  stage.delay_s = 0.4e-3;
+  stage.info.delay_s = 0.4e-3;
   return stage;
 }
 
