@@ -22,19 +22,19 @@ struct ClosedLoop {
   std::vector<Eigen::MatrixXcd> to_y;
 };
 
-ClosedLoop closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {
+ClosedLoop closed_loop(const ExperimentPlan& plan, const StageSpec& stage, const PlantSpec& plant) {
   const StageInfo& info = stage.info;
   const auto n_u = static_cast<Eigen::Index>(info.actuators.size());
   Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(n_u, plan.axes());
   const std::vector<int> excited = excited_actuators(plan.spec(), info);
   for (std::size_t axis = 0; axis < excited.size(); ++axis)
     selection(excited[axis], static_cast<Eigen::Index>(axis)) = 1.0;
-  const std::vector<PlantMode> modes = wafer_stage_modes(stage);
+  const std::vector<PlantMode> modes = plant_modes(info, plant);
   const MotionController controller(stage.controller);
   ClosedLoop loop;
   for (const double frequency_hz : plan.grid().frequency_hz()) {
     const Eigen::MatrixXcd G =
-        sampled_response(modes, stage.info.delay_s, info.sample_rate_hz, frequency_hz);
+        sampled_response(modes, info.delay_s, info.sample_rate_hz, frequency_hz);
     const Eigen::MatrixXcd K = controller.response(frequency_hz);
     const Eigen::MatrixXcd return_difference = Eigen::MatrixXcd::Identity(n_u, n_u) - K * G;
     loop.to_u.push_back(solve(return_difference, selection.cast<std::complex<double>>()));
@@ -53,11 +53,12 @@ void compare(ChannelPrediction& channel, const char* what, double value,
 
 class Predictor {
  public:
-  Predictor(const ExperimentPlan& plan, const WaferStageSpec& stage)
+  Predictor(const ExperimentPlan& plan, const StageSpec& stage,
+            const std::optional<PlantSpec>& plant)
       : plan_(plan), stage_(stage), dft_(plan.grid().samples_per_period()) {
     result_.crest_factor.assign(plan.spec().axes.size(), 0.0);
-    if (!why_unpredictable(stage).empty()) return;
-    loop_ = closed_loop(plan, stage);
+    if (!why_unpredictable(stage, plant).empty()) return;
+    loop_ = closed_loop(plan, stage, plant.value());
     for (const Channel& c : stage.info.actuators) result_.actuators.push_back({c.name, c.unit});
     for (const Channel& c : stage.info.sensors) result_.sensors.push_back({c.name, c.unit});
   }
@@ -123,7 +124,7 @@ class Predictor {
   }
 
   const ExperimentPlan& plan_;
-  const WaferStageSpec& stage_;
+  const StageSpec& stage_;
   ClosedLoop loop_;
   RealDft dft_;
   DesignPrediction result_;
@@ -139,15 +140,16 @@ std::vector<std::string> DesignPrediction::violations() const {
   return all;
 }
 
-std::string why_unpredictable(const WaferStageSpec& stage) {
+std::string why_unpredictable(const StageSpec& stage, const std::optional<PlantSpec>& plant) {
   if (stage.controller.by_peer)
     return "the stage closes the loop by a controller of its own ('controller: peer')";
-  if (!stage.has_plant()) return "the stage file has no 'plant'";
+  if (!plant) return "the stage file has no 'plant'";
   return "";
 }
 
-DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage) {
-  return Predictor(plan, stage).predict();
+DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const StageSpec& stage,
+                                     const std::optional<PlantSpec>& plant) {
+  return Predictor(plan, stage, plant).predict();
 }
 
 }  // namespace stageid

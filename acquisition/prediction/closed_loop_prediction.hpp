@@ -1,11 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "excitation/plan/experiment_plan.hpp"
-#include "hal/simulator/simulated_stage.hpp"
-#include "hal/stage/limits.hpp"
+#include "hal/simulator/plant_spec.hpp"
+#include "hal/stage/stage_spec.hpp"
 
 namespace stageid {
 
@@ -28,12 +29,13 @@ struct DesignPrediction {
 };
 
 /// Why the signals of a stage cannot be predicted; empty if they can: its plant and its controller are known.
-std::string why_unpredictable(const WaferStageSpec& stage);
+std::string why_unpredictable(const StageSpec& stage, const std::optional<PlantSpec>& plant);
 
 /// Predicts u and y of every run from the exact sampled plant and its controller:
 ///   u = f + (I - K G)^-1 r,  y = G u,  with feed-forward f and K the response from y to u,
 /// line by line, then sample by sample over one period. Only the crest factors if the signals are unpredictable.
 /// @throws std::invalid_argument if the plan excites a channel that the stage does not have.
-DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const WaferStageSpec& stage);
+DesignPrediction predict_closed_loop(const ExperimentPlan& plan, const StageSpec& stage,
+                                     const std::optional<PlantSpec>& plant);
 
 }  // namespace stageid

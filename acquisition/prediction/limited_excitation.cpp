@@ -54,7 +54,7 @@ std::vector<Index> outputs_of(const std::vector<std::string>& names, const Stage
 /// Transfers and noise of the loop, per line.
 class LoopTransfers {
  public:
-  LoopTransfers(const FrequencyGrid& grid, const WaferStageSpec& stage, const PlantPrior& prior,
+  LoopTransfers(const FrequencyGrid& grid, const StageSpec& stage, const PlantPrior& prior,
                 const std::vector<Index>& axes, const std::vector<Index>& outputs)
       : grid_(grid), prior_(prior), axes_(axes), outputs_(outputs) {
     const auto n_u = static_cast<Index>(stage.info.actuators.size());
@@ -154,7 +154,7 @@ void add(BoundedLoop& loop, BoundedSignal signal, std::string unit) {
   loop.units.push_back(std::move(unit));
 }
 
-void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const WaferStageSpec& stage,
+void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const StageSpec& stage,
                   std::size_t i) {
   const Channel& channel = stage.info.actuators[i];
   BoundedSignal u{
@@ -178,7 +178,7 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Wafer
   add(loop, std::move(slew), channel.unit + "/s");
 }
 
-void add_sensor(BoundedLoop& loop, const LoopTransfers& transfers, const WaferStageSpec& stage,
+void add_sensor(BoundedLoop& loop, const LoopTransfers& transfers, const StageSpec& stage,
                 const Eigen::VectorXd& velocity_m_s, std::size_t i) {
   const Channel& channel = stage.info.sensors[i];
   BoundedSignal y{
@@ -196,7 +196,7 @@ void add_sensor(BoundedLoop& loop, const LoopTransfers& transfers, const WaferSt
 }  // namespace
 
 BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experiment,
-                         const WaferStageSpec& stage, const PlantPrior& prior,
+                         const StageSpec& stage, const PlantPrior& prior,
                          const std::vector<std::string>& outputs,
                          const Eigen::VectorXd& velocity_m_s) {
   const std::vector<Index> axes = actuators_of(experiment, stage.info, prior);

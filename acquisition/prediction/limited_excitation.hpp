@@ -6,7 +6,7 @@
 
 #include "acquisition/prediction/plant_prior.hpp"
 #include "excitation/plan/limited_design.hpp"
-#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/stage_spec.hpp"
 
 namespace stageid {
 
@@ -35,7 +35,7 @@ struct BoundedLoop {
 /// @param velocity_m_s  limit of the velocity of every sensor; empty: none
 /// @throws std::invalid_argument naming an axis that the stage or the prior lacks, or an unknown output.
 BoundedLoop bounded_loop(const FrequencyGrid& grid, const ExperimentSpec& experiment,
-                         const WaferStageSpec& stage, const PlantPrior& prior,
+                         const StageSpec& stage, const PlantPrior& prior,
                          const std::vector<std::string>& outputs,
                          const Eigen::VectorXd& velocity_m_s);
 

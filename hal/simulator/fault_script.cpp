@@ -10,7 +10,7 @@
 namespace stageid {
 namespace {
 
-using Fault = WaferStageSpec::Fault;
+using Fault = SimulationSpec::Fault;
 using Kind = Fault::Kind;
 
 constexpr double kLongestExtraDelay = 1000.0;  // samples
@@ -48,7 +48,7 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info) {
 
 }  // namespace
 
-FaultScript::FaultScript(std::vector<WaferStageSpec::Fault> faults, const StageInfo& info)
+FaultScript::FaultScript(std::vector<SimulationSpec::Fault> faults, const StageInfo& info)
     : faults_(std::move(faults)), period_s_(1.0 / info.sample_rate_hz) {
   for (std::size_t i = 0; i < faults_.size(); ++i) {
     check(faults_[i], i + 1, info);

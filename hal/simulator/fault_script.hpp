@@ -8,7 +8,7 @@
 
 namespace stageid {
 
-/// Applies the faults of a WaferStageSpec. Cycles count the exchanges of a run: cycle n takes the command
+/// Applies the faults of a SimulationSpec. Cycles count the exchanges of a run: cycle n takes the command
 /// u[n] and returns the measurement y[n+1].
 ///
 ///   stuck_actuator  silently keeps the force of its last good cycle
@@ -28,11 +28,11 @@ class FaultScript {
  public:
   /// @throws std::invalid_argument if a channel does not exist, a missed_cycle has no cycles, or a value is
   /// invalid.
-  FaultScript(std::vector<WaferStageSpec::Fault> faults, const StageInfo& info);
+  FaultScript(std::vector<SimulationSpec::Fault> faults, const StageInfo& info);
 
   void start_run(int run) noexcept;
   /// Whether a fault of this kind acts.
-  bool any(WaferStageSpec::Fault::Kind kind, std::uint64_t cycle) const noexcept;
+  bool any(SimulationSpec::Fault::Kind kind, std::uint64_t cycle) const noexcept;
   /// Replaces the forces of faulty actuators. `applied`: forces of the last cycle.
   void drive(std::uint64_t cycle, std::span<const double> applied, std::span<double> u) noexcept;
   /// Corrupts a fresh measurement; `last` is the previous one.
@@ -42,7 +42,7 @@ class FaultScript {
   bool empty() const noexcept { return faults_.empty(); }
 
  private:
-  using Fault = WaferStageSpec::Fault;
+  using Fault = SimulationSpec::Fault;
   bool active(const Fault& fault, std::uint64_t cycle) const noexcept;
   void delay(std::uint64_t cycle, std::span<double> u) noexcept;
 

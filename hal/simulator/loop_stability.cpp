@@ -60,11 +60,12 @@ struct LoopMode {
 /// The linear map from one sample of the unexcited loop to the next.
 class SampledLoop {
  public:
-  SampledLoop(const WaferStageSpec& spec, ControllerStateSpace controller)
+  SampledLoop(const StageInfo& info, const std::vector<PlantMode>& modes,
+              ControllerStateSpace controller)
       : controller_(std::move(controller)) {
-    const double period_s = 1.0 / spec.info.sample_rate_hz;
-    const double whole = std::floor(spec.info.delay_s / period_s);
-    fraction_ = spec.info.delay_s / period_s - whole;
+    const double period_s = 1.0 / info.sample_rate_hz;
+    const double whole = std::floor(info.delay_s / period_s);
+    fraction_ = info.delay_s / period_s - whole;
     held_ = static_cast<Index>(whole) + 1;
     const ControllerStateSpace& k = controller_;
     MatrixXd outputs(k.d.rows(), k.a.cols() + k.d.cols());
@@ -72,7 +73,7 @@ class SampledLoop {
     MatrixXd inputs(k.d.cols(), k.a.rows() + k.d.rows());
     inputs << k.b.transpose(), k.d.transpose();
     commands_ = range_of(outputs);
-    add_modes(wafer_stage_modes(spec), range_of(inputs), period_s);
+    add_modes(modes, range_of(inputs), period_s);
   }
 
   Index states() const {
@@ -174,14 +175,13 @@ void balance(MatrixXd& a) {
 }
 
 /// Frequencies for the search of the largest sensitivity: a logarithmic grid, refined around the modes.
-std::vector<double> test_frequencies(const WaferStageSpec& spec) {
+std::vector<double> test_frequencies(const std::vector<PlantMode>& modes, double highest) {
   constexpr int kPerDecade = 200;
   constexpr int kAroundMode = 20;
-  const double highest = 0.5 * spec.info.sample_rate_hz;
   std::vector<double> out;
   for (double f = 1e-5 * highest; f < highest; f *= std::pow(10.0, 1.0 / kPerDecade))
     out.push_back(f);
-  for (const PlantMode& mode : wafer_stage_modes(spec))
+  for (const PlantMode& mode : modes)
     for (int i = -kAroundMode; i <= kAroundMode; ++i) {
       const double f = mode.natural_frequency_hz * (1.0 + 0.2 * mode.damping_ratio * i);
       if (f > 0.0 && f < highest) out.push_back(f);
@@ -198,11 +198,13 @@ double largest_sensitivity(const MatrixXcd& loop_gain) {
 
 bool LoopStability::stable() const noexcept { return !tested || largest_pole <= 1.0 + kRounding; }
 
-LoopStability loop_stability(const WaferStageSpec& spec) {
-  const MotionController controller(spec.controller);
+LoopStability loop_stability(const StageSpec& stage, const PlantSpec& plant) {
+  const StageInfo& info = stage.info;
+  const MotionController controller(stage.controller);
   LoopStability out;
   if (!controller.acts()) return out;
-  const SampledLoop loop(spec, controller.realization());
+  const std::vector<PlantMode> modes = plant_modes(info, plant);
+  const SampledLoop loop(info, modes, controller.realization());
   if (loop.states() > kMostStates) return out;
   MatrixXd a = loop.matrix();
   balance(a);
@@ -212,12 +214,10 @@ LoopStability loop_stability(const WaferStageSpec& spec) {
   out.tested = true;
   Index outermost = 0;
   out.largest_pole = poles.cwiseAbs().maxCoeff(&outermost);
-  out.pole_hz = std::abs(std::arg(poles[outermost])) / kTwoPi * spec.info.sample_rate_hz;
-  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
-  for (const double f : test_frequencies(spec)) {
+  out.pole_hz = std::abs(std::arg(poles[outermost])) / kTwoPi * info.sample_rate_hz;
+  for (const double f : test_frequencies(modes, 0.5 * info.sample_rate_hz)) {
     const double size = largest_sensitivity(
-        -sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, f) *
-        controller.response(f));
+        -sampled_response(modes, info.delay_s, info.sample_rate_hz, f) * controller.response(f));
     if (!(size > out.largest_sensitivity)) continue;
     out.largest_sensitivity = size;
     out.sensitivity_hz = f;

@@ -2,7 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "hal/simulator/simulated_stage.hpp"
+#include "hal/simulator/plant_spec.hpp"
+#include "hal/stage/stage_spec.hpp"
 
 namespace stageid {
 
@@ -10,7 +11,7 @@ namespace stageid {
 /// loci. It does not depend on the units of the channels.
 double largest_sensitivity(const Eigen::MatrixXcd& loop_gain);
 
-/// Stability of the loop of a configured stage.
+/// Stability of the loop of a stage with a known plant.
 struct LoopStability {
   bool tested = false;        ///< false: the loop is open, or the model is too large or not finite
   double largest_pole = 0.0;  ///< |z| of the outermost closed-loop pole; stable below 1
@@ -24,6 +25,6 @@ struct LoopStability {
 /// Computed from the eigenvalues of the exact sampled loop of the linear plant, with modes, delay and controller
 /// as in the simulator. Modes that the controller does not excite or measure are excluded.
 /// @throws std::invalid_argument for an invalid controller or plant
-LoopStability loop_stability(const WaferStageSpec& spec);
+LoopStability loop_stability(const StageSpec& stage, const PlantSpec& plant);
 
 }  // namespace stageid

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "hal/simulator/simulated_stage.hpp"
+#include "hal/simulator/plant_spec.hpp"
 
 namespace stageid {
 

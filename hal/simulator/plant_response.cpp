@@ -8,7 +8,7 @@
 #include <complex>
 
 #include "hal/simulator/mode_transition.hpp"
-#include "hal/simulator/simulated_stage.hpp"
+#include "hal/simulator/plant_spec.hpp"
 #include "hal/stage/require.hpp"
 
 namespace stageid {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/modal_plant.hpp"
@@ -12,24 +13,40 @@
 namespace stageid {
 namespace {
 
-constexpr Eigen::Index kHeaveMode = 2;  // of wafer_stage_modes(): x y z ...
+constexpr Eigen::Index kHeaveMode = 2;  // of plant_modes(): x y z ...
 
-NoiseSpec noise_of(const WaferStageSpec& spec) {
-  return {static_cast<Eigen::Index>(spec.info.actuators.size()),
-          static_cast<Eigen::Index>(spec.info.sensors.size()),
-          spec.info.sample_rate_hz,
+const SimulationSpec& checked(const SimulationSpec& spec, double pace) {
+  const std::pair<const char*, double> fields[] = {
+      {"noise sensor_m", spec.sensor_noise_m},
+      {"noise sensor_coloured_m", spec.sensor_noise_coloured_m},
+      {"noise force_n", spec.force_noise_n},
+      {"noise sensor_quantum_m", spec.sensor_quantum_m},
+      {"noise actuator_quantum_n", spec.actuator_quantum_n},
+      {"pace", pace}};
+  for (const auto& [field, value] : fields)
+    require(value >= 0.0 && std::isfinite(value), "stage: {} is {}; must be 0 or more", field,
+            value);
+  const double corner_hz = spec.sensor_noise_corner_hz;
+  require(corner_hz > 0.0 && std::isfinite(corner_hz),
+          "stage: noise sensor_corner_hz is {}; must be positive", corner_hz);
+  return spec;
+}
+
+NoiseSpec noise_of(const StageInfo& info, const SimulationSpec& spec) {
+  return {static_cast<Eigen::Index>(info.actuators.size()),
+          static_cast<Eigen::Index>(info.sensors.size()),
+          info.sample_rate_hz,
           spec.force_noise_n,
           spec.sensor_noise_m,
           spec.sensor_noise_coloured_m,
           spec.sensor_noise_corner_hz};
 }
 
-StageInfo info_of(const WaferStageSpec& spec) {
-  StageInfo info = spec.info;
+StageInfo info_of(StageInfo info, double pace) {
   if (info.backend.empty()) info.backend = "sim";
   if (info.maximum_rate_hz == 0.0) info.maximum_rate_hz = info.sample_rate_hz;
-  info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
-  if (spec.pace > 0.0) info.pace = spec.pace;
+  info.clock = pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  if (pace > 0.0) info.pace = pace;
   return info;
 }
 
@@ -40,21 +57,24 @@ void quantize(Eigen::ArrayXd& values, double quantum) {
 }  // namespace
 
 struct SimulatedStage::State {
-  explicit State(const WaferStageSpec& checked)
-      : spec(checked),
-        info(info_of(checked)),
-        plant(wafer_stage_modes(checked), checked.info.delay_s, checked.info.sample_rate_hz),
-        noise(noise_of(checked)),
-        pacer(checked.info.sample_rate_hz, checked.pace),
-        faults(checked.faults, checked.info),
+  State(const StageInfo& stage, const PlantSpec& of_plant, const SimulationSpec& of_simulation,
+        double pace)
+      : spec(of_simulation),
+        plant_spec(of_plant),
+        info(info_of(stage, pace)),
+        plant(plant_modes(stage, plant_spec), stage.delay_s, stage.sample_rate_hz),
+        noise(noise_of(stage, spec)),
+        pacer(stage.sample_rate_hz, pace),
+        faults(spec.faults, stage),
         u(Eigen::ArrayXd::Zero(plant.actuators())),
         commanded(Eigen::ArrayXd::Zero(plant.actuators())),
         applied(Eigen::ArrayXd::Zero(plant.actuators())),
         y(Eigen::ArrayXd::Zero(plant.sensors())),
         last_y(Eigen::ArrayXd::Zero(plant.sensors())),
-        all_sensors(all_bits(checked.info.sensors.size())) {}
+        all_sensors(all_bits(stage.sensors.size())) {}
 
-  WaferStageSpec spec;
+  SimulationSpec spec;
+  PlantSpec plant_spec;
   StageInfo info;
   ModalPlant plant;
   StageNoise noise;
@@ -77,8 +97,8 @@ struct SimulatedStage::State {
     u = commanded;
     if (off) u.setZero();
     if (spec.actuator_quantum_n > 0.0) quantize(u, spec.actuator_quantum_n);
-    if (spec.actuator_saturation_n > 0.0)
-      u = u.min(spec.actuator_saturation_n).max(-spec.actuator_saturation_n);
+    if (plant_spec.actuator_saturation_n > 0.0)
+      u = u.min(plant_spec.actuator_saturation_n).max(-plant_spec.actuator_saturation_n);
     if (!faults.empty() && !off)
       faults.drive(cycle, {applied.data(), command.size()}, {u.data(), command.size()});
     applied = u;
@@ -88,11 +108,11 @@ struct SimulatedStage::State {
   void drive() noexcept {
     noise.next();
     u += Eigen::Map<const Eigen::ArrayXd>(noise.force_n(), u.size());
-    if (spec.cubic_stiffness_n_m3 > 0.0) {
+    if (plant_spec.cubic_stiffness_n_m3 > 0.0) {
       // The nonlinear force is sampled and held over the interval, so the discretization remains exact.
-      const double shape = 1.0 / std::sqrt(spec.mass_kg);
+      const double shape = 1.0 / std::sqrt(plant_spec.mass_kg);
       const double z_m = shape * plant.coordinate(kHeaveMode);
-      plant.add_modal_force(kHeaveMode, -shape * spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);
+      plant.add_modal_force(kHeaveMode, -shape * plant_spec.cubic_stiffness_n_m3 * z_m * z_m * z_m);
     }
     plant.step(u.data());
   }
@@ -105,8 +125,9 @@ struct SimulatedStage::State {
   }
 };
 
-SimulatedStage::SimulatedStage(const WaferStageSpec& spec)
-    : state_(std::make_unique<State>(spec)) {}
+SimulatedStage::SimulatedStage(const StageInfo& info, const PlantSpec& plant,
+                               const SimulationSpec& simulation, double pace)
+    : state_(std::make_unique<State>(info, plant, checked(simulation, pace), pace)) {}
 
 SimulatedStage::~SimulatedStage() = default;
 
@@ -147,8 +168,8 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
     return Outcome::fault;
   }
   const bool faulty = !s.faults.empty();
-  const bool missed = faulty && s.faults.any(WaferStageSpec::Fault::Kind::missed_cycle, s.cycle);
-  const bool off = faulty && s.faults.any(WaferStageSpec::Fault::Kind::interlock, s.cycle);
+  const bool missed = faulty && s.faults.any(SimulationSpec::Fault::Kind::missed_cycle, s.cycle);
+  const bool off = faulty && s.faults.any(SimulationSpec::Fault::Kind::interlock, s.cycle);
   const bool accepted = s.take_command(outputs.u, missed, off);
   s.drive();
   s.measure();

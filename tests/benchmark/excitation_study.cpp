@@ -26,8 +26,8 @@
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/confidence.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/plant_prior_file.hpp"
 
@@ -41,7 +41,7 @@ double since(Clock::time_point start) {
 }
 
 struct Study {
-  WaferStageSpec stage;
+  test::SimulatedSpec stage;
   int runs = 1000;
   double period_s = 4.0;
   double high_hz = 2000.0;
@@ -71,7 +71,7 @@ struct Study {
 };
 
 FrfEstimate measure(const Study& study, const ExperimentPlan& plan, const FrfOptions& options) {
-  LimitedStage stage(std::make_unique<SimulatedStage>(study.stage), study.stage.limits);
+  LimitedStage stage(test::simulated(study.stage), study.stage.limits);
   MotionController controller(study.stage.controller);
   const test::TemporaryDirectory directory;
   SlogWriter log =
@@ -158,7 +158,7 @@ void print_use(const BoundedLoop& loop, const LimitedDesign& design) {
 
 /// Runs that end at a limit, of so many with noise of their own.
 int violations(const Study& study, const ExperimentPlan& plan, int runs) {
-  LimitedStage stage(std::make_unique<SimulatedStage>(study.stage), study.stage.limits);
+  LimitedStage stage(test::simulated(study.stage), study.stage.limits);
   MotionController controller(study.stage.controller);
   SampleRing ring(study.stage.info.actuators.size() + study.stage.info.sensors.size() + 1, 4096);
   MeasurementLoop loop(stage, controller, ring);
@@ -237,7 +237,8 @@ int main(int argc, char** argv) {
     return i < argc ? std::atof(argv[i]) : otherwise;
   };
   Study study;
-  study.stage = load_stage_config(argv[1]).spec;
+  const StageConfig config = load_stage_config(argv[1]);
+  study.stage = {config.spec, config.plant.value(), config.simulation, config.pace};
   study.runs = static_cast<int>(number(2, study.runs));
   study.period_s = number(3, study.period_s);
   study.high_hz = number(4, study.high_hz);

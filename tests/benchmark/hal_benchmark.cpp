@@ -15,8 +15,8 @@ namespace {
 using namespace stageid;
 
 void plant_step(benchmark::State& state) {
-  const WaferStageSpec spec = test::wafer_stage_spec();
-  ModalPlant plant(wafer_stage_modes(spec), spec.info.delay_s, spec.info.sample_rate_hz);
+  const test::SimulatedSpec spec = test::wafer_stage_spec();
+  ModalPlant plant(plant_modes(spec.info, spec.plant), spec.info.delay_s, spec.info.sample_rate_hz);
   std::vector<double> u(17, 0.1);
   std::vector<double> y(7);
   for (auto _ : state) {
@@ -52,8 +52,8 @@ void noise_sample(benchmark::State& state) {
 BENCHMARK(noise_sample);
 
 void limited_closed_loop_cycle(benchmark::State& state) {
-  const WaferStageSpec spec = test::wafer_stage_spec();
-  LimitedStage stage(std::make_unique<SimulatedStage>(spec), spec.limits);
+  const test::SimulatedSpec spec = test::wafer_stage_spec();
+  LimitedStage stage(test::simulated(spec), spec.limits);
   MotionController controller(spec.controller);
   std::vector<double> y(7);
   std::vector<double> u(17);

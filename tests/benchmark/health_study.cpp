@@ -55,8 +55,8 @@ struct PlantResult {
 };
 
 struct Study {
-  WaferStageSpec nominal = test::wafer_stage_spec();
-  std::optional<NominalStage> expectation = nominal_stage(nominal);
+  test::SimulatedSpec nominal = test::wafer_stage_spec();
+  std::optional<NominalStage> expectation = nominal_stage(nominal, nominal.plant);
   bool verbose = false;
   std::string only;
 
@@ -80,7 +80,7 @@ PlantResult Study::of_plant(int seed) const {
   PlantResult result;
   test::FaultyLogRequest request;
   request.configured = nominal;
-  request.plant = test::random_wafer_stage(static_cast<std::uint64_t>(seed), nominal);
+  request.stage = test::random_wafer_stage(static_cast<std::uint64_t>(seed), nominal);
   request.seed = static_cast<std::uint64_t>(seed) + 1000;
   const MemoryLog clean = test::simulate_faulty_log(request, {});
   for (const test::NamedFault& planted :

@@ -9,7 +9,6 @@
 
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -40,9 +39,9 @@ void print(const char* what, const TimingHistogram& histogram) {
 }
 
 int measure(int seconds, const RealTimeOptions& real_time) {
-  WaferStageSpec spec = test::wafer_stage_spec();
+  test::SimulatedSpec spec = test::wafer_stage_spec();
   spec.pace = 1.0;
-  LimitedStage stage(std::make_unique<SimulatedStage>(spec), spec.limits);
+  LimitedStage stage(test::simulated(spec), spec.limits);
   MotionController controller(spec.controller);
   const ExperimentPlan plan = plan_of(seconds);
   const test::TemporaryDirectory directory(std::filesystem::temp_directory_path());

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "hal/simulator/simulated_stage.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 
 namespace stageid::test {
 
@@ -59,14 +59,13 @@ class Driver {
 };
 
 struct OwnSimulatedStage {
-  SimulatedStage simulated;
+  std::unique_ptr<SimulatedStage> own;
 };
 
 class Bench : private OwnSimulatedStage, public Driver {
  public:
-  explicit Bench(const WaferStageSpec& spec)
-      : OwnSimulatedStage{SimulatedStage(spec)}, Driver(simulated) {}
-  SimulatedStage& stage() { return simulated; }
+  explicit Bench(const SimulatedSpec& spec) : OwnSimulatedStage{simulated(spec)}, Driver(*own) {}
+  SimulatedStage& stage() { return *own; }
 };
 
 }  // namespace stageid::test

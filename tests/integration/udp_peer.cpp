@@ -37,7 +37,8 @@ struct Datagram {
 
 class Device {
  public:
-  Device(const WaferStageSpec& spec, double watchdog_s) : actuators_(spec.info.actuators.size()) {
+  Device(const test::SimulatedSpec& spec, double watchdog_s)
+      : actuators_(spec.info.actuators.size()) {
     auto stage = std::make_unique<test::WatchedStage>(spec);
     watch_ = stage.get();
     node_ = std::make_unique<StageNode>(std::move(stage), spec.limits, spec.controller, NodePanel{},
@@ -128,6 +129,8 @@ int main(int argc, char** argv) {
   const std::uint64_t cycles = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 0;
   const int port = argc > 3 ? std::atoi(argv[3]) : 0;
   const double watchdog_s = argc > 4 ? std::atof(argv[4]) : 5.0;
-  return serve({load_stage_config(argv[1]).spec, watchdog_s}, cycles,
-               static_cast<std::uint16_t>(port));
+  const StageConfig config = load_stage_config(argv[1]);
+  const test::SimulatedSpec spec = {config.spec, config.plant.value(), config.simulation,
+                                    config.pace};
+  return serve({spec, watchdog_s}, cycles, static_cast<std::uint16_t>(port));
 }

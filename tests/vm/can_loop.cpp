@@ -30,7 +30,7 @@ using namespace stageid;
 constexpr int kAttempts = 50;
 
 struct Setup {
-  WaferStageSpec stage = test::small_stage_spec();
+  test::SimulatedSpec stage = test::small_stage_spec();
   CanSpec can;
   std::string interface;
 };
@@ -57,8 +57,8 @@ Setup make_setup(const std::string& interface, double rate_hz) {
 void serve(const Setup& setup, const std::atomic<bool>& end) {
   NodeOptions options;
   options.watchdog_s = setup.can.watchdog_s;
-  StageNode node(std::make_unique<SimulatedStage>(setup.stage), setup.stage.limits,
-                 setup.stage.controller, NodePanel{}, options);
+  StageNode node(test::simulated(setup.stage), setup.stage.limits, setup.stage.controller,
+                 NodePanel{}, options);
   const CanLayout layout = can_layout(setup.can, setup.stage.info);
   SocketCan bus({setup.interface}, can_node_identifiers(layout));
   CanNode front(node, layout, bus);

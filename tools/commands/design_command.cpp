@@ -68,7 +68,7 @@ struct DesignFlags {
 
 std::vector<std::string> design_table(const ExperimentConfig& config, const ExperimentPlan& plan,
                                       const DesignPrediction& prediction) {
-  const WaferStageSpec& stage = config.stage.spec;
+  const StageSpec& stage = config.stage.spec;
   const Eigen::VectorXd frequency_hz = plan.grid().frequency_hz();
   std::vector<std::string> lines;
   const auto [least, most] =
@@ -134,7 +134,8 @@ void design(const DesignFlags& flags, Console& console) {
                       "--accuracy: needs the noise of a prior; set 'level: {limits: {prior: "
                       "FILE}}' in the experiment file");
   const ExperimentPlan plan = make_plan(config);
-  const DesignPrediction prediction = predict_closed_loop(plan, config.stage.spec);
+  const DesignPrediction prediction =
+      predict_closed_loop(plan, config.stage.spec, config.stage.plant);
   warn_of_prediction(config, console);
   const bool written = flags.force || prediction.violations().empty();
   if (written) write_experiment_plan(flags.output, plan);

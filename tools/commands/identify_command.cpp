@@ -98,7 +98,7 @@ class Identification {
   /// @throws FileError, FormatError, std::invalid_argument, StageError, Interrupted
   int run() {
     for (const char* name : kResults) note_own_file(path(name));
-    require_backend(config_, config_.stage.backend, config_.stage.spec.pace);
+    require_backend(config_, config_.stage.backend, config_.stage.pace);
     say_at_interrupt("finished steps are kept; continue with --resume");
     design();
     const int measured = measure_all();
@@ -140,7 +140,8 @@ class Identification {
     }
     // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
     const DesignPrediction prediction =
-        config_.limits ? DesignPrediction{} : predict_closed_loop(plan_, config_.stage.spec);
+        config_.limits ? DesignPrediction{}
+                       : predict_closed_loop(plan_, config_.stage.spec, config_.stage.plant);
     if (!config_.limits) warn_of_prediction(config_, console_);
     if (!flags_.force) require_within_limits(config_, prediction);
     require_directory(flags_.output);
@@ -269,8 +270,9 @@ class Identification {
           validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
     }
     verdict_ = judge_model(model_, health_, validation_);
-    if (config_.stage.spec.has_plant())
-      truth_ = compare_with_truth(model_, setup_->frf, config_.stage.spec);
+    if (config_.stage.plant)
+      truth_ =
+          compare_with_truth(model_, setup_->frf, config_.stage.spec.info, *config_.stage.plant);
   }
 
   void write_outputs() {

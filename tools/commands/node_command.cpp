@@ -161,7 +161,7 @@ constexpr double kHot_k = 320.0;
 
 /// Initial values of the supervisor panel, in the middle of the expected ranges.
 NodePanel panel_of(const StageConfig& config) {
-  const double share_n = config.spec.mass_kg * kGravity_m_s2 / kCompensators;
+  const double share_n = config.plant.value().mass_kg * kGravity_m_s2 / kCompensators;
   PlantConditions ranges;
   ranges.gravity_low_n = 0.5 * share_n;
   ranges.gravity_high_n = 1.5 * share_n;
@@ -235,13 +235,13 @@ double node_watchdog_s(const NodeFlags& flags, const StageConfig& config) {
 }
 
 StageNode make_node(const NodeFlags& flags, const StageConfig& config) {
-  WaferStageSpec spec = config.spec;
-  spec.pace = 0.0;  // the requests for samples set the pace
   NodeOptions options;
   options.watchdog_s = node_watchdog_s(flags, config);
   options.hold_s = flags.hold_s;
-  return {std::make_unique<SimulatedStage>(spec), spec.limits, spec.controller, panel_of(config),
-          options};
+  // In virtual time, because the requests for samples set the pace.
+  return {
+      std::make_unique<SimulatedStage>(config.spec.info, config.plant.value(), config.simulation),
+      config.spec.limits, config.spec.controller, panel_of(config), options};
 }
 
 void serve_can(const NodeFlags& flags, Console& console, const StageConfig& config,
@@ -262,7 +262,7 @@ void serve(const NodeFlags& flags, Console& console) {
     throw std::invalid_argument(
         "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
   const StageConfig config = load_stage_config(flags.config);
-  if (!config.spec.has_plant())
+  if (!config.plant)
     throw FormatError(flags.config, "",
                       "the node simulates the stage, but there is no group 'plant'; add it");
   if (config.spec.controller.by_peer)

@@ -187,7 +187,8 @@ NominalStage read_controller_file(const YamlDocument& document) {
         f.linear.has_state_space ? response_of_state_space(f) : response_of_transfer(f);
   }
   if (!f.stage.empty()) {
-    const NominalStage stage = nominal_stage(load_stage_config(folder / f.stage).spec);
+    const StageConfig config = load_stage_config(folder / f.stage);
+    const NominalStage stage = nominal_stage(config.spec, config.plant);
     std::string missing;
     const auto y = positions_in(stage.sensors, nominal.sensors, &missing);
     const auto u = positions_in(stage.actuators, nominal.actuators, &missing);

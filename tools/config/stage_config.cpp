@@ -58,34 +58,36 @@ Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channe
   return shape;
 }
 
-void take_limits(const StageFile& file, WaferStageSpec& spec) {
-  spec.limits.actuator_n = limit_vector(file.actuators, &ChannelConfig::limit_n);
-  spec.limits.slew_n_s = limit_vector(file.actuators, &ChannelConfig::slew_n_s);
-  spec.limits.thermal_rms_n = limit_vector(file.actuators, &ChannelConfig::thermal_rms_n);
-  spec.limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
-  spec.limits.hard_window_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
+void take_limits(const StageFile& file, StageLimits& limits) {
+  limits.actuator_n = limit_vector(file.actuators, &ChannelConfig::limit_n);
+  limits.slew_n_s = limit_vector(file.actuators, &ChannelConfig::slew_n_s);
+  limits.thermal_rms_n = limit_vector(file.actuators, &ChannelConfig::thermal_rms_n);
+  limits.position_window_m = limit_vector(file.sensors, &ChannelConfig::window_m);
+  limits.hard_window_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
     return sensor.hard_window_m > 0.0 ? sensor.hard_window_m : 2.0 * sensor.window_m;
   });
-  spec.limits.deviation_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
+  limits.deviation_m = per_channel(file.sensors, [](const ChannelConfig& sensor) {
     if (is_acceleration(sensor.channel)) return kUnlimited;  // not predicted
     return sensor.deviation_m > 0.0 ? sensor.deviation_m : 0.5 * sensor.window_m;
   });
-  spec.limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
-  spec.limits.thermal_time_constant_s = file.thermal_time_constant_s;
+  limits.speed_m_s = limit_vector(file.sensors, &ChannelConfig::speed_m_s);
+  limits.thermal_time_constant_s = file.thermal_time_constant_s;
 }
 
-void take_faults(const StageConfig& config, const StageFile& file, WaferStageSpec& spec) {
-  using Kind = WaferStageSpec::Fault::Kind;
+void take_faults(const StageFile& file, StageConfig& config) {
+  using Kind = SimulationSpec::Fault::Kind;
+  const StageInfo& info = config.spec.info;
+  std::vector<SimulationSpec::Fault>& faults = config.simulation.faults;
   for (const FaultConfig& fault : file.faults) {
-    spec.faults.push_back(fault.fault);
+    faults.push_back(fault.fault);
     if (fault.channel.empty()) {
-      spec.faults.back().channel = -1;
+      faults.back().channel = -1;
       continue;
     }
     const bool actuator =
         fault.fault.kind == Kind::stuck_actuator || fault.fault.kind == Kind::actuator_gain;
-    spec.faults.back().channel =
-        require_channel(config, actuator ? spec.info.actuators : spec.info.sensors, fault.channel,
+    faults.back().channel =
+        require_channel(config, actuator ? info.actuators : info.sensors, fault.channel,
                         actuator ? "actuator" : "sensor", "faults");
   }
 }
@@ -112,25 +114,26 @@ void take_controller(StageConfig& config, const StageFile& file,
   controller.feed_forward_n = per_channel(file.actuators, &ChannelConfig::bias_n);
 }
 
-void complete_spec(StageConfig& config, const StageFile& file) {
-  WaferStageSpec& spec = config.spec;
+void complete_plant(StageConfig& config, const StageFile& file, PlantSpec& plant) {
+  const StageInfo& info = config.spec.info;
+  std::copy_n(file.inertia_kg_m2.begin(), 3, plant.inertia_kg_m2);
+  std::copy_n(file.suspension_hz.begin(), 6, plant.suspension_hz);
+  for (const InPlaneModeConfig& mode : file.in_plane_modes)
+    plant.in_plane_modes.push_back(
+        {mode.natural_frequency_hz, mode.damping_ratio,
+         shape_vector(config, info.actuators, mode.actuators, "actuator"),
+         shape_vector(config, info.sensors, mode.sensors, "sensor")});
+}
+
+void complete_config(StageConfig& config, const StageFile& file) {
+  StageSpec& spec = config.spec;
   spec.info.backend = to_string(config.backend);
   spec.info.maximum_rate_hz = spec.info.sample_rate_hz;
-  spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
-  if (spec.has_plant()) {
-    std::copy_n(file.inertia_kg_m2.begin(), 3, spec.inertia_kg_m2);
-    std::copy_n(file.suspension_hz.begin(), 6, spec.suspension_hz);
-  }
-  for (const InPlaneModeConfig& mode : file.in_plane_modes)
-    spec.in_plane_modes.push_back(
-        {mode.natural_frequency_hz, mode.damping_ratio,
-         shape_vector(config, spec.info.actuators, mode.actuators, "actuator"),
-         shape_vector(config, spec.info.sensors, mode.sensors, "sensor")});
-  take_limits(file, spec);
-  take_faults(config, file, spec);
-  const std::array<double, kRigidAxes> inertia = {spec.mass_kg,          spec.mass_kg,
-                                                  spec.mass_kg,          spec.inertia_kg_m2[0],
-                                                  spec.inertia_kg_m2[1], spec.inertia_kg_m2[2]};
+  spec.info.clock = config.pace > 0.0 ? Clock::wall : Clock::virtual_time;
+  if (config.plant) complete_plant(config, file, *config.plant);
+  take_limits(file, spec.limits);
+  take_faults(file, config);
+  const auto inertia = config.plant.value_or(PlantSpec{}).axis_inertia();
   take_controller(config, file, inertia);
   spec.limits.motion =
       rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors, inertia);
@@ -153,11 +156,11 @@ StageConfig stage_config(const std::filesystem::path& path, const YamlDocument& 
   if (config.plugin) config.plugin->library = path.parent_path() / config.plugin->library;
   // Errors of the libraries get the name of the file; they contain the place themselves.
   try {
-    complete_spec(config, file);
+    complete_config(config, file);
     if (file.can.config.present)
       config.can = complete_can(file.can, config.spec.info, config.spec.limits);
-    if (config.spec.has_plant()) {
-      const SimulatedStage stage(config.spec);
+    if (config.plant) {
+      const SimulatedStage stage(config.spec.info, *config.plant, config.simulation);
     }
     complete_limits(config.spec.limits, config.spec.info);
     const MotionController controller(config.spec.controller);
@@ -196,7 +199,7 @@ StageInfo stage_info(const std::filesystem::path& name, std::string text) {
   return stage_file(YamlDocument::parse(name, std::move(text))).config.spec.info;
 }
 
-std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
+std::vector<PlantMode> flexible_modes_seen(const StageInfo& info, const PlantSpec& plant,
                                            const std::vector<std::string>& actuators,
                                            const std::vector<std::string>& sensors) {
   const auto seen = [](const Eigen::VectorXd& shape, const std::vector<Channel>& channels,
@@ -207,13 +210,13 @@ std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
       return index >= 0 && std::abs(shape[index]) > 1e-6 * largest;
     });
   };
-  const std::vector<PlantMode> all = wafer_stage_modes(spec);
+  const std::vector<PlantMode> all = plant_modes(info, plant);
   std::vector<PlantMode> modes;
   for (std::size_t i = kRigidAxes; i < all.size(); ++i) {
     Eigen::VectorXd shape = all[i].sensor_shape;
     if (all[i].acceleration_shape.size() > 0) shape += all[i].acceleration_shape;
-    if (seen(all[i].actuator_shape, spec.info.actuators, actuators) &&
-        seen(shape, spec.info.sensors, sensors))
+    if (seen(all[i].actuator_shape, info.actuators, actuators) &&
+        seen(shape, info.sensors, sensors))
       modes.push_back(all[i]);
   }
   return modes;

@@ -10,9 +10,8 @@
 #include "excitation/words/words.hpp"
 #include "hal/plugin/plugin_stage.hpp"
 #include "hal/simulator/simulated_stage.hpp"
-#include "hal/stage/limited_stage.hpp"
-#include "hal/stage/motion_controller.hpp"
 #include "hal/stage/real_time.hpp"
+#include "hal/stage/stage_spec.hpp"
 #include "tools/config/can_config.hpp"
 #include "tools/config/config_visitor.hpp"
 #include "tools/config/modbus_config.hpp"
@@ -30,7 +29,7 @@ struct RealTimeKeys {
   int misses_allowed = 10;  ///< see LoopOptions
 };
 
-/// Content of a stage file and the WaferStageSpec derived from it.
+/// Content of a stage file, and the stage derived from it.
 struct StageConfig {
   std::filesystem::path file;
   std::string text;             ///< of the file, kept for the log
@@ -39,7 +38,10 @@ struct StageConfig {
   RealTimeKeys real_time;
   double ramp_s = 0.1;  ///< of a stop, see LoopOptions
   BetweenRuns between_runs = BetweenRuns::release;
-  WaferStageSpec spec;  ///< complete: limits, controller from the geometry, faults
+  StageSpec spec;                  ///< complete: limits, controller from the geometry
+  std::optional<PlantSpec> plant;  ///< of the simulation, or for predictions
+  SimulationSpec simulation;
+  double pace = 0.0;  ///< 0: virtual time; 1: wall clock
   CanConfig can;
   std::optional<ModbusConfig> modbus;          ///< of the stage
   std::optional<PluginSpec> plugin;            ///< a third-party back end
@@ -62,7 +64,7 @@ void describe_stage_keys(ConfigVisitor& visitor);
 
 /// The modes that can appear in the identified sub-plant: out-of-plane and flexible ones, observed by at least one of
 /// `sensors` and driven by at least one of `actuators` (names).
-std::vector<PlantMode> flexible_modes_seen(const WaferStageSpec& spec,
+std::vector<PlantMode> flexible_modes_seen(const StageInfo& info, const PlantSpec& plant,
                                            const std::vector<std::string>& actuators,
                                            const std::vector<std::string>& sensors);
 

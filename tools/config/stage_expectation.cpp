@@ -53,25 +53,25 @@ NominalStage with_channels_of(const LogInfo& info, NominalStage all) {
 
 }  // namespace
 
-NominalStage nominal_stage(const WaferStageSpec& spec) {
+NominalStage nominal_stage(const StageSpec& stage, const std::optional<PlantSpec>& plant) {
   NominalStage nominal;
-  nominal.actuators = names_of(spec.info.actuators);
-  nominal.sensors = names_of(spec.info.sensors);
-  if (!spec.controller.by_peer) {
-    const auto controller = std::make_shared<const MotionController>(spec.controller);
+  nominal.actuators = names_of(stage.info.actuators);
+  nominal.sensors = names_of(stage.info.sensors);
+  if (!stage.controller.by_peer) {
+    const auto controller = std::make_shared<const MotionController>(stage.controller);
     nominal.controller = [controller](double frequency_hz) {
       return controller->response(frequency_hz);
     };
   }
-  if (!spec.has_plant()) return nominal;
-  std::vector<PlantMode> rigid = wafer_stage_modes(spec);
+  if (!plant) return nominal;
+  std::vector<PlantMode> rigid = plant_modes(stage.info, *plant);
   rigid.resize(kRigidAxes);
-  nominal.rigid_body = [rigid, delay_s = spec.info.delay_s,
-                        rate_hz = spec.info.sample_rate_hz](double frequency_hz) {
+  nominal.rigid_body = [rigid, delay_s = stage.info.delay_s,
+                        rate_hz = stage.info.sample_rate_hz](double frequency_hz) {
     return sampled_response(rigid, delay_s, rate_hz, frequency_hz);
   };
-  nominal.free_from_hz = kFreeOverSuspension * *std::max_element(std::begin(spec.suspension_hz),
-                                                                 std::end(spec.suspension_hz));
+  nominal.free_from_hz = kFreeOverSuspension * *std::max_element(std::begin(plant->suspension_hz),
+                                                                 std::end(plant->suspension_hz));
   return nominal;
 }
 
@@ -80,14 +80,16 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
   if (!stage_file.empty()) {
     const YamlDocument document = YamlDocument::read(stage_file);
     if (is_controller_file(document)) return with_channels_of(info, read_controller_file(document));
-    return nominal_stage(load_stage_config(stage_file).spec);
+    const StageConfig config = load_stage_config(stage_file);
+    return nominal_stage(config.spec, config.plant);
   }
   const auto json = parse_json<nlohmann::json>(info.metadata_json);
   const std::string stage = text_in(json, "stage");
   if (stage.empty()) return std::nullopt;
   try {
-    return nominal_stage(
-        parse_stage_config(text_in(json, "stage_file"), stage, text_in(json, "controller")).spec);
+    const StageConfig config =
+        parse_stage_config(text_in(json, "stage_file"), stage, text_in(json, "controller"));
+    return nominal_stage(config.spec, config.plant);
   } catch (const FormatError&) {
     return std::nullopt;  // written by another version; --stage can name a readable file
   }

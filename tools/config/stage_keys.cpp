@@ -136,15 +136,15 @@ void describe_sensor(ConfigVisitor& v, std::vector<ChannelConfig>& list) {
   add_channel(v, std::move(c), list);
 }
 
-void describe_plate(ConfigVisitor& v, WaferStageSpec& s) {
-  v.number("length_x_m", s.length_x_m, positive("m"), kRequired, "size of the plate along x");
-  v.number("length_y_m", s.length_y_m, positive("m"), kRequired, "size of the plate along y");
-  v.number("first_mode_hz", s.first_mode_hz, positive("Hz"), kRequired,
+void describe_plate(ConfigVisitor& v, PlantSpec& p) {
+  v.number("length_x_m", p.length_x_m, positive("m"), kRequired, "size of the plate along x");
+  v.number("length_y_m", p.length_y_m, positive("m"), kRequired, "size of the plate along y");
+  v.number("first_mode_hz", p.first_mode_hz, positive("Hz"), kRequired,
            "scales the stiffness of the plate");
-  v.number("poisson_ratio", s.poisson_ratio, {"", 0.0, 0.499}, kOptional,
+  v.number("poisson_ratio", p.poisson_ratio, {"", 0.0, 0.499}, kOptional,
            "Poisson's ratio of the plate");
-  count(v, "modes", s.flexible_modes, 0, 40, kRequired, "number of flexible modes");
-  v.numbers("damping", s.flexible_damping, {"", 0.0, 0.999}, {1}, kRequired,
+  count(v, "modes", p.flexible_modes, 0, 40, kRequired, "number of flexible modes");
+  v.numbers("damping", p.flexible_damping, {"", 0.0, 0.999}, {1}, kRequired,
             "damping ratio of each mode; the last one repeats");
 }
 
@@ -161,25 +161,25 @@ void describe_in_plane_mode(ConfigVisitor& v, std::vector<InPlaneModeConfig>& li
 }
 
 void describe_plant(ConfigVisitor& v, StageFile& f) {
-  WaferStageSpec& s = f.config.spec;
-  v.number("mass_kg", s.mass_kg, positive("kg"), kRequired, "moving mass");
+  PlantSpec& p = f.config.plant.emplace();
+  v.number("mass_kg", p.mass_kg, positive("kg"), kRequired, "moving mass");
   v.numbers("inertia_kg_m2", f.inertia_kg_m2, positive("kg m^2"), {3, 3}, kRequired,
             "about x, y, z");
   v.numbers("suspension_hz", f.suspension_hz, not_negative("Hz"), {6, 6}, kRequired,
             "suspension by the gravity compensators: x y z Rx Ry Rz; 0: free");
-  v.number("suspension_damping", s.suspension_damping, {"", 0.0, 0.999}, kOptional,
+  v.number("suspension_damping", p.suspension_damping, {"", 0.0, 0.999}, kOptional,
            "damping ratio of the suspension");
-  group(v, "plate", describe_plate, s, kRequired,
+  group(v, "plate", describe_plate, p, kRequired,
         "free rectangular plate: the flexible modes out of plane");
   items(v, "in_plane_modes", describe_in_plane_mode, f.in_plane_modes, {}, kOptional,
         "flexible modes in plane");
-  v.number("cubic_stiffness_n_m3", s.cubic_stiffness_n_m3, not_negative("N/m^3"), kOptional,
+  v.number("cubic_stiffness_n_m3", p.cubic_stiffness_n_m3, not_negative("N/m^3"), kOptional,
            "on the rigid z motion; 0: linear");
-  v.number("actuator_saturation_n", s.actuator_saturation_n, not_negative("N"), kOptional,
+  v.number("actuator_saturation_n", p.actuator_saturation_n, not_negative("N"), kOptional,
            "largest force of an actuator; 0: unlimited");
 }
 
-void describe_noise(ConfigVisitor& v, WaferStageSpec& s) {
+void describe_noise(ConfigVisitor& v, SimulationSpec& s) {
   v.number("sensor_m", s.sensor_noise_m, not_negative("m rms"), kOptional,
            "white noise of every sensor, in its unit");
   v.number("sensor_coloured_m", s.sensor_noise_coloured_m, not_negative("m rms"), kOptional,
@@ -245,7 +245,7 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
 
 void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   FaultConfig f;
-  using Kind = WaferStageSpec::Fault::Kind;
+  using Kind = SimulationSpec::Fault::Kind;
   std::vector<std::string> kinds = words_of<Kind>();
   kinds.erase(kinds.begin());  // none
   auto kind = static_cast<std::size_t>(Kind::dead_sensor) - 1;
@@ -309,7 +309,7 @@ void require_ranges(ConfigVisitor& v, const StageFile& f) {
 
 void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   StageConfig& config = f.config;
-  WaferStageSpec& s = config.spec;
+  StageSpec& s = config.spec;
   auto backend = static_cast<std::size_t>(config.backend);
   v.choice("format", f.format, {"stageid-stage"}, kRequired, "file type");
   v.text("name", s.info.name, kRequired, "name of the stage");
@@ -335,14 +335,14 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
   group(v, "plant", describe_plant, f, config.backend == Backend::sim ? kRequired : kOptional,
         "the simulated stage. Optional for other back ends, which without it need a prior to test "
         "the loop and to predict signals");
-  group(v, "noise", describe_noise, s, kOptional, "noise of the simulated stage");
+  group(v, "noise", describe_noise, config.simulation, kOptional, "noise of the simulated stage");
   v.group_or_text(
       "controller", [&](ConfigVisitor& controller) { describe_controller(controller, f); },
       f.controller, kRequired,
       "controllers of x, y, z, Rx, Ry, Rz; or state_space or transfer, discrete at sample_rate_hz; "
       "or a file with one of these two (.yaml, .json, .mat, .npz, .h5, .csv), relative to this "
       "one; or peer: the stage closes the loop itself");
-  v.number("pace", s.pace, not_negative(""), kOptional,
+  v.number("pace", config.pace, not_negative(""), kOptional,
            "0: virtual time, as fast as possible; 1: wall clock");
   group(v, "realtime", describe_real_time, config.real_time, kOptional,
         "settings of the loop thread; ignored in virtual time");

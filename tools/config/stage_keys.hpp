@@ -31,7 +31,7 @@ struct InPlaneModeConfig {
 };
 
 struct FaultConfig {
-  WaferStageSpec::Fault fault;
+  SimulationSpec::Fault fault;
   std::string channel;
 };
 

@@ -49,10 +49,10 @@ double duration_to_reach_s(const LimitedPlan& limited, double variance) {
 LimitedPlan make_limited_plan(const ExperimentConfig& config) {
   const LimitRequest& request = config.limits.value();
   const ExperimentPlan outline = outline_plan(config);
-  const WaferStageSpec& stage = config.stage.spec;
+  const StageSpec& stage = config.stage.spec;
   if (stage.controller.by_peer)
     throw FormatError(config.file, "",
-                      "level.limits: " + why_unpredictable(stage) +
+                      "level.limits: " + why_unpredictable(stage, config.stage.plant) +
                           ", so its signals cannot be predicted; use rms_n or peak_n");
   const PlantPrior prior = read_plant_prior(
       request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));

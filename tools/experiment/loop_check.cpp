@@ -49,7 +49,7 @@ class PriorLoop {
     const MotionController controller(config.stage.spec.controller);
     if (!controller.acts()) return;
     const VectorXd band_hz = outline_plan(config).grid().frequency_hz();
-    const VectorXd below_hz = frequencies_below(band_hz[0], config.stage.spec);
+    const VectorXd below_hz = frequencies_below(band_hz[0], config.stage);
     const PlantPrior prior =
         read_plant_prior(config.limits->prior, config.stage.spec.info, band_hz, below_hz);
     for (std::size_t k = 0; k < prior.below_band.size(); ++k)
@@ -84,13 +84,14 @@ class PriorLoop {
 
  private:
   /// Frequencies starting where the loop gain is large and the plant is a free mass, above its suspension.
-  static VectorXd frequencies_below(double lowest_hz, const WaferStageSpec& stage) {
+  static VectorXd frequencies_below(double lowest_hz, const StageConfig& stage) {
     double from_hz = lowest_hz;
-    for (const AxisController& axis : stage.controller.axes)
+    for (const AxisController& axis : stage.spec.controller.axes)
       if (axis.crossover_hz > 0.0) from_hz = std::min(from_hz, axis.crossover_hz);
     from_hz /= 30.0;  // without axes: the band includes the crossover
-    for (const double suspension_hz : stage.suspension_hz)
-      from_hz = std::max(from_hz, 3.0 * suspension_hz);
+    if (stage.plant)
+      for (const double suspension_hz : stage.plant->suspension_hz)
+        from_hz = std::max(from_hz, 3.0 * suspension_hz);
     if (!(from_hz < lowest_hz)) return {};
     constexpr double kPerDecade = 100.0;
     const auto count = static_cast<Index>(std::ceil(kPerDecade * std::log10(lowest_hz / from_hz)));
@@ -158,11 +159,11 @@ class PriorLoop {
 };
 
 /// Why nothing is known about the loop of a stage file; empty if it can be tested.
-std::string why_untested(const WaferStageSpec& stage) {
-  if (stage.controller.by_peer)
+std::string why_untested(const StageConfig& stage) {
+  if (stage.spec.controller.by_peer)
     return "stability of the loop is not tested: the stage closes it by a controller of its own "
            "('controller: peer')";
-  if (!stage.has_plant())
+  if (!stage.plant)
     return "stability of the loop is not tested: there is no 'plant'. Measure a pilot and design "
            "from it with 'level: {limits: {prior: FILE}}'";
   return "";
@@ -175,9 +176,9 @@ void judge(const std::filesystem::path& file, const LoopCheck& check, const Cons
 
 }  // namespace
 
-LoopCheck check_loop(const WaferStageSpec& stage) {
+LoopCheck check_loop(const StageConfig& stage) {
   if (const std::string reason = why_untested(stage); !reason.empty()) return {"", reason};
-  const LoopStability loop = loop_stability(stage);
+  const LoopStability loop = loop_stability(stage.spec, stage.plant.value());
   LoopCheck out;
   if (!loop.tested) return out;
   out.largest_sensitivity = loop.largest_sensitivity;
@@ -192,12 +193,12 @@ LoopCheck check_loop(const WaferStageSpec& stage) {
 }
 
 LoopCheck check_loop(const ExperimentConfig& config) {
-  if (config.stage.spec.controller.by_peer) return check_loop(config.stage.spec);
-  return config.limits ? PriorLoop(config).check() : check_loop(config.stage.spec);
+  if (config.stage.spec.controller.by_peer) return check_loop(config.stage);
+  return config.limits ? PriorLoop(config).check() : check_loop(config.stage);
 }
 
 void require_stable_loop(const StageConfig& stage, const Console& console) {
-  judge(stage.file, check_loop(stage.spec), console);
+  judge(stage.file, check_loop(stage), console);
 }
 
 void require_stable_loop(const ExperimentConfig& config, const Console& console) {
@@ -220,7 +221,7 @@ void require_within_limits(const ExperimentConfig& config, const DesignPredictio
 }
 
 void warn_of_prediction(const ExperimentConfig& config, const Console& console) {
-  const std::string reason = why_unpredictable(config.stage.spec);
+  const std::string reason = why_unpredictable(config.stage.spec, config.stage.plant);
   if (reason.empty()) return;
   console.warning(
       fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "

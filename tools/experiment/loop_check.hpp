@@ -16,7 +16,7 @@ struct LoopCheck {
 };
 
 /// For the plant of a stage file: eigenvalues of the exact sampled loop.
-LoopCheck check_loop(const WaferStageSpec& stage);
+LoopCheck check_loop(const StageConfig& stage);
 
 /// For an experiment: by the plant of its stage file or, with a level within limits, by the prior, whose response must
 /// not encircle the critical point (Nyquist).

@@ -18,7 +18,7 @@ std::string run_metadata(const ExperimentConfig& config, Backend backend, const 
       {"started_utc", utc_now()},
       {"backend", to_string(backend)},
       {"measurement_id", config.measurement_id},
-      {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.spec.seed}}},
+      {"seeds", {{"experiment", config.experiment.seed}, {"noise", config.stage.simulation.seed}}},
       {"transport_delay_s", config.stage.spec.info.delay_s},
       {"configuration_file", config.file.filename().string()},
       {"configuration", config.text},

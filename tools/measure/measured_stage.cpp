@@ -28,7 +28,7 @@ namespace {
 class StreamedStage final : public MeasuredStage {
  public:
   StreamedStage(const ExperimentPlan& plan, std::unique_ptr<CyclicStage> stage,
-                const WaferStageSpec& spec)
+                const StageSpec& spec)
       : plan_(plan), stage_(std::move(stage), spec.limits), controller_(spec.controller) {
     stage_.carry(spec.controller);
   }
@@ -169,7 +169,7 @@ void require_backend(const ExperimentConfig& config, Backend backend, double pac
     throw std::invalid_argument(
         fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
                     to_string(backend), config.stage.file.string()));
-  if (backend == Backend::sim && !config.stage.spec.has_plant())
+  if (backend == Backend::sim && !config.stage.plant)
     throw std::invalid_argument(
         fmt::format("--backend sim: {} has no group 'plant', which is the simulated stage; add it",
                     config.stage.file.string()));
@@ -199,9 +199,9 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
                                                    const ExperimentPlan& plan,
                                                    const MeasurementRequest& request,
                                                    const std::vector<RunId>& skip) {
-  WaferStageSpec spec = config.stage.spec;
-  if (request.pace >= 0.0) spec.pace = request.pace;
-  require_backend(config, request.backend, spec.pace);
+  StageSpec spec = config.stage.spec;
+  const double pace = request.pace >= 0.0 ? request.pace : config.stage.pace;
+  require_backend(config, request.backend, pace);
   const auto streamed = [&](std::unique_ptr<CyclicStage> stage) {
     return std::make_unique<StreamedStage>(plan, std::move(stage), spec);
   };
@@ -209,10 +209,10 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
   if (request.backend == Backend::replay) spec.limits.motion = {};
   switch (request.backend) {
     case Backend::sim:
-      spec.info.clock = spec.pace > 0.0 ? Clock::wall : Clock::virtual_time;
-      return streamed(std::make_unique<SimulatedStage>(spec));
+      return streamed(std::make_unique<SimulatedStage>(spec.info, config.stage.plant.value(),
+                                                       config.stage.simulation, pace));
     case Backend::can: {
-      const CanHostOptions options{spec.pace, request.reset_fault,
+      const CanHostOptions options{pace, request.reset_fault,
                                    [] { return interrupt_flag().load(); }};
       const CanSpec& can = config.stage.can.spec;
       const CanLayout layout = can_layout(can, spec.info);
@@ -225,9 +225,9 @@ std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& confi
     case Backend::modbus:
       return streamed(std::make_unique<ModbusStage>(
           config.stage.spec.info, config.stage.modbus->address, config.stage.modbus->timing,
-          ModbusHostOptions{spec.pace, request.reset_fault}));
+          ModbusHostOptions{pace, request.reset_fault}));
     case Backend::plugin:
-      return streamed(std::make_unique<PluginStage>(spec.info, *config.stage.plugin, spec.pace));
+      return streamed(std::make_unique<PluginStage>(spec.info, *config.stage.plugin, pace));
     case Backend::replay:
       break;
   }

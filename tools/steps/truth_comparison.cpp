@@ -54,17 +54,17 @@ void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf
 }
 
 /// The exact plant on the lines, channels as in `frf`, as measured in the loop.
-Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const WaferStageSpec& stage) {
-  const std::vector<PlantMode> modes = wafer_stage_modes(stage);
+Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const StageInfo& info,
+                                const PlantSpec& plant) {
+  const std::vector<PlantMode> modes = plant_modes(info, plant);
   Eigen::MatrixXcd G(frf.n_outputs() * frf.n_inputs(), frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd whole =
-        sampled_response(modes, stage.info.delay_s, stage.info.sample_rate_hz, frf.frequency_hz[k]);
+        sampled_response(modes, info.delay_s, info.sample_rate_hz, frf.frequency_hz[k]);
     for (Eigen::Index j = 0; j < frf.n_inputs(); ++j)
       for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
-        G(i + frf.n_outputs() * j, k) =
-            whole(channel_index(stage.info.sensors, frf.outputs.name(i)),
-                  channel_index(stage.info.actuators, frf.inputs.name(j)));
+        G(i + frf.n_outputs() * j, k) = whole(channel_index(info.sensors, frf.outputs.name(i)),
+                                              channel_index(info.actuators, frf.inputs.name(j)));
   }
   return G;
 }
@@ -107,10 +107,11 @@ double ModeComparison::damping_deviation() const {
 }
 
 TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate& frf,
-                                   const WaferStageSpec& stage) {
+                                   const StageInfo& info, const PlantSpec& plant) {
   TruthComparison out;
   const double last_hz = frf.frequency_hz[frf.lines() - 1];
-  for (const PlantMode& mode : flexible_modes_seen(stage, frf.inputs.names, frf.outputs.names))
+  for (const PlantMode& mode :
+       flexible_modes_seen(info, plant, frf.inputs.names, frf.outputs.names))
     if (mode.natural_frequency_hz <= last_hz) {
       ModeComparison comparison;
       comparison.true_frequency_hz = mode.natural_frequency_hz;
@@ -118,7 +119,7 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
       out.modes.push_back(comparison);
     }
   match(modes_of(model), frf, out);
-  const Eigen::MatrixXcd G = exact_response(frf, stage);
+  const Eigen::MatrixXcd G = exact_response(frf, info, plant);
   const Eigen::MatrixXcd E = response_like(model, frf) - G;
   out.relative_rms_error =
       relative_rms_error(E.cwiseAbs2().array(), G.cwiseAbs2().array(), responding_channels(frf));

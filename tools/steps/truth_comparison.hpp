@@ -7,7 +7,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "frf/response/frf_estimate.hpp"
-#include "hal/simulator/simulated_stage.hpp"
+#include "hal/simulator/plant_spec.hpp"
 
 namespace stageid {
 
@@ -42,7 +42,7 @@ struct TruthComparison {
 /// response on the lines of `frf`, as measured in the loop.
 /// @param frf with the lines, channels and compensation to which the model was fitted.
 TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate& frf,
-                                   const WaferStageSpec& stage);
+                                   const StageInfo& info, const PlantSpec& plant);
 
 std::vector<std::string> truth_table(const TruthComparison& comparison);
 std::string truth_error_line(const TruthComparison& comparison);

@@ -20,7 +20,6 @@
 #include "acquisition/loop/measurement_loop.hpp"
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_writer.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "tests/acquisition/loop/small_plan.hpp"
 #include "tests/support/process/allocation_counter.hpp"
@@ -36,13 +35,14 @@ constexpr std::uint64_t kSamples = 2000;
 /// A simulated stage that stamps its samples. Every tenth is late.
 class StampingStage final : public CyclicStage {
  public:
-  explicit StampingStage(const WaferStageSpec& spec) : plant_(spec), info_(plant_.info()) {
+  explicit StampingStage(const test::SimulatedSpec& spec)
+      : plant_(test::simulated(spec)), info_(plant_->info()) {
     info_.stamps = info_.clock == Clock::wall;
   }
   const StageInfo& info() const noexcept override { return info_; }
-  void start(std::uint64_t seed, Inputs& first) override { plant_.start(seed, first); }
+  void start(std::uint64_t seed, Inputs& first) override { plant_->start(seed, first); }
   Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override {
-    const Outcome outcome = plant_.exchange(outputs, inputs, deadline);
+    const Outcome outcome = plant_->exchange(outputs, inputs, deadline);
     if (!info_.stamps) return outcome;
     const auto period_ns = static_cast<std::int64_t>(1e9 / info_.sample_rate_hz);
     inputs.t_arrival_ns = inputs.t_sample_ns + 1000;
@@ -51,10 +51,10 @@ class StampingStage final : public CyclicStage {
     inputs.stamp_of_stage = true;
     return outcome;
   }
-  void stop() noexcept override { plant_.stop(); }
+  void stop() noexcept override { plant_->stop(); }
 
  private:
-  SimulatedStage plant_;
+  std::unique_ptr<SimulatedStage> plant_;
   StageInfo info_;
 };
 
@@ -85,14 +85,14 @@ class WholeLoop {
   const MeasurementLoop& loop() const { return loop_; }
 
  private:
-  static WaferStageSpec spec_of(double pace) {
-    WaferStageSpec spec = test::wafer_stage_spec();
+  static test::SimulatedSpec spec_of(double pace) {
+    test::SimulatedSpec spec = test::wafer_stage_spec();
     spec.pace = pace;
-    spec.faults = {{WaferStageSpec::Fault::Kind::missed_cycle, 0, 300, 2, -1}};
+    spec.simulation.faults = {{SimulationSpec::Fault::Kind::missed_cycle, 0, 300, 2, -1}};
     return spec;
   }
 
-  WaferStageSpec spec_;
+  test::SimulatedSpec spec_;
   LimitedStage stage_;
   MotionController controller_;
   SampleRing ring_;

@@ -80,7 +80,7 @@ inline LoopExcitation healthy_excitation() {
   return excitation;
 }
 
-inline void take_motion(const WatchedStage& watch, const WaferStageSpec& spec, Stopped& result) {
+inline void take_motion(const WatchedStage& watch, const SimulatedSpec& spec, Stopped& result) {
   result.largest_m = watch.largest_m;
   result.largest_n = watch.largest_n;
   result.speed_m_s = watch.speed_m_s();
@@ -90,7 +90,7 @@ inline void take_motion(const WatchedStage& watch, const WaferStageSpec& spec, S
 
 /// The host's loop around a stage. `disturb` is called in cycle kFaultCycle; false: the host is dead.
 template <typename Disturb>
-Stopped stream(std::unique_ptr<CyclicStage> link, const WaferStageSpec& spec, Disturb disturb) {
+Stopped stream(std::unique_ptr<CyclicStage> link, const SimulatedSpec& spec, Disturb disturb) {
   LimitedStage stage(std::move(link), spec.limits);
   MotionController controller(spec.controller);
   SampleRing ring(3, 1U << 15);
@@ -114,7 +114,7 @@ Stopped stream(std::unique_ptr<CyclicStage> link, const WaferStageSpec& spec, Di
   return result;
 }
 
-inline Stopped stop_in_process(const WaferStageSpec& spec, bool as_plugin) {
+inline Stopped stop_in_process(const SimulatedSpec& spec, bool as_plugin) {
   auto watched = std::make_unique<WatchedStage>(spec);
   const WatchedStage& watch = *watched;
   std::unique_ptr<CyclicStage> owner;
@@ -174,7 +174,7 @@ inline CanSpec stop_can_spec(const std::string& interface) {
 /// The node behind CAN, in the same thread.
 class CanStopRig {
  public:
-  CanStopRig(const WaferStageSpec& spec, double pace) {
+  CanStopRig(const SimulatedSpec& spec, double pace) {
     auto watched = std::make_unique<WatchedStage>(spec);
     watch_ = watched.get();
     node_ = std::make_unique<StageNode>(std::move(watched), spec.limits, spec.controller,
@@ -208,7 +208,7 @@ class CanStopRig {
 /// The node behind ZeroMQ, in a thread of its own on the clock of this computer.
 class ZeroMqStopRig {
  public:
-  ZeroMqStopRig(const WaferStageSpec& spec, double pace)
+  ZeroMqStopRig(const SimulatedSpec& spec, double pace)
       : can_(stop_can_spec("ipc://" + (directory_ / "node").string())),
         router_(can_.buses[0].interface),
         host_(can_.buses[0].interface) {
@@ -258,7 +258,7 @@ class ZeroMqStopRig {
   std::thread thread_;
 };
 
-inline Stopped stop_over_can(const WaferStageSpec& spec, LinkEvent event) {
+inline Stopped stop_over_can(const SimulatedSpec& spec, LinkEvent event) {
   CanStopRig rig(spec, 0.0);
   Stopped result =
       stream(std::make_unique<CanStage>(spec.info, rig.can(), rig.host_bus(), CanHostOptions{}),
@@ -272,7 +272,7 @@ inline Stopped stop_over_can(const WaferStageSpec& spec, LinkEvent event) {
 
 /// @tparam Rig CanStopRig or ZeroMqStopRig
 template <typename Rig>
-Stopped stop_resident(const WaferStageSpec& spec, LinkEvent event, double pace) {
+Stopped stop_resident(const SimulatedSpec& spec, LinkEvent event, double pace) {
   struct Outcomes final : TraceSink {
     void rows(std::uint64_t, std::span<const double>, std::span<const Outcome> found) override {
       for (const Outcome outcome : found) marked += outcome != Outcome::ok ? 1 : 0;
@@ -312,7 +312,7 @@ Stopped stop_resident(const WaferStageSpec& spec, LinkEvent event, double pace) 
 }
 
 /// A server in a thread of its own, on the clock of this computer.
-inline Stopped stop_over_modbus(const WaferStageSpec& spec, LinkEvent event) {
+inline Stopped stop_over_modbus(const SimulatedSpec& spec, LinkEvent event) {
   constexpr ModbusTiming kTiming = {0.1, 0.2, 5e-5};
   constexpr int kStartRequests = 7;  // as in modbus_stage_test.cpp
   auto watched = std::make_unique<WatchedStage>(spec);
@@ -340,7 +340,7 @@ inline Stopped stop_over_modbus(const WaferStageSpec& spec, LinkEvent event) {
   return result;
 }
 
-inline Stopped stop_over(StopLink link, const WaferStageSpec& spec, LinkEvent event) {
+inline Stopped stop_over(StopLink link, const SimulatedSpec& spec, LinkEvent event) {
   switch (link) {
     case StopLink::can:
       return stop_over_can(spec, event);

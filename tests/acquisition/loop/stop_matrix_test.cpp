@@ -14,7 +14,7 @@
 
 namespace stageid::test_stop_matrix {
 
-using Kind = WaferStageSpec::Fault::Kind;
+using Kind = SimulationSpec::Fault::Kind;
 using testing::HasSubstr;
 using namespace test;
 
@@ -42,10 +42,10 @@ int exit_code_of(const Case& c) {
   return c.reason == StopReason::limit ? 4 : 1;
 }
 
-WaferStageSpec spec_of(const Case& c) {
-  WaferStageSpec spec = stop_stage_spec(c.controller_gain);
+test::SimulatedSpec spec_of(const Case& c) {
+  test::SimulatedSpec spec = stop_stage_spec(c.controller_gain);
   if (c.kind != Kind::none)
-    spec.faults = {
+    spec.simulation.faults = {
         {.kind = c.kind, .from_cycle = kFaultCycle, .cycles = kStopSamples, .value = c.value}};
   return spec;
 }
@@ -141,7 +141,7 @@ std::string name_of(const testing::TestParamInfo<StopMatrix::ParamType>& at) {
 
 enum class Strategy : std::uint8_t { ramp, cut, brake };
 
-WaferStageSpec with_strategy(WaferStageSpec spec, Strategy strategy) {
+test::SimulatedSpec with_strategy(test::SimulatedSpec spec, Strategy strategy) {
   if (strategy == Strategy::ramp) {  // nothing is predicted, so the loop stays closed
     spec.limits.motion = {};
     spec.limits.hard_window_m = Eigen::VectorXd::Constant(1, 1.0);

@@ -68,10 +68,10 @@ Waveforms waveforms(int periods = 2) {
   return w;
 }
 
-WaferStageSpec noisy_stage() {
-  WaferStageSpec spec = CanRig::quiet_stage();
-  spec.sensor_noise_m = 1e-9;
-  spec.force_noise_n = 1e-3;
+test::SimulatedSpec noisy_stage() {
+  test::SimulatedSpec spec = CanRig::quiet_stage();
+  spec.simulation.sensor_noise_m = 1e-9;
+  spec.simulation.force_noise_n = 1e-3;
   return spec;
 }
 
@@ -87,7 +87,7 @@ JobProgress play(CanRig& rig, CanResidentStage& stage, std::uint64_t seed) {
 }
 
 /// u = C(y) + r on the stage without bus: rows of u and y.
-std::vector<double> expected_rows(const WaferStageSpec& spec, std::uint64_t seed) {
+std::vector<double> expected_rows(const test::SimulatedSpec& spec, std::uint64_t seed) {
   test::Bench stage(spec);
   MotionController controller(spec.controller);
   const Waveforms w = waveforms();
@@ -158,7 +158,7 @@ TEST(CanResidentStage, ATransferThatBrokeOffGoesOn) {
 }
 
 TEST(CanResidentStage, ALimitEndsTheRunAndTheRowsUpToItAreThere) {
-  WaferStageSpec spec = CanRig::quiet_stage();
+  test::SimulatedSpec spec = CanRig::quiet_stage();
   spec.limits.actuator_n[1] = 0.4;
   CanRig rig({}, spec);
   const auto stage = rig.resident();

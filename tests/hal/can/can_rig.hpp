@@ -46,7 +46,7 @@ struct CanRigOptions {
 /// the host waits, and the time is that of the bus.
 class CanRig {
  public:
-  explicit CanRig(CanRigOptions options = {}, WaferStageSpec stage = quiet_stage())
+  explicit CanRig(CanRigOptions options = {}, SimulatedSpec stage = quiet_stage())
       : stage_spec_(std::move(stage)),
         spec_(can_spec(options.buses)),
         layout_(can_layout(spec_, stage_spec_.info)),
@@ -56,8 +56,8 @@ class CanRig {
     boot();
   }
 
-  static WaferStageSpec quiet_stage() {
-    WaferStageSpec spec = small_stage_spec();
+  static SimulatedSpec quiet_stage() {
+    SimulatedSpec spec = small_stage_spec();
     spec.limits.actuator_n = Eigen::VectorXd::Constant(2, 50.0);
     spec.limits.position_window_m = Eigen::VectorXd::Constant(1, 1e-3);
     spec.controller = one_axis_controller(spec.info.sample_rate_hz, 10.0, 100.0);
@@ -66,8 +66,8 @@ class CanRig {
   }
 
   StageNode new_node(double watchdog_s = 0.02) const {
-    return StageNode(std::make_unique<SimulatedStage>(stage_spec_), stage_spec_.limits,
-                     stage_spec_.controller, NodePanel{}, {.watchdog_s = watchdog_s});
+    return StageNode(simulated(stage_spec_), stage_spec_.limits, stage_spec_.controller,
+                     NodePanel{}, {.watchdog_s = watchdog_s});
   }
 
   /// Replaces the node by a new one, as after a restart.
@@ -106,7 +106,7 @@ class CanRig {
   void send_to_node(const CanFrame& frame) { static_cast<void>(pair_.host().send({&frame, 1})); }
   void send_to_host(const CanFrame& frame) { static_cast<void>(pair_.node().send({&frame, 1})); }
 
-  const WaferStageSpec& stage_spec() const { return stage_spec_; }
+  const SimulatedSpec& stage_spec() const { return stage_spec_; }
   const CanSpec& spec() const { return spec_; }
   const CanLayout& layout() const { return layout_; }
   CanPair& pair() { return pair_; }
@@ -129,7 +129,7 @@ class CanRig {
     return spec;
   }
 
-  WaferStageSpec stage_spec_;
+  SimulatedSpec stage_spec_;
   CanSpec spec_;
   CanLayout layout_;
   CanPair pair_;

@@ -19,9 +19,9 @@ using Running = test::RunningCanHost;
 using Wire = test::CanRigOptions;
 
 TEST(CanStage, GivesTheSamplesOfTheStageItselfButForRounding) {
-  WaferStageSpec spec = CanRig::quiet_stage();
-  spec.sensor_noise_m = 1e-9;
-  spec.force_noise_n = 1e-3;
+  test::SimulatedSpec spec = CanRig::quiet_stage();
+  spec.simulation.sensor_noise_m = 1e-9;
+  spec.simulation.force_noise_n = 1e-3;
   CanRig rig({}, spec);
   Host host(rig);
   test::Bench bare(spec);
@@ -58,8 +58,8 @@ TEST(CanStage, FourLostAnswersInARowAreStale) {
 }
 
 TEST(CanStage, AChannelWithoutAValueIsIncompleteOrStale) {
-  WaferStageSpec spec = CanRig::quiet_stage();
-  spec.faults = {{WaferStageSpec::Fault::Kind::missed_cycle, 0, 2, 1, -1}};
+  test::SimulatedSpec spec = CanRig::quiet_stage();
+  spec.simulation.faults = {{SimulationSpec::Fault::Kind::missed_cycle, 0, 2, 1, -1}};
   CanRig rig({}, spec);
   Running host(rig);
   EXPECT_THAT(host.exchange(4),
@@ -79,7 +79,7 @@ TEST(CanStage, ASetpointThatIsMissingOnOneBusMovesNothing) {
 }
 
 TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
-  WaferStageSpec spec = CanRig::quiet_stage();
+  test::SimulatedSpec spec = CanRig::quiet_stage();
   spec.limits.actuator_n[0] = 0.4;  // reached in cycle 2: 0.745 N sin 0.6
   CanRig rig({}, spec);
   Running host(rig);
@@ -94,7 +94,7 @@ TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
 }
 
 TEST(CanStage, FaultsOfTheStageEndTheRun) {
-  using Kind = WaferStageSpec::Fault::Kind;
+  using Kind = SimulationSpec::Fault::Kind;
   struct Row {
     Kind kind;
     Outcome outcome;
@@ -102,8 +102,8 @@ TEST(CanStage, FaultsOfTheStageEndTheRun) {
   };
   for (const Row& row : {Row{Kind::nan_sensor, Outcome::limit, "s1: the measurement is not finite"},
                          Row{Kind::interlock, Outcome::fault, "the stage reported a fault"}}) {
-    WaferStageSpec spec = CanRig::quiet_stage();
-    spec.faults = {{row.kind, 0, 2, 1, -1}};
+    test::SimulatedSpec spec = CanRig::quiet_stage();
+    spec.simulation.faults = {{row.kind, 0, 2, 1, -1}};
     CanRig rig({}, spec);
     Running host(rig);
     EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, row.outcome));
@@ -216,7 +216,7 @@ TEST(CanStage, StartRefusesInWords) {
   EXPECT_THAT(start, test::refuses("can: pair0: bus off"));
   rig.pair().set_state(0, CanBusState::active);
   rig.thaw();
-  WaferStageSpec other = rig.stage_spec();
+  test::SimulatedSpec other = rig.stage_spec();
   other.info.sensors[0].name = "other";
   CanStage stranger(other.info, rig.spec(), rig.host_bus(), {});
   EXPECT_THROW(stranger.connect(), StageError);

@@ -275,11 +275,11 @@ TEST(StageNode, RefusesWhatDoesNotFit) {
 
 // A stage behind a bus equals one without: same seed, same run.
 TEST(StageNode, GivesTheSamplesOfTheStageItself) {
-  WaferStageSpec spec = test::small_stage_spec();
-  spec.sensor_noise_m = 1e-9;
-  spec.force_noise_n = 1e-3;
+  test::SimulatedSpec spec = test::small_stage_spec();
+  spec.simulation.sensor_noise_m = 1e-9;
+  spec.simulation.force_noise_n = 1e-3;
   MotionControllerSpec loop = controller();
-  StageNode node(std::make_unique<SimulatedStage>(spec), {}, loop, {}, {});
+  StageNode node(test::simulated(spec), {}, loop, {}, {});
   test::Bench bare(spec);
   ASSERT_TRUE(node.request(SupervisorCommand::enable).accepted);
   std::vector<double> y(1);

@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/replay_stage.hpp"
@@ -16,7 +15,7 @@
 namespace stageid {
 namespace test_allocation {
 
-using Kind = WaferStageSpec::Fault::Kind;
+using Kind = SimulationSpec::Fault::Kind;
 
 class Allocation : public testing::Test {
  protected:
@@ -24,10 +23,10 @@ class Allocation : public testing::Test {
     if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
   }
   // Allocations of 2000 cycles of control and exchange; `seen` counts the outcomes that were not ok.
-  static std::uint64_t cycles(const WaferStageSpec& spec, int& seen) {
+  static std::uint64_t cycles(const test::SimulatedSpec& spec, int& seen) {
     StageLimits limits = spec.limits;
     limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
-    LimitedStage stage(std::make_unique<SimulatedStage>(spec), limits);
+    LimitedStage stage(test::simulated(spec), limits);
     MotionController controller(spec.controller);
     test::Driver host(stage);
     host.start();
@@ -55,31 +54,31 @@ TEST_F(Allocation, AHealthyCycleHasNone) {
 }
 
 TEST_F(Allocation, ABrakeHasNone) {
-  WaferStageSpec spec = test::wafer_stage_spec();
-  spec.faults = {{Kind::nan_sensor, 0, 1000, 1, -1}};
+  test::SimulatedSpec spec = test::wafer_stage_spec();
+  spec.simulation.faults = {{Kind::nan_sensor, 0, 1000, 1, -1}};
   int seen = 0;
   EXPECT_EQ(cycles(spec, seen), 0U);
   EXPECT_EQ(seen, 1000);
 }
 
 TEST_F(Allocation, ACycleWithEveryOptionHasNone) {
-  WaferStageSpec spec = test::wafer_stage_spec();
-  spec.cubic_stiffness_n_m3 = 1e9;
-  spec.actuator_saturation_n = 10.0;
-  spec.actuator_quantum_n = 1e-4;
-  spec.sensor_quantum_m = 1e-10;
-  spec.faults = {{Kind::stuck_actuator, 3, 100, 1, -1},
-                 {Kind::missed_cycle, 0, 200, 5, -1},
-                 {Kind::dead_sensor, 4, 300, 1, -1},
-                 {Kind::nan_sensor, 0, 400, 1, -1},
-                 {Kind::interlock, 0, 1500, 1, -1}};
+  test::SimulatedSpec spec = test::wafer_stage_spec();
+  spec.plant.cubic_stiffness_n_m3 = 1e9;
+  spec.plant.actuator_saturation_n = 10.0;
+  spec.simulation.actuator_quantum_n = 1e-4;
+  spec.simulation.sensor_quantum_m = 1e-10;
+  spec.simulation.faults = {{Kind::stuck_actuator, 3, 100, 1, -1},
+                            {Kind::missed_cycle, 0, 200, 5, -1},
+                            {Kind::dead_sensor, 4, 300, 1, -1},
+                            {Kind::nan_sensor, 0, 400, 1, -1},
+                            {Kind::interlock, 0, 1500, 1, -1}};
   int seen = 0;
   EXPECT_EQ(cycles(spec, seen), 0U);
   EXPECT_EQ(seen, 1705);  // five missed, and everything from cycle 300 on
 }
 
 TEST_F(Allocation, ACycleAtALimitHasNone) {
-  WaferStageSpec spec = test::wafer_stage_spec();
+  test::SimulatedSpec spec = test::wafer_stage_spec();
   spec.limits.actuator_n.setConstant(0.9);
   spec.limits.thermal_rms_n.setConstant(0.5);
   spec.limits.thermal_time_constant_s = 0.01;

@@ -31,8 +31,8 @@ MatrixXd propagation(const PlantMode& mode, double duration_s) {
 }
 
 // Plant with delayed input: the states are those of the modes, then u[n-1], u[n-2], ... u[n-d-1].
-System plant_system(const WaferStageSpec& spec) {
-  const auto modes = wafer_stage_modes(spec);
+System plant_system(const SimulatedSpec& spec) {
+  const auto modes = plant_modes(spec.info, spec.plant);
   const auto count = static_cast<Index>(modes.size());
   const auto inputs = static_cast<Index>(spec.info.actuators.size());
   const auto outputs = static_cast<Index>(spec.info.sensors.size());
@@ -117,7 +117,7 @@ System controller_system(const MotionControllerSpec& spec) {
 
 }  // namespace
 
-ClosedLoopModel closed_loop_model(const WaferStageSpec& spec) {
+ClosedLoopModel closed_loop_model(const SimulatedSpec& spec) {
   const System plant = plant_system(spec);
   const System controller = controller_system(spec.controller);
   const Index n1 = plant.a.rows();

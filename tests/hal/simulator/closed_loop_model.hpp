@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "hal/simulator/simulated_stage.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 
 namespace stageid::test {
 
@@ -13,6 +13,6 @@ struct ClosedLoopModel {
   Eigen::MatrixXd a, b, c;
 };
 
-ClosedLoopModel closed_loop_model(const WaferStageSpec& spec);
+ClosedLoopModel closed_loop_model(const SimulatedSpec& spec);
 
 }  // namespace stageid::test

@@ -25,9 +25,9 @@ constexpr int kLines = 4000;    // odd ones, 0.25 to 1999.75 Hz
 constexpr double kRms_n = 2.0;
 
 TEST(ClosedLoop, SimulationFollowsTheModelOfTheWholeLoop) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   const test::ClosedLoopModel model = test::closed_loop_model(spec);
-  SimulatedStage stage(spec);
+  SimulatedStage stage(spec.info, spec.plant, spec.simulation);
   test::ClosedLoop loop(stage, spec.controller);
   loop.start(1);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(model.a.rows());
@@ -48,7 +48,7 @@ TEST(ClosedLoop, SimulationFollowsTheModelOfTheWholeLoop) {
 // Every pole, those of suspension, integrators and flexible modes included, must have decayed to
 // 1e-6 after the transient period of 4 s: Re s < -3.45 / s.
 TEST(ClosedLoop, ForgetsItsStartWithinTheTransientPeriod) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   const test::ClosedLoopModel model = test::closed_loop_model(spec);
   const double radius = eigenvalues(model.a).cwiseAbs().maxCoeff();
   const double slowest = std::log(radius) * spec.info.sample_rate_hz;
@@ -59,8 +59,8 @@ TEST(ClosedLoop, ForgetsItsStartWithinTheTransientPeriod) {
 // sigma_max of the output sensitivity (I - G K)^-1, all channels in metres, over all frequencies:
 // a logarithmic grid, and finely through every resonance.
 TEST(ClosedLoop, HasASensitivityPeakBelowTwoAndAHalf) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  const auto modes = wafer_stage_modes(spec);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = plant_modes(spec.info, spec.plant);
   const MotionController controller(spec.controller);
   std::vector<double> grid;
   for (int i = 0; i <= 1200; ++i) grid.push_back(0.02 * std::pow(4999.0 / 0.02, i / 1200.0));
@@ -81,8 +81,8 @@ TEST(ClosedLoop, HasASensitivityPeakBelowTwoAndAHalf) {
 }
 
 TEST(ClosedLoop, CrossesOverBetweenThirtyAndSixtyHertzOutOfPlane) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  const auto modes = wafer_stage_modes(spec);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = plant_modes(spec.info, spec.plant);
   const MotionController controller(spec.controller);
   const auto loop_gain = [&](Eigen::Index axis, double f) {
     const Eigen::MatrixXcd G = sampled_response(modes, spec.info.delay_s, 1e4, f);
@@ -103,8 +103,9 @@ struct Record {
 };
 
 // `periods` of the excitation (17 x period) on a limited stage; only the last ones are kept.
-Record run(const WaferStageSpec& spec, const Eigen::MatrixXd& excitation, int periods, int kept) {
-  LimitedStage stage(std::make_unique<SimulatedStage>(spec), spec.limits);
+Record run(const test::SimulatedSpec& spec, const Eigen::MatrixXd& excitation, int periods,
+           int kept) {
+  LimitedStage stage(test::simulated(spec), spec.limits);
   test::ClosedLoop loop(stage, spec.controller);
   const auto period = static_cast<int>(excitation.cols());
   Record record{Eigen::MatrixXd(17, kept * period), Eigen::MatrixXd(7, kept * period)};
@@ -135,7 +136,7 @@ TEST(ClosedLoop, IsPeriodicAfterOnePeriod) {
 
 // All thirteen axes at once, 2 N rms each, with noise: all limits are far away.
 TEST(ClosedLoop, KeepsTheDefaultExperimentFarFromItsLimits) {
-  const WaferStageSpec spec = test::wafer_stage_spec();
+  const test::SimulatedSpec spec = test::wafer_stage_spec();
   for (const Eigen::MatrixXd& excitation :
        {excite({0}), excite({6}), excite({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12})}) {
     const Record record = run(spec, excitation, 1, 1);
@@ -195,7 +196,8 @@ class FrfNoise : public testing::Test {
     return median(all);
   }
 
-  std::vector<PlantMode> modes_ = wafer_stage_modes(test::wafer_stage_spec());
+  test::SimulatedSpec spec_ = test::wafer_stage_spec();
+  std::vector<PlantMode> modes_ = plant_modes(spec_.info, spec_.plant);
   Eigen::MatrixXcd U_, dU_, dY_;
 };
 

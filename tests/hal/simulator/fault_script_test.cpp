@@ -12,22 +12,22 @@
 namespace stageid {
 namespace test_fault_script {
 
-using Kind = WaferStageSpec::Fault::Kind;
+using Kind = SimulationSpec::Fault::Kind;
 using test::Bench;
 
-WaferStageSpec with_fault(Kind kind, int channel, std::uint64_t from, std::uint64_t cycles = 1,
-                          int run = -1) {
-  WaferStageSpec spec = test::small_stage_spec();
+test::SimulatedSpec with_fault(Kind kind, int channel, std::uint64_t from, std::uint64_t cycles = 1,
+                               int run = -1) {
+  test::SimulatedSpec spec = test::small_stage_spec();
   spec.info.sensors.push_back(spec.info.sensors[0]);
   spec.info.sensors[1].position_m[0] = -0.5;
-  if (kind != Kind::none) spec.faults = {{kind, channel, from, cycles, run}};
+  if (kind != Kind::none) spec.simulation.faults = {{kind, channel, from, cycles, run}};
   return spec;
 }
 
 // Runs a faulty stage beside a healthy one with the same commands.
 class FaultTest : public testing::Test {
  protected:
-  void begin(const WaferStageSpec& spec) {
+  void begin(const test::SimulatedSpec& spec) {
     faulty_ = std::make_unique<Bench>(spec);
     healthy_ = std::make_unique<Bench>(with_fault(Kind::none, 0, 0));
     faulty_->start();
@@ -104,9 +104,9 @@ TEST_F(FaultTest, AStuckActuatorKeepsItsLastForce) {
   }
 }
 
-WaferStageSpec with_value(Kind kind, int channel, std::uint64_t from, double value) {
-  WaferStageSpec spec = with_fault(kind, channel, from);
-  spec.faults[0].value = value;
+test::SimulatedSpec with_value(Kind kind, int channel, std::uint64_t from, double value) {
+  test::SimulatedSpec spec = with_fault(kind, channel, from);
+  spec.simulation.faults[0].value = value;
   return spec;
 }
 

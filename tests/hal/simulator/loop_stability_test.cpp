@@ -10,8 +10,8 @@
 namespace stageid {
 namespace test_loop_stability {
 
-WaferStageSpec with_crossovers(double factor) {
-  WaferStageSpec spec = test::silent_wafer_stage_spec();
+test::SimulatedSpec with_crossovers(double factor) {
+  test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   for (AxisController& axis : spec.controller.axes) {
     axis.crossover_hz *= factor;
     axis.gain *= factor * factor;
@@ -39,9 +39,9 @@ double growth(const Eigen::MatrixXd& a) {
 // The reference uses the general matrix exponential and the actuators and sensors themselves.
 TEST(LoopStability, TheOutermostPoleIsThatOfTheWholeLoop) {
   for (const double factor : {0.5, 1.0, 3.0, 10.0}) {
-    const WaferStageSpec spec = with_crossovers(factor);
+    const test::SimulatedSpec spec = with_crossovers(factor);
     const double reference = growth(test::closed_loop_model(spec).a);
-    const LoopStability loop = loop_stability(spec);
+    const LoopStability loop = loop_stability(spec, spec.plant);
     ASSERT_TRUE(loop.tested);
     EXPECT_NEAR(loop.largest_pole, reference, 2e-4) << factor;
     EXPECT_EQ(loop.stable(), reference < 1.0) << factor;
@@ -49,10 +49,11 @@ TEST(LoopStability, TheOutermostPoleIsThatOfTheWholeLoop) {
 }
 
 TEST(LoopStability, TheShippedStageHasMarginAndAFasterOneHasNot) {
-  const LoopStability shipped = loop_stability(test::silent_wafer_stage_spec());
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const LoopStability shipped = loop_stability(spec, spec.plant);
   EXPECT_TRUE(shipped.stable());
   EXPECT_LT(shipped.largest_sensitivity, 1.75);  // the stage file states 1.7, per channel
-  EXPECT_FALSE(loop_stability(with_crossovers(10.0)).stable());
+  EXPECT_FALSE(loop_stability(with_crossovers(10.0), spec.plant).stable());
 }
 
 // One axis, L = l: S = 1 / |1 + l|. Two axes in other units give the same.

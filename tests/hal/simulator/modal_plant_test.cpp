@@ -126,8 +126,8 @@ TEST(ModalPlant, AgreesWithAnIndependentIntegration) {
 // Excites the plant with a periodic signal until the transient has decayed (the modes are well damped here), and
 // compares its DFT with the closed form.
 TEST(ModalPlant, ReachesTheClosedFormFrequencyResponse) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  auto modes = wafer_stage_modes(spec);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  auto modes = plant_modes(spec.info, spec.plant);
   for (PlantMode& mode : modes) {
     mode.damping_ratio = 0.3;
     mode.natural_frequency_hz = std::max(mode.natural_frequency_hz, 100.0);
@@ -202,9 +202,9 @@ TEST(ModalPlant, MovesAFreeMassByNewtonsLaw) {
 }
 
 TEST(ModalPlant, ResetForgetsEverything) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  ModalPlant used(wafer_stage_modes(spec), spec.info.delay_s, 1e4);
-  ModalPlant fresh(wafer_stage_modes(spec), spec.info.delay_s, 1e4);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  ModalPlant used(plant_modes(spec.info, spec.plant), spec.info.delay_s, 1e4);
+  ModalPlant fresh(plant_modes(spec.info, spec.plant), spec.info.delay_s, 1e4);
   const VectorXd u = VectorXd::LinSpaced(17, -1.0, 1.0);
   for (int n = 0; n < 7; ++n) used.step(u.data());
   used.add_modal_force(2, 1.0);

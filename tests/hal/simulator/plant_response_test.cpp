@@ -84,7 +84,8 @@ TEST(SampledResponse, AtZeroFrequencyIsTheStaticCompliance) {
 }
 
 TEST(SampledResponse, DelayedByWholeSamplesTurnsThePhaseOnly) {
-  const auto modes = wafer_stage_modes(test::silent_wafer_stage_spec());
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = plant_modes(spec.info, spec.plant);
   const double f = 777.0;
   const Eigen::MatrixXcd once = sampled_response(modes, 130e-6, kRate_hz, f);
   const Eigen::MatrixXcd later = sampled_response(modes, 430e-6, kRate_hz, f);
@@ -94,32 +95,32 @@ TEST(SampledResponse, DelayedByWholeSamplesTurnsThePhaseOnly) {
 
 // Between suspension and first flexible mode the stage is a rigid body: G = J_y M^-1 J_u^T / s^2.
 TEST(ContinuousResponse, OfTheStageIsARigidBodyBelowTheFlexibleModes) {
-  WaferStageSpec spec = test::silent_wafer_stage_spec();
+  test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(6, 6);
-  inertia.diagonal() << 20.0, 20.0, 20.0, spec.inertia_kg_m2[0], spec.inertia_kg_m2[1],
-      spec.inertia_kg_m2[2];
+  inertia.diagonal() << 20.0, 20.0, 20.0, spec.plant.inertia_kg_m2[0], spec.plant.inertia_kg_m2[1],
+      spec.plant.inertia_kg_m2[2];
   const Eigen::MatrixXd mass_line = rigid_body_jacobian(spec.info.sensors) * inertia.inverse() *
                                     rigid_body_jacobian(spec.info.actuators).transpose();
   const double f = 10.0;
   const double omega = kTwoPi * f;
-  const Eigen::MatrixXcd G = continuous_response(wafer_stage_modes(spec), f);
+  const Eigen::MatrixXcd G = continuous_response(plant_modes(spec.info, spec.plant), f);
   // Springs: (0.5 / 10)^2 = 2.5e-3, damping 2 * 0.1 * 0.05 = 1e-2, compliance (10 / 180)^2 = 3e-3
   // of an entry of like size, summed over 23 modes.
   EXPECT_LT((-omega * omega * G - mass_line).norm(), 3e-2 * mass_line.norm());
-  spec.flexible_modes = 0;
-  spec.in_plane_modes.clear();
-  for (double& hz : spec.suspension_hz) hz = 0.0;
-  const Eigen::MatrixXcd rigid = continuous_response(wafer_stage_modes(spec), f);
+  spec.plant.flexible_modes = 0;
+  spec.plant.in_plane_modes.clear();
+  for (double& hz : spec.plant.suspension_hz) hz = 0.0;
+  const Eigen::MatrixXcd rigid = continuous_response(plant_modes(spec.info, spec.plant), f);
   EXPECT_LT((-omega * omega * rigid - mass_line).norm(), 1e-12 * mass_line.norm());
 }
 
 // With sensors at the actuators: symmetric (Maxwell, Betti), and dissipative: Im G is negative
 // semidefinite at every positive frequency.
 TEST(ContinuousResponse, OfCollocatedChannelsIsReciprocalAndDissipative) {
-  WaferStageSpec spec = test::silent_wafer_stage_spec();
+  test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   spec.info.sensors = spec.info.actuators;
-  spec.in_plane_modes.clear();
-  const auto modes = wafer_stage_modes(spec);
+  spec.plant.in_plane_modes.clear();
+  const auto modes = plant_modes(spec.info, spec.plant);
   for (const double f : {0.1, 5.0, 180.0, 452.0, 1000.0, 1959.0}) {
     const Eigen::MatrixXcd G = continuous_response(modes, f);
     EXPECT_LT((G - G.transpose()).norm(), 1e-14 * G.norm());
@@ -128,8 +129,8 @@ TEST(ContinuousResponse, OfCollocatedChannelsIsReciprocalAndDissipative) {
 }
 
 TEST(WaferStageModes, HaveSeventeenFlexibleOnesBelowTwoKilohertz) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  const auto modes = wafer_stage_modes(spec);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = plant_modes(spec.info, spec.plant);
   ASSERT_EQ(modes.size(), 32U);
   const auto frequency = [&](int flexible) {
     return modes[static_cast<std::size_t>(6 + flexible)].natural_frequency_hz;
@@ -146,11 +147,12 @@ TEST(WaferStageModes, HaveSeventeenFlexibleOnesBelowTwoKilohertz) {
 
 // The plate's own rms of every shape is 1/sqrt(mass).
 TEST(WaferStageModes, AreAllSeenBySensorsAndDrivenByActuators) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
-  const auto modes = wafer_stage_modes(spec);
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
+  const auto modes = plant_modes(spec.info, spec.plant);
   for (std::size_t i = 6; i < 6 + test::kModesInBand; ++i) {
     const auto rms = [&](const Eigen::VectorXd& shape) {
-      return std::sqrt(spec.mass_kg * shape.squaredNorm() / static_cast<double>(shape.size()));
+      return std::sqrt(spec.plant.mass_kg * shape.squaredNorm() /
+                       static_cast<double>(shape.size()));
     };
     EXPECT_GT(rms(modes[i].sensor_shape.head(test::kZSensors)), 0.8) << "mode " << i;
     EXPECT_GT(rms(modes[i].actuator_shape.head(test::kZActuators)), 0.55) << "mode " << i;

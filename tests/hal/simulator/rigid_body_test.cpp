@@ -45,7 +45,7 @@ TEST(RigidBodyJacobian, IsTheFirstOrderMotionOfEveryChannel) {
 }
 
 TEST(MotionControllerSpec, DecouplesTheWaferStage) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(6, 6);
   const Eigen::MatrixXd seen =
       spec.controller.sensor_decoupling * rigid_body_jacobian(spec.info.sensors);
@@ -58,7 +58,7 @@ TEST(MotionControllerSpec, DecouplesTheWaferStage) {
 }
 
 TEST(MotionControllerSpec, KeepsInPlaneAndOutOfPlaneApart) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   for (const Eigen::Index axis : {2, 3, 4}) {  // z, Rx, Ry
     EXPECT_LT(spec.controller.sensor_decoupling.row(axis).tail(3).norm(), 1e-12);
     EXPECT_LT(spec.controller.actuator_decoupling.col(axis).tail(4).norm(), 1e-12);
@@ -70,7 +70,7 @@ TEST(MotionControllerSpec, KeepsInPlaneAndOutOfPlaneApart) {
 }
 
 TEST(MotionControllerSpec, ComputesTheGainOfUnitLoopGainAtTheCrossover) {
-  const WaferStageSpec spec = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   const double inertia[6] = {20.0, 20.0, 20.0, 0.61206, 0.6, 1.21206};
   for (std::size_t i = 0; i < 6; ++i) {
     const AxisController& axis = spec.controller.axes[i];
@@ -82,7 +82,7 @@ TEST(MotionControllerSpec, ComputesTheGainOfUnitLoopGainAtTheCrossover) {
 }
 
 TEST(MotionControllerSpec, LeavesAGivenGainAndOpenAxesAlone) {
-  const WaferStageSpec stage = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec stage = test::silent_wafer_stage_spec();
   AxisController z = lead(20.0);
   z.gain = 123.0;
   const auto spec = motion_controller_spec(
@@ -103,7 +103,7 @@ class UncontrollableStage : public testing::Test {
     return motion_controller_spec(1e4, actuators, sensors, axes,
                                   {inertia, inertia, inertia, inertia, inertia, inertia});
   }
-  WaferStageSpec stage_ = test::silent_wafer_stage_spec();
+  test::SimulatedSpec stage_ = test::silent_wafer_stage_spec();
   std::vector<Channel> vertical_actuators_{stage_.info.actuators.begin(),
                                            stage_.info.actuators.begin() + 13};
   std::vector<Channel> two_sensors_{stage_.info.sensors.begin(), stage_.info.sensors.begin() + 2};

@@ -17,11 +17,12 @@
 namespace stageid {
 namespace test_simulated_stage {
 
-using Kind = WaferStageSpec::Fault::Kind;
+using Kind = SimulationSpec::Fault::Kind;
 
 using test::Bench;
+using test::SimulatedSpec;
 
-std::vector<double> closed_loop_record(SimulatedStage& stage, const WaferStageSpec& spec,
+std::vector<double> closed_loop_record(SimulatedStage& stage, const SimulatedSpec& spec,
                                        std::uint64_t run_seed, int samples) {
   test::ClosedLoop loop(stage, spec.controller);
   loop.start(run_seed);
@@ -37,33 +38,33 @@ std::vector<double> closed_loop_record(SimulatedStage& stage, const WaferStageSp
 }
 
 TEST(SimulatedStage, RepeatsARunExactlyWhateverWasRunBefore) {
-  const WaferStageSpec spec = test::wafer_stage_spec();
-  SimulatedStage stage(spec);
+  const SimulatedSpec spec = test::wafer_stage_spec();
+  SimulatedStage stage(spec.info, spec.plant, spec.simulation);
   const auto first = closed_loop_record(stage, spec, 7, 500);
   const auto other = closed_loop_record(stage, spec, 8, 300);
   const auto again = closed_loop_record(stage, spec, 7, 500);
   EXPECT_EQ(first, again);
   EXPECT_NE(first, other);
-  SimulatedStage another(spec);
+  SimulatedStage another(spec.info, spec.plant, spec.simulation);
   EXPECT_EQ(closed_loop_record(another, spec, 7, 500), first);
-  WaferStageSpec reseeded = spec;
-  reseeded.seed = 2;
-  SimulatedStage third(reseeded);
+  SimulatedSpec reseeded = spec;
+  reseeded.simulation.seed = 2;
+  SimulatedStage third(spec.info, spec.plant, reseeded.simulation);
   EXPECT_NE(closed_loop_record(third, spec, 7, 500), first);
 }
 
 TEST(SimulatedStage, TellsWhatItIs) {
-  WaferStageSpec spec = test::small_stage_spec();
+  SimulatedSpec spec = test::small_stage_spec();
   spec.info.delay_s = 1.5e-3;
   spec.info.backend.clear();
-  const SimulatedStage stage(spec);
+  const SimulatedStage stage(spec.info, spec.plant, spec.simulation);
   EXPECT_EQ(stage.info().backend, "sim");
   EXPECT_EQ(stage.info().delay_s, 1.5e-3);
   EXPECT_EQ(stage.info().maximum_rate_hz, 1e3);
   EXPECT_EQ(stage.info().clock, Clock::virtual_time);
-  EXPECT_EQ(wafer_stage_modes(spec).size(), 7U);
+  EXPECT_EQ(plant_modes(spec.info, spec.plant).size(), 7U);
   spec.pace = 1.0;
-  EXPECT_EQ(SimulatedStage(spec).info().clock, Clock::wall);
+  EXPECT_EQ(test::simulated(spec)->info().clock, Clock::wall);
 }
 
 TEST(SimulatedStage, KeepsVirtualTimeByCountingSamples) {
@@ -93,7 +94,7 @@ TEST(SimulatedStage, AnswersNothingUnlessStarted) {
 }
 
 TEST(SimulatedStage, RefusesACommandThatIsNoNumberAndKeepsTheLast) {
-  const WaferStageSpec spec = test::small_stage_spec();
+  const SimulatedSpec spec = test::small_stage_spec();
   Bench bench(spec);
   Bench steady(spec);
   bench.start();
@@ -109,10 +110,10 @@ TEST(SimulatedStage, RefusesACommandThatIsNoNumberAndKeepsTheLast) {
 }
 
 TEST(SimulatedStage, SaturatesAndQuantizesTheForces) {
-  WaferStageSpec spec = test::small_stage_spec();
+  SimulatedSpec spec = test::small_stage_spec();
   Bench plain(spec);
-  spec.actuator_saturation_n = 2.0;
-  spec.actuator_quantum_n = 0.5;
+  spec.plant.actuator_saturation_n = 2.0;
+  spec.simulation.actuator_quantum_n = 0.5;
   Bench limited(spec);
   plain.start();
   limited.start();
@@ -128,9 +129,9 @@ TEST(SimulatedStage, SaturatesAndQuantizesTheForces) {
 }
 
 TEST(SimulatedStage, QuantizesTheMeasurement) {
-  WaferStageSpec spec = test::small_stage_spec();
+  SimulatedSpec spec = test::small_stage_spec();
   Bench plain(spec);
-  spec.sensor_quantum_m = 1e-7;
+  spec.simulation.sensor_quantum_m = 1e-7;
   Bench coarse(spec);
   plain.start();
   coarse.start();
@@ -150,18 +151,18 @@ TEST(SimulatedStage, QuantizesTheMeasurement) {
 // A mass on a cubic spring under a constant force comes to rest (because of the suspension's damper) at
 // k z + c z^3 = F.
 TEST(SimulatedStage, SettlesWhereTheCubicSpringHoldsTheForce) {
-  WaferStageSpec spec = test::small_stage_spec();
+  SimulatedSpec spec = test::small_stage_spec();
   spec.info.actuators[0].position_m[0] = spec.info.actuators[0].position_m[1] = 0.0;
   spec.info.sensors[0].position_m[0] = spec.info.sensors[0].position_m[1] = 0.0;
-  spec.flexible_modes = 0;
-  spec.suspension_damping = 0.5;
-  spec.cubic_stiffness_n_m3 = 1e5;
+  spec.plant.flexible_modes = 0;
+  spec.plant.suspension_damping = 0.5;
+  spec.plant.cubic_stiffness_n_m3 = 1e5;
   Bench bench(spec);
   bench.start();
   bench.u[0] = 10.0;
   for (int n = 0; n < 20000; ++n) EXPECT_EQ(bench.step(), Outcome::ok);
   const double stiffness =
-      spec.mass_kg * std::pow(2.0 * std::numbers::pi * spec.suspension_hz[2], 2);
+      spec.plant.mass_kg * std::pow(2.0 * std::numbers::pi * spec.plant.suspension_hz[2], 2);
   const double z = bench.y[0];
   EXPECT_NEAR(stiffness * z + 1e5 * z * z * z, 10.0, 1e-6);
   EXPECT_GT(1e5 * z * z * z, 1.0) << "the cubic part must matter";
@@ -178,7 +179,7 @@ TEST(SimulatedStage, StartsFromStandstillWithSensorNoiseOnly) {
 }
 
 TEST(SimulatedStage, AgainstTheWallClockIsLateOnlyWhenCalledTooLate) {
-  WaferStageSpec spec = test::small_stage_spec();
+  SimulatedSpec spec = test::small_stage_spec();
   spec.pace = 1.0;
   Bench bench(spec);
   bench.start();
@@ -202,53 +203,62 @@ TEST(SimulatedStage, AgainstTheWallClockIsLateOnlyWhenCalledTooLate) {
 TEST(SimulatedStage, RefusesABadSpecNamingTheField) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto refuse = [](const char* field, auto change) {
-    WaferStageSpec spec = test::small_stage_spec();
+    SimulatedSpec spec = test::small_stage_spec();
     change(spec);
-    EXPECT_THAT([&] { SimulatedStage stage(spec); },
+    EXPECT_THAT([&] { test::simulated(spec); },
                 testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(field)));
   };
-  refuse("sample_rate_hz", [](WaferStageSpec& s) { s.info.sample_rate_hz = 0.0; });
-  refuse("mass_kg", [](WaferStageSpec& s) { s.mass_kg = -1.0; });
-  refuse("inertia_kg_m2", [](WaferStageSpec& s) { s.inertia_kg_m2[1] = 0.0; });
-  refuse("suspension_hz", [](WaferStageSpec& s) { s.suspension_hz[5] = -0.1; });
-  refuse("suspension_damping", [](WaferStageSpec& s) { s.suspension_damping = 1.0; });
-  refuse("length_x_m", [](WaferStageSpec& s) { s.length_x_m = 0.0; });
-  refuse("length_y_m", [&](WaferStageSpec& s) { s.length_y_m = nan; });
-  refuse("poisson_ratio", [](WaferStageSpec& s) { s.poisson_ratio = 0.5; });
-  refuse("first_mode_hz", [](WaferStageSpec& s) { s.first_mode_hz = 0.0; });
-  refuse("modes", [](WaferStageSpec& s) { s.flexible_modes = 1000; });
-  refuse("damping", [](WaferStageSpec& s) { s.flexible_damping.clear(); });
-  refuse("damping", [](WaferStageSpec& s) { s.flexible_damping = {-0.1}; });
-  refuse("in_plane_modes", [](WaferStageSpec& s) {
-    s.in_plane_modes = {{10.0, 0.1, Eigen::VectorXd::Ones(2), Eigen::VectorXd::Ones(2)}};
+  refuse("sample_rate_hz", [](SimulatedSpec& s) { s.info.sample_rate_hz = 0.0; });
+  refuse("mass_kg", [](SimulatedSpec& s) { s.plant.mass_kg = -1.0; });
+  refuse("inertia_kg_m2", [](SimulatedSpec& s) { s.plant.inertia_kg_m2[1] = 0.0; });
+  refuse("suspension_hz", [](SimulatedSpec& s) { s.plant.suspension_hz[5] = -0.1; });
+  refuse("suspension_damping", [](SimulatedSpec& s) { s.plant.suspension_damping = 1.0; });
+  refuse("length_x_m", [](SimulatedSpec& s) { s.plant.length_x_m = 0.0; });
+  refuse("length_y_m", [&](SimulatedSpec& s) { s.plant.length_y_m = nan; });
+  refuse("poisson_ratio", [](SimulatedSpec& s) { s.plant.poisson_ratio = 0.5; });
+  refuse("first_mode_hz", [](SimulatedSpec& s) { s.plant.first_mode_hz = 0.0; });
+  refuse("modes", [](SimulatedSpec& s) { s.plant.flexible_modes = 1000; });
+  refuse("damping", [](SimulatedSpec& s) { s.plant.flexible_damping.clear(); });
+  refuse("damping", [](SimulatedSpec& s) { s.plant.flexible_damping = {-0.1}; });
+  refuse("in_plane_modes", [](SimulatedSpec& s) {
+    s.plant.in_plane_modes = {{10.0, 0.1, Eigen::VectorXd::Ones(2), Eigen::VectorXd::Ones(2)}};
   });
-  refuse("delay_s", [](WaferStageSpec& s) { s.info.delay_s = -1e-6; });
-  refuse("delay", [](WaferStageSpec& s) { s.info.delay_s = 1e6; });
-  refuse("sensor_m", [](WaferStageSpec& s) { s.sensor_noise_m = -1.0; });
-  refuse("sensor_coloured_m", [&](WaferStageSpec& s) { s.sensor_noise_coloured_m = nan; });
-  refuse("sensor_corner_hz", [](WaferStageSpec& s) { s.sensor_noise_corner_hz = 0.0; });
-  refuse("force_n", [](WaferStageSpec& s) { s.force_noise_n = -1.0; });
-  refuse("sensor_quantum_m", [](WaferStageSpec& s) { s.sensor_quantum_m = -1.0; });
-  refuse("actuator_quantum_n", [](WaferStageSpec& s) { s.actuator_quantum_n = -1.0; });
-  refuse("cubic_stiffness_n_m3", [](WaferStageSpec& s) { s.cubic_stiffness_n_m3 = -1.0; });
-  refuse("actuator_saturation_n", [](WaferStageSpec& s) { s.actuator_saturation_n = -1.0; });
-  refuse("pace", [](WaferStageSpec& s) { s.pace = -1.0; });
-  refuse("actuators", [](WaferStageSpec& s) { s.info.actuators.clear(); });
-  refuse("sensors", [](WaferStageSpec& s) { s.info.sensors.resize(65, s.info.sensors[0]); });
-  refuse("direction", [](WaferStageSpec& s) { s.info.sensors[0].direction[2] = 0.5; });
-  refuse("position_m", [](WaferStageSpec& s) { s.info.actuators[0].position_m[0] = 0.6; });
-  refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::dead_sensor, 1, 0, 1, -1}}; });
-  refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::stuck_actuator, -1, 0, 1, -1}}; });
-  refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::missed_cycle, 0, 0, 0, -1}}; });
-  refuse("faults", [](WaferStageSpec& s) { s.faults = {{Kind::extra_delay, -1, 0, 1, -1, 0.5}}; });
+  refuse("delay_s", [](SimulatedSpec& s) { s.info.delay_s = -1e-6; });
+  refuse("delay", [](SimulatedSpec& s) { s.info.delay_s = 1e6; });
+  refuse("sensor_m", [](SimulatedSpec& s) { s.simulation.sensor_noise_m = -1.0; });
+  refuse("sensor_coloured_m",
+         [&](SimulatedSpec& s) { s.simulation.sensor_noise_coloured_m = nan; });
+  refuse("sensor_corner_hz", [](SimulatedSpec& s) { s.simulation.sensor_noise_corner_hz = 0.0; });
+  refuse("force_n", [](SimulatedSpec& s) { s.simulation.force_noise_n = -1.0; });
+  refuse("sensor_quantum_m", [](SimulatedSpec& s) { s.simulation.sensor_quantum_m = -1.0; });
+  refuse("actuator_quantum_n", [](SimulatedSpec& s) { s.simulation.actuator_quantum_n = -1.0; });
+  refuse("cubic_stiffness_n_m3", [](SimulatedSpec& s) { s.plant.cubic_stiffness_n_m3 = -1.0; });
+  refuse("actuator_saturation_n", [](SimulatedSpec& s) { s.plant.actuator_saturation_n = -1.0; });
+  refuse("pace", [](SimulatedSpec& s) { s.pace = -1.0; });
+  refuse("actuators", [](SimulatedSpec& s) { s.info.actuators.clear(); });
+  refuse("sensors", [](SimulatedSpec& s) { s.info.sensors.resize(65, s.info.sensors[0]); });
+  refuse("direction", [](SimulatedSpec& s) { s.info.sensors[0].direction[2] = 0.5; });
+  refuse("position_m", [](SimulatedSpec& s) { s.info.actuators[0].position_m[0] = 0.6; });
+  refuse("faults", [](SimulatedSpec& s) {
+    s.simulation.faults = {{Kind::dead_sensor, 1, 0, 1, -1}};
+  });
+  refuse("faults", [](SimulatedSpec& s) {
+    s.simulation.faults = {{Kind::stuck_actuator, -1, 0, 1, -1}};
+  });
+  refuse("faults", [](SimulatedSpec& s) {
+    s.simulation.faults = {{Kind::missed_cycle, 0, 0, 0, -1}};
+  });
+  refuse("faults", [](SimulatedSpec& s) {
+    s.simulation.faults = {{Kind::extra_delay, -1, 0, 1, -1, 0.5}};
+  });
 }
 
 TEST(SimulatedStage, WantsRoomForEverySensor) {
-  SimulatedStage stage(test::small_stage_spec());
+  const auto stage = test::simulated(test::small_stage_spec());
   std::vector<double> y(3);
   Inputs inputs;
   inputs.y = y;
-  EXPECT_THROW(stage.start(0, inputs), std::invalid_argument);
+  EXPECT_THROW(stage->start(0, inputs), std::invalid_argument);
 }
 
 }  // namespace test_simulated_stage

@@ -15,12 +15,12 @@ namespace stageid {
 namespace test_limit_guard {
 
 using testing::HasSubstr;
-using Kind = WaferStageSpec::Fault::Kind;
+using Kind = SimulationSpec::Fault::Kind;
 
 /// A stage in closed loop without excitation; `push_n` acts on every actuator in every sample.
 class GuardedLoop {
  public:
-  explicit GuardedLoop(const WaferStageSpec& spec) : controller_(spec.controller) {
+  explicit GuardedLoop(const test::SimulatedSpec& spec) : controller_(spec.controller) {
     auto watched = std::make_unique<test::WatchedStage>(spec);
     watch = watched.get();
     stage = std::make_unique<LimitedStage>(std::move(watched), spec.limits);
@@ -59,14 +59,14 @@ class GuardedLoop {
   Inputs inputs_;
 };
 
-WaferStageSpec with_fault(Kind kind, double value, int channel = -1) {
-  WaferStageSpec spec = test::stop_stage_spec();
-  spec.faults = {{kind, channel, 100, 1, -1, value}};
+test::SimulatedSpec with_fault(Kind kind, double value, int channel = -1) {
+  test::SimulatedSpec spec = test::stop_stage_spec();
+  spec.simulation.faults = {{kind, channel, 100, 1, -1, value}};
   return spec;
 }
 
 TEST(LimitGuard, BrakesByThePredictionWhereTheSensorFailed) {
-  WaferStageSpec spec = with_fault(Kind::sensor_offset, 300e-6);
+  test::SimulatedSpec spec = with_fault(Kind::sensor_offset, 300e-6);
   GuardedLoop loop(spec);
   ASSERT_EQ(loop.steps(100, 20.0), Outcome::ok);
   EXPECT_EQ(loop.step(), Outcome::braking);
@@ -81,7 +81,7 @@ TEST(LimitGuard, BrakesByThePredictionWhereTheSensorFailed) {
 }
 
 TEST(LimitGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
-  WaferStageSpec spec = with_fault(Kind::nan_sensor, 0.0, 0);
+  test::SimulatedSpec spec = with_fault(Kind::nan_sensor, 0.0, 0);
   spec.controller.axes[2].brake = false;
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
   GuardedLoop loop(spec);
@@ -92,7 +92,7 @@ TEST(LimitGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
 }
 
 TEST(LimitGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
-  WaferStageSpec spec = with_fault(Kind::actuator_gain, -1.0);
+  test::SimulatedSpec spec = with_fault(Kind::actuator_gain, -1.0);
   GuardedLoop loop(spec);
   ASSERT_EQ(loop.steps(101, 2.0), Outcome::ok);
   ASSERT_EQ(loop.steps(2000), Outcome::braking);
@@ -105,7 +105,7 @@ TEST(LimitGuard, LearnsThatTheStageAnswersTheOtherWayRound) {
 }
 
 TEST(LimitGuard, ASpeedLimitBrakes) {
-  WaferStageSpec spec = test::stop_stage_spec();
+  test::SimulatedSpec spec = test::stop_stage_spec();
   spec.limits.speed_m_s = Eigen::VectorXd::Constant(1, 2e-3);
   GuardedLoop loop(spec);
   EXPECT_EQ(loop.steps(200, 20.0), Outcome::braking);
@@ -115,7 +115,7 @@ TEST(LimitGuard, ASpeedLimitBrakes) {
 }
 
 TEST(LimitGuard, AStageThatCouldNotBeStoppedInTimeIsBraked) {
-  WaferStageSpec spec = test::stop_stage_spec();
+  test::SimulatedSpec spec = test::stop_stage_spec();
   GuardedLoop loop(spec);
   // A disturbance beyond the capability of the controller.
   EXPECT_EQ(loop.steps(200, 640.0), Outcome::braking);
@@ -138,9 +138,9 @@ TEST(LimitGuard, ARampThatDoesNotConvergeIsEndedByTheBrake) {
 
 // Four sensors and three motions out of plane: inconsistent sensors are detected.
 TEST(LimitGuard, ASensorThatDriftsContradictsTheOthers) {
-  WaferStageSpec spec = test::wafer_stage_spec();
+  test::SimulatedSpec spec = test::wafer_stage_spec();
   spec.limits.motion = rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors);
-  spec.faults = {{Kind::sensor_drift, 0, 100, 1, -1, 1e-3}};
+  spec.simulation.faults = {{Kind::sensor_drift, 0, 100, 1, -1, 1e-3}};
   GuardedLoop loop(spec);
   EXPECT_EQ(loop.steps(6000), Outcome::braking);
   EXPECT_EQ(loop.stage->violation().kind, LimitKind::contradiction);
@@ -149,11 +149,11 @@ TEST(LimitGuard, ASensorThatDriftsContradictsTheOthers) {
 
 // Feed-forward against gravity: the simulator has no weight, so the stage is played by hand, at rest.
 TEST(LimitGuard, AWeightThatIsCarriedIsNotAMotion) {
-  WaferStageSpec spec = test::stop_stage_spec();
+  test::SimulatedSpec spec = test::stop_stage_spec();
   spec.limits.stuck_sensor_s = 0.0;
   const auto actuators = static_cast<Eigen::Index>(spec.info.actuators.size());
-  const Eigen::VectorXd load =
-      Eigen::VectorXd::Constant(actuators, 9.81 * spec.mass_kg / static_cast<double>(actuators));
+  const Eigen::VectorXd load = Eigen::VectorXd::Constant(
+      actuators, 9.81 * spec.plant.mass_kg / static_cast<double>(actuators));
   constexpr int kRamp = 200;
   for (const bool carried : {false, true}) {
     LimitGuard guard(spec.limits, spec.info);
@@ -180,7 +180,7 @@ TEST(LimitGuard, AWeightThatIsCarriedIsNotAMotion) {
 }
 
 TEST(LimitGuard, WithoutAMotionNothingIsPredicted) {
-  WaferStageSpec spec = with_fault(Kind::sensor_offset, 150e-6);
+  test::SimulatedSpec spec = with_fault(Kind::sensor_offset, 150e-6);
   spec.limits.motion = {};
   GuardedLoop loop(spec);
   EXPECT_EQ(loop.steps(1000), Outcome::limit) << "the controller's command, then the ramp";
@@ -188,7 +188,7 @@ TEST(LimitGuard, WithoutAMotionNothingIsPredicted) {
 }
 
 TEST(LimitGuard, RefusesAMotionThatDoesNotFit) {
-  const WaferStageSpec spec = test::stop_stage_spec();
+  const test::SimulatedSpec spec = test::stop_stage_spec();
   const auto make = [&](auto change) {
     StageLimits limits = spec.limits;
     change(limits.motion);

@@ -143,8 +143,8 @@ TEST(StateSpaceController, OnlyAFeedthroughIsAController) {
 }
 
 /// The controller of a stage, by its own realization.
-WaferStageSpec in_state_space(const WaferStageSpec& stage) {
-  WaferStageSpec out = stage;
+test::SimulatedSpec in_state_space(const test::SimulatedSpec& stage) {
+  test::SimulatedSpec out = stage;
   out.controller = open_spec(static_cast<Eigen::Index>(stage.info.actuators.size()),
                              static_cast<Eigen::Index>(stage.info.sensors.size()));
   out.controller.sample_rate_hz = stage.controller.sample_rate_hz;
@@ -153,8 +153,8 @@ WaferStageSpec in_state_space(const WaferStageSpec& stage) {
 }
 
 TEST(StateSpaceController, TheRealizationOfAxesIsTheSameController) {
-  const WaferStageSpec axes = test::silent_wafer_stage_spec();
-  const WaferStageSpec matrices = in_state_space(axes);
+  const test::SimulatedSpec axes = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec matrices = in_state_space(axes);
   const MotionController one(axes.controller);
   const MotionController other(matrices.controller);
   for (const double f : {0.5, 30.0, 400.0, 4000.0})
@@ -162,25 +162,22 @@ TEST(StateSpaceController, TheRealizationOfAxesIsTheSameController) {
 }
 
 TEST(StateSpaceController, TheLoopIsTestedAndGuardedInAnyForm) {
-  const WaferStageSpec axes = test::silent_wafer_stage_spec();
-  const WaferStageSpec matrices = in_state_space(axes);
-  const LoopStability one = loop_stability(axes);
-  const LoopStability other = loop_stability(matrices);
+  const test::SimulatedSpec axes = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec matrices = in_state_space(axes);
+  const LoopStability one = loop_stability(axes, axes.plant);
+  const LoopStability other = loop_stability(matrices, matrices.plant);
   ASSERT_TRUE(other.tested);
   EXPECT_NEAR(other.largest_pole, one.largest_pole, 1e-6);
   EXPECT_NEAR(other.largest_sensitivity, one.largest_sensitivity, 1e-6 * one.largest_sensitivity);
 
-  WaferStageSpec wrong = matrices;
+  test::SimulatedSpec wrong = matrices;
   wrong.controller.state_space.c *= -1.0;
   wrong.controller.state_space.d *= -1.0;
-  EXPECT_FALSE(loop_stability(wrong).stable());
+  EXPECT_FALSE(loop_stability(wrong, wrong.plant).stable());
 
-  const std::array<double, kRigidAxes> inertia = {axes.mass_kg,          axes.mass_kg,
-                                                  axes.mass_kg,          axes.inertia_kg_m2[0],
-                                                  axes.inertia_kg_m2[1], axes.inertia_kg_m2[2]};
   const RigidMotion of_axes = rigid_motion(axes.controller, axes.info.actuators, axes.info.sensors);
-  const RigidMotion of_matrices =
-      rigid_motion(matrices.controller, axes.info.actuators, axes.info.sensors, inertia);
+  const RigidMotion of_matrices = rigid_motion(matrices.controller, axes.info.actuators,
+                                               axes.info.sensors, axes.plant.axis_inertia());
   EXPECT_LT((of_matrices.acceleration_per_n - of_axes.acceleration_per_n).norm(),
             0.1 * of_axes.acceleration_per_n.norm());
   EXPECT_LT((of_matrices.force_per_acceleration - of_axes.force_per_acceleration).norm(),

@@ -80,7 +80,7 @@ TEST(MotionController, LeavesOutFactorsOfFrequencyZero) {
 // The response measured by running it: periodic input and output, after the transient of the slowest controller pole.
 // The integrator is omitted, because its transient does not decay.
 TEST(MotionController, RunsAsItsResponseSays) {
-  WaferStageSpec stage = test::silent_wafer_stage_spec();
+  test::SimulatedSpec stage = test::silent_wafer_stage_spec();
   for (AxisController& axis : stage.controller.axes) axis.integrator_hz = 0.0;
   stage.controller.axes[2].notches = full_axis().notches;
   MotionController controller(stage.controller);
@@ -95,7 +95,7 @@ TEST(MotionController, RunsAsItsResponseSays) {
 }
 
 TEST(MotionController, IsLinearAndForgetsOnReset) {
-  const WaferStageSpec stage = test::silent_wafer_stage_spec();
+  const test::SimulatedSpec stage = test::silent_wafer_stage_spec();
   MotionController controller(stage.controller);
   const Eigen::VectorXd y = Eigen::VectorXd::LinSpaced(7, -1e-6, 1e-6);
   const Eigen::VectorXd twice = 2.0 * y;

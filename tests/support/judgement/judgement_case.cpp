@@ -85,10 +85,10 @@ std::string last_line(const std::string& text) {
 }
 
 /// The plant that the fitted realizations saw on average.
-WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
-  WaferStageSpec spec = stage.spec;
+SimulatedSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
+  SimulatedSpec spec = stage.spec;
   if (plan.drifting_mode >= 0)
-    spec.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
+    spec.plant.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
         1.0 - 0.5 * plan.drift_relative / stage.realizations;
   if (plan.swapped[0] >= 0 && !stage.stage_file) {
     // Only a stage file could reveal it; the expected answer uses the names in the log.
@@ -96,7 +96,7 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
     const auto b = static_cast<std::size_t>(plan.swapped[1]);
     std::swap(spec.info.sensors[a], spec.info.sensors[b]);
     std::swap(spec.info.sensors[a].name, spec.info.sensors[b].name);
-    for (PlantMode& mode : spec.in_plane_modes)
+    for (PlantMode& mode : spec.plant.in_plane_modes)
       std::swap(mode.sensor_shape[plan.swapped[0]], mode.sensor_shape[plan.swapped[1]]);
   }
   return spec;
@@ -105,8 +105,8 @@ WaferStageSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
 /// Response of the plant with its trouble as a flawless measurement records it, (n_y n_u) x N in the order of `frf`.
 Eigen::MatrixXcd exact_response(const JudgementStage& stage, const TroublePlan& plan,
                                 const FrfEstimate& frf) {
-  const WaferStageSpec spec = plant_of(stage, plan);
-  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const SimulatedSpec spec = plant_of(stage, plan);
+  const std::vector<PlantMode> modes = plant_modes(spec.info, spec.plant);
   const bool nonlinear = plan.cubic_n_m3 > 0.0 || plan.friction_n > 0.0;
   const Eigen::MatrixXcd average =
       nonlinear ? best_linear_approximation(stage, plan) : Eigen::MatrixXcd();
@@ -154,8 +154,8 @@ double excess_of(const AdditiveModel& model, const FrfEstimate& frf,
 
 void compare(const AdditiveModel& model, const FrfEstimate& frf, const JudgementStage& stage,
              const TroublePlan& plan, Json& result) {
-  const WaferStageSpec spec = plant_of(stage, plan);
-  const TruthComparison truth = compare_with_truth(model, frf, spec);
+  const SimulatedSpec spec = plant_of(stage, plan);
+  const TruthComparison truth = compare_with_truth(model, frf, spec.info, spec.plant);
   Json df = Json::array();
   Json dz = Json::array();
   int found = 0;

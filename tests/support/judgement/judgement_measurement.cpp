@@ -17,7 +17,7 @@ namespace stageid::test {
 namespace {
 
 constexpr Eigen::Index kSpareSamples = 64;  // behind a run: recordings that are late need them
-constexpr Eigen::Index kHeave = 2;          // of wafer_stage_modes()
+constexpr Eigen::Index kHeave = 2;          // of plant_modes()
 constexpr int kRetunePeriod = 64;           // samples
 
 void quantize(Eigen::Ref<Eigen::VectorXd> values, double quantum) {
@@ -25,12 +25,12 @@ void quantize(Eigen::Ref<Eigen::VectorXd> values, double quantum) {
   for (double& value : values) value = quantum * std::nearbyint(value / quantum);
 }
 
-NoiseSpec white_noise_of(const WaferStageSpec& spec) {
+NoiseSpec white_noise_of(const SimulatedSpec& spec) {
   return {static_cast<Eigen::Index>(spec.info.actuators.size()),
           static_cast<Eigen::Index>(spec.info.sensors.size()),
           spec.info.sample_rate_hz,
-          spec.force_noise_n,
-          spec.sensor_noise_m,
+          spec.simulation.force_noise_n,
+          spec.simulation.sensor_noise_m,
           0.0,
           1.0};
 }
@@ -48,7 +48,7 @@ class Loop {
   Loop(const JudgementStage& stage, const TroublePlan& plan)
       : stage_(stage),
         plan_(plan),
-        plant_(wafer_stage_modes(stage.spec), stage.spec.info.delay_s,
+        plant_(plant_modes(stage.spec.info, stage.spec.plant), stage.spec.info.delay_s,
                stage.spec.info.sample_rate_hz),
         controller_(stage.spec.controller),
         noise_(white_noise_of(stage.spec)),
@@ -66,7 +66,7 @@ class Loop {
                  std::pair<double, double> done) {
     plant_.reset();
     controller_.reset();
-    noise_.restart(stage_.spec.seed + stage_.seed, seed);
+    noise_.restart(stage_.spec.simulation.seed + stage_.seed, seed);
     coloured_.restart(~stage_.seed, seed);
     if (friction_) friction_->reset();
     LogSamples record;
@@ -89,7 +89,7 @@ class Loop {
  private:
   void drift(double done) {
     const PlantMode& mode =
-        stage_.spec.in_plane_modes[static_cast<std::size_t>(plan_.drifting_mode)];
+        stage_.spec.plant.in_plane_modes[static_cast<std::size_t>(plan_.drifting_mode)];
     plant_.retune(static_cast<Eigen::Index>(kRigidAxes) + plan_.drifting_mode,
                   mode.natural_frequency_hz * (1.0 + plan_.drift_relative * (done - 0.5)),
                   mode.damping_ratio);
@@ -112,7 +112,7 @@ class Loop {
     force_ = u_;
     quantize(force_, plan_.actuator_quantum_n);
     force_ += Eigen::Map<const Eigen::VectorXd>(noise_.force_n(), force_.size());
-    const double shape = 1.0 / std::sqrt(stage_.spec.mass_kg);
+    const double shape = 1.0 / std::sqrt(stage_.spec.plant.mass_kg);
     const double z_m = shape * plant_.coordinate(kHeave);
     double extra_n = -plan_.cubic_n_m3 * z_m * z_m * z_m;
     if (friction_) extra_n += friction_->move_to(z_m);
@@ -214,7 +214,7 @@ Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const Tr
   JudgementStage quiet = stage;
   quiet.seed = ~stage.seed;
   quiet.realizations = kRealizations;
-  quiet.spec.sensor_noise_m = quiet.spec.force_noise_n = 0.0;
+  quiet.spec.simulation.sensor_noise_m = quiet.spec.simulation.force_noise_n = 0.0;
   quiet.noise.colour = NoiseColour::white;
   quiet.noise.density = 0.0;
   const ExperimentPlan experiment = quiet.plan();

@@ -47,27 +47,27 @@ Channel channel(const std::string& name, const char* unit, double x_m, double y_
 
 /// Vertical channels on the plate: on the line x = 0 with `line`, else around its edge.
 void place_vertical(RandomNumbers& random, const char* prefix, const char* unit, int count,
-                    bool line, const WaferStageSpec& spec, std::vector<Channel>& channels) {
+                    bool line, const PlantSpec& plant, std::vector<Channel>& channels) {
   for (int i = 0; i < count; ++i) {
     const std::string name = fmt::format("{}{}", prefix, i + 1);
     if (line) {
       const double y =
-          spec.length_y_m * (-0.45 + 0.9 * i / (count - 1.0)) * random.uniform(0.8, 1.0);
+          plant.length_y_m * (-0.45 + 0.9 * i / (count - 1.0)) * random.uniform(0.8, 1.0);
       channels.push_back(channel(name, unit, 0.0, y, 2));
       continue;
     }
     const double angle = 2.0 * kPi * (i + random.uniform(-0.2, 0.2)) / count + 0.4;
     const double radius = i < 4 ? random.uniform(0.38, 0.48) : random.uniform(0.1, 0.48);
-    channels.push_back(channel(name, unit, radius * spec.length_x_m * std::cos(angle),
-                               radius * spec.length_y_m * std::sin(angle), 2));
+    channels.push_back(channel(name, unit, radius * plant.length_x_m * std::cos(angle),
+                               radius * plant.length_y_m * std::sin(angle), 2));
   }
 }
 
 /// Three sensors, three or four actuators in the plane: x, y and Rz can be distinguished.
 void place_in_plane(RandomNumbers& random, const char* prefix, const char* unit, int count,
-                    const WaferStageSpec& spec, std::vector<Channel>& channels) {
-  const double a = 0.4 * spec.length_x_m * random.uniform(0.8, 1.0);
-  const double b = 0.4 * spec.length_y_m * random.uniform(0.8, 1.0);
+                    const PlantSpec& plant, std::vector<Channel>& channels) {
+  const double a = 0.4 * plant.length_x_m * random.uniform(0.8, 1.0);
+  const double b = 0.4 * plant.length_y_m * random.uniform(0.8, 1.0);
   const std::array<std::array<double, 2>, 4> at = {{{0.0, -b}, {0.0, b}, {a, 0.0}, {-a, 0.0}}};
   for (int i = 0; i < count; ++i)
     channels.push_back(channel(fmt::format("{}h{}", prefix, i + 1), unit,
@@ -75,55 +75,55 @@ void place_in_plane(RandomNumbers& random, const char* prefix, const char* unit,
                                at[static_cast<std::size_t>(i)][1], i < 2 ? 0 : 1));
 }
 
-void draw_body(RandomNumbers& random, const Sizes& sizes, WaferStageSpec& spec) {
+void draw_body(RandomNumbers& random, const Sizes& sizes, SimulatedSpec& spec) {
+  PlantSpec& plant = spec.plant;
   spec.info.name = "random stage";
   spec.info.backend = "sim";
   const std::array<double, 3> rates = {1000.0, 2000.0, 4000.0};
   spec.info.sample_rate_hz = rates[static_cast<std::size_t>(random.integer(0, 2))];
-  spec.mass_kg = random.uniform(5.0, 30.0);
-  spec.length_x_m = random.uniform(0.4, 0.8);
-  spec.length_y_m = spec.length_x_m * random.uniform(0.7, 1.3);
+  plant.mass_kg = random.uniform(5.0, 30.0);
+  plant.length_x_m = random.uniform(0.4, 0.8);
+  plant.length_y_m = plant.length_x_m * random.uniform(0.7, 1.3);
   const double thickness_m = 0.1;
   const auto inertia = [&](double a, double b) {
-    return spec.mass_kg * (std::pow(a, 2) + std::pow(b, 2)) / 12.0;
+    return plant.mass_kg * (std::pow(a, 2) + std::pow(b, 2)) / 12.0;
   };
-  spec.inertia_kg_m2[0] = inertia(spec.length_y_m, thickness_m);
-  spec.inertia_kg_m2[1] = inertia(spec.length_x_m, thickness_m);
-  spec.inertia_kg_m2[2] = inertia(spec.length_x_m, spec.length_y_m);
-  for (double& hz : spec.suspension_hz) hz = kSuspensionHz;
-  spec.suspension_damping = 0.1;
+  plant.inertia_kg_m2[0] = inertia(plant.length_y_m, thickness_m);
+  plant.inertia_kg_m2[1] = inertia(plant.length_x_m, thickness_m);
+  plant.inertia_kg_m2[2] = inertia(plant.length_x_m, plant.length_y_m);
+  for (double& hz : plant.suspension_hz) hz = kSuspensionHz;
+  plant.suspension_damping = 0.1;
   const int plane_sensors = sizes.in_plane ? 3 : 0;
   const int plane_actuators = sizes.in_plane ? (sizes.actuators > 7 ? 4 : 3) : 0;
-  place_vertical(random, "z", "m", sizes.sensors - plane_sensors, sizes.sensors == 2, spec,
+  place_vertical(random, "z", "m", sizes.sensors - plane_sensors, sizes.sensors == 2, plant,
                  spec.info.sensors);
-  place_in_plane(random, "z", "m", plane_sensors, spec, spec.info.sensors);
-  place_vertical(random, "a", "N", sizes.actuators - plane_actuators, sizes.sensors == 2, spec,
+  place_in_plane(random, "z", "m", plane_sensors, plant, spec.info.sensors);
+  place_vertical(random, "a", "N", sizes.actuators - plane_actuators, sizes.sensors == 2, plant,
                  spec.info.actuators);
-  place_in_plane(random, "a", "N", plane_actuators, spec, spec.info.actuators);
+  place_in_plane(random, "a", "N", plane_actuators, plant, spec.info.actuators);
   spec.info.delay_s = random.uniform(0.3, 1.7) / spec.info.sample_rate_hz;
 }
 
 /// `count` frequencies of the band, at least three half-power widths apart, and one or two above it.
 void draw_modes(RandomNumbers& random, int count, JudgementStage& stage) {
-  WaferStageSpec& spec = stage.spec;
+  SimulatedSpec& spec = stage.spec;
+  std::vector<PlantMode>& modes = spec.plant.in_plane_modes;
   const auto crowded = [&](double hz, double damping) {
-    return std::any_of(
-        spec.in_plane_modes.begin(), spec.in_plane_modes.end(), [&](const PlantMode& other) {
-          const double width =
-              2.0 * std::max(damping * hz, other.damping_ratio * other.natural_frequency_hz);
-          return std::abs(other.natural_frequency_hz - hz) < 3.0 * width;
-        });
+    return std::any_of(modes.begin(), modes.end(), [&](const PlantMode& other) {
+      const double width =
+          2.0 * std::max(damping * hz, other.damping_ratio * other.natural_frequency_hz);
+      return std::abs(other.natural_frequency_hz - hz) < 3.0 * width;
+    });
   };
   const auto add = [&](double hz, double damping) {
-    const double scale = random.uniform(0.3, 0.8) / std::sqrt(spec.mass_kg);
-    spec.in_plane_modes.push_back({hz, damping,
-                                   random_vector(random, spec.info.actuators.size(), scale),
-                                   random_vector(random, spec.info.sensors.size(), scale)});
+    const double scale = random.uniform(0.3, 0.8) / std::sqrt(spec.plant.mass_kg);
+    modes.push_back({hz, damping, random_vector(random, spec.info.actuators.size(), scale),
+                     random_vector(random, spec.info.sensors.size(), scale)});
   };
   const double first_hz = 0.2 * stage.band_high_hz;
   const double last_hz = 0.93 * stage.band_high_hz;
-  for (int trials = 0; static_cast<int>(spec.in_plane_modes.size()) < count; ++trials) {
-    if (trials % 100 == 99) spec.in_plane_modes.clear();  // those drawn may leave no room
+  for (int trials = 0; static_cast<int>(modes.size()) < count; ++trials) {
+    if (trials % 100 == 99) modes.clear();  // those drawn may leave no room
     const double hz = random.uniform(first_hz, last_hz);
     const double damping = 0.005 * std::pow(4.0, random.uniform());
     if (!crowded(hz, damping)) add(hz, damping);
@@ -135,7 +135,7 @@ void draw_modes(RandomNumbers& random, int count, JudgementStage& stage) {
         random.uniform(0.007, 0.03));
 }
 
-MotionControllerSpec controller(const WaferStageSpec& spec, const Sizes& sizes,
+MotionControllerSpec controller(const SimulatedSpec& spec, const Sizes& sizes,
                                 double crossover_hz) {
   AxisController axis;
   axis.crossover_hz = crossover_hz;
@@ -148,18 +148,17 @@ MotionControllerSpec controller(const WaferStageSpec& spec, const Sizes& sizes,
   const AxisController pitch = sizes.sensors == 2 ? open : axis;
   return motion_controller_spec(spec.info.sample_rate_hz, spec.info.actuators, spec.info.sensors,
                                 {plane, plane, axis, axis, pitch, plane},
-                                {spec.mass_kg, spec.mass_kg, spec.mass_kg, spec.inertia_kg_m2[0],
-                                 spec.inertia_kg_m2[1], spec.inertia_kg_m2[2]});
+                                spec.plant.axis_inertia());
 }
 
 /// Samples until a kick at all actuators has decayed to kDecayed of its largest motion, in the sensors and in each
 /// flexible mode; -1: it does not within `most`.
-int settling_samples(const WaferStageSpec& spec, int most) {
-  ModalPlant plant(wafer_stage_modes(spec), spec.info.delay_s, spec.info.sample_rate_hz);
+int settling_samples(const SimulatedSpec& spec, int most) {
+  ModalPlant plant(plant_modes(spec.info, spec.plant), spec.info.delay_s, spec.info.sample_rate_hz);
   MotionController loop(spec.controller);
   Eigen::VectorXd y(plant.sensors());
   Eigen::VectorXd u(plant.actuators());
-  const auto modes = static_cast<Eigen::Index>(spec.in_plane_modes.size());
+  const auto modes = static_cast<Eigen::Index>(spec.plant.in_plane_modes.size());
   Eigen::ArrayXXd motion(1 + modes, most);  // of the sensors, of each mode
   for (int n = 0; n < most; ++n) {
     plant.output(y.data());
@@ -193,9 +192,9 @@ void close_loop(RandomNumbers& random, const Sizes& sizes, JudgementStage& stage
 /// Sensor noise by the response's: of the mean over all periods and fitted realizations, single axis; orthogonal
 /// axes have sqrt(n) less.
 void draw_noise(RandomNumbers& random, JudgementStage& stage) {
-  WaferStageSpec& spec = stage.spec;
+  SimulatedSpec& spec = stage.spec;
   const Eigen::VectorXd frequency_hz = stage.plan().grid().frequency_hz();
-  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const std::vector<PlantMode> modes = plant_modes(spec.info, spec.plant);
   std::vector<double> magnitudes;
   for (Eigen::Index k = 0; k < frequency_hz.size(); k += 5) {
     const Eigen::MatrixXcd g =
@@ -207,7 +206,7 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   stage.snr_db = random.uniform(30.0, 50.0);
   double response_noise = median * std::pow(10.0, -stage.snr_db / 20.0);
   for (int i = 0; i < stage.modes_in_band; ++i) {
-    const PlantMode& mode = spec.in_plane_modes[static_cast<std::size_t>(i)];
+    const PlantMode& mode = spec.plant.in_plane_modes[static_cast<std::size_t>(i)];
     const double omega = 2.0 * kPi * mode.natural_frequency_hz;
     const double peak = mode.actuator_shape.cwiseAbs().maxCoeff() *
                         mode.sensor_shape.cwiseAbs().maxCoeff() /
@@ -226,12 +225,12 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   stage.noise.damping_ratio = random.uniform(0.005, 0.03);
   stage.noise.reference_hz = stage.band_high_hz * random.uniform(0.15, 0.9);
   stage.noise.density = density;
-  spec.sensor_noise_m = white;
+  spec.simulation.sensor_noise_m = white;
   if (stage.noise.colour == NoiseColour::white) stage.noise.density = 0.0;
   if (stage.noise.colour == NoiseColour::resonant) stage.noise.density *= 30.0;
   if (stage.noise.colour == NoiseColour::flicker) {
     stage.noise.reference_hz = 0.2 * stage.band_high_hz;
-    spec.sensor_noise_m *= 0.5;
+    spec.simulation.sensor_noise_m *= 0.5;
   }
   // What leaks from a random walk is common to all lines: a trouble of its own unless it is below the white noise.
   if (stage.noise.colour == NoiseColour::drift) stage.noise.reference_hz = 1.5 * stage.band_low_hz;
@@ -239,16 +238,16 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   if (random.uniform() < 0.5) {
     const Eigen::MatrixXcd g = sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz,
                                                 0.3 * stage.band_high_hz);
-    spec.force_noise_n = white / std::sqrt(g.cwiseAbs2().rowwise().sum().mean());
+    spec.simulation.force_noise_n = white / std::sqrt(g.cwiseAbs2().rowwise().sum().mean());
   }
 }
 
 /// Rms of the rigid heave in a run, by the closed loop's response to the excitation.
 double heave_motion(const JudgementStage& stage) {
   constexpr std::size_t kHeave = 2;
-  const WaferStageSpec& spec = stage.spec;
+  const SimulatedSpec& spec = stage.spec;
   const Eigen::VectorXd frequency_hz = stage.plan().grid().frequency_hz();
-  const std::vector<PlantMode> modes = wafer_stage_modes(spec);
+  const std::vector<PlantMode> modes = plant_modes(spec.info, spec.plant);
   const MotionController loop(spec.controller);
   const auto axes = static_cast<Eigen::Index>(spec.info.actuators.size());
   double power = 0.0;
@@ -259,7 +258,7 @@ double heave_motion(const JudgementStage& stage) {
         (Eigen::MatrixXcd::Identity(axes, axes) - loop.response(hz) * g).inverse();
     const double omega = 2.0 * kPi * hz;
     power += (modes[kHeave].actuator_shape.transpose() * u).squaredNorm() /
-             (spec.mass_kg * std::pow(omega, 4));
+             (spec.plant.mass_kg * std::pow(omega, 4));
   }
   const double runs =
       stage.scheme == ExcitationScheme::single_axis ? static_cast<double>(axes) : 1.0;
@@ -301,9 +300,9 @@ std::string JudgementStage::nominal_text() const {
       "plant:\n  mass_kg: {}\n  inertia_kg_m2: [{}, {}, {}]\n  suspension_hz: [{}]\n"
       "  suspension_damping: {}\n  plate: {{length_x_m: {}, length_y_m: {}, first_mode_hz: 100, "
       "modes: 0, damping: [0.01]}}\n",
-      off(spec.mass_kg), off(spec.inertia_kg_m2[0]), off(spec.inertia_kg_m2[1]),
-      off(spec.inertia_kg_m2[2]), fmt::join(spec.suspension_hz, ", "), spec.suspension_damping,
-      spec.length_x_m, spec.length_y_m);
+      off(spec.plant.mass_kg), off(spec.plant.inertia_kg_m2[0]), off(spec.plant.inertia_kg_m2[1]),
+      off(spec.plant.inertia_kg_m2[2]), fmt::join(spec.plant.suspension_hz, ", "),
+      spec.plant.suspension_damping, spec.plant.length_x_m, spec.plant.length_y_m);
   text += "controller:\n";
   for (std::size_t i = 0; i < kRigidAxes; ++i) {
     const AxisController& axis = spec.controller.axes[i];

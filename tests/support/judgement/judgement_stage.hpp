@@ -4,8 +4,8 @@
 #include <string>
 
 #include "excitation/plan/experiment_plan.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/stages/coloured_noise.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 
 /// Random stages for judgement_study: everything that a measurement needs, drawn from one seed.
 namespace stageid::test {
@@ -14,11 +14,12 @@ struct JudgementStage {
   std::uint64_t seed = 0;
   /// The true plant, its limits unused, and the controller that closes the loop. Modes in the band and one or two
   /// above it are `in_plane_modes`, whose shapes reach all channels.
-  WaferStageSpec spec;
-  ColouredNoiseSpec noise;  ///< of the sensors, in addition to the white spec.sensor_noise_m
-  double snr_db = 0.0;      ///< median magnitude of the response over the noise of its mean
-  double level_n = 1.0;     ///< rms per axis
-  double motion_m = 0.0;    ///< rms of the rigid heave under excitation
+  SimulatedSpec spec;
+  ColouredNoiseSpec
+      noise;            ///< of the sensors, in addition to the white spec.simulation.sensor_noise_m
+  double snr_db = 0.0;  ///< median magnitude of the response over the noise of its mean
+  double level_n = 1.0;   ///< rms per axis
+  double motion_m = 0.0;  ///< rms of the rigid heave under excitation
   int period_samples = 0;
   double band_low_hz = 0.0;
   double band_high_hz = 0.0;

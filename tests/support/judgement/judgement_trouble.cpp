@@ -17,7 +17,7 @@ constexpr std::array<const char*, kTroubles> kNames = {
 /// The force on the heave that goes with its motion at the crossover: what keeps the loop stable.
 double loop_force(const JudgementStage& stage) {
   const double omega = 2.0 * std::numbers::pi * stage.spec.controller.axes[2].crossover_hz;
-  return stage.spec.mass_kg * omega * omega * stage.motion_m;
+  return stage.spec.plant.mass_kg * omega * omega * stage.motion_m;
 }
 
 void draw_late_channel(RandomNumbers& random, const JudgementStage& stage, TroublePlan& plan) {
@@ -73,7 +73,7 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       plan.right_causes = distortion;
       break;
     case Trouble::adc_step:
-      plan.sensor_quantum_m = stage.spec.sensor_noise_m * random.uniform(2.0, 20.0);
+      plan.sensor_quantum_m = stage.spec.simulation.sensor_noise_m * random.uniform(2.0, 20.0);
       plan.right_causes = distortion;
       break;
     case Trouble::cubic:
@@ -88,16 +88,17 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       break;
     case Trouble::slow_noise:
       stage.noise.colour = NoiseColour::drift;
-      stage.noise.density = stage.spec.sensor_noise_m * stage.spec.sensor_noise_m * 2.0 /
-                            stage.spec.info.sample_rate_hz *
-                            std::pow(10.0, random.uniform(0.5, 2.5));
+      stage.noise.density =
+          stage.spec.simulation.sensor_noise_m * stage.spec.simulation.sensor_noise_m * 2.0 /
+          stage.spec.info.sample_rate_hz * std::pow(10.0, random.uniform(0.5, 2.5));
       stage.noise.reference_hz = 0.2 * stage.band_high_hz;
       plan.right_causes = {"unsettled", "drift", "slow", "uneven_noise", "noise"};
       break;
     case Trouble::mode_drift: {
       plan.drifting_mode = random.integer(0, stage.modes_in_band - 1);
       const double damping =
-          stage.spec.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].damping_ratio;
+          stage.spec.plant.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)]
+              .damping_ratio;
       plan.drift_relative = 2.0 * damping * random.uniform(0.3, 2.0);
       plan.right_causes = {"drift", "realizations", "changed"};
       break;

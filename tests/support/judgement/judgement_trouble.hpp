@@ -44,7 +44,7 @@ struct TroublePlan {
   double cubic_n_m3 = 0.0;  ///< on the rigid heave
   double friction_n = 0.0;
   double friction_stiffness_n_m = 0.0;
-  int drifting_mode = -1;       ///< of JudgementStage::spec.in_plane_modes
+  int drifting_mode = -1;       ///< of JudgementStage::spec.plant.in_plane_modes
   double drift_relative = 0.0;  ///< of its frequency, from the first to the last sample of all runs
   double setpoint_m = 0.0;      ///< rms size of slow motion in heave
   int silent_axis = -1;         ///< its excitation does not arrive

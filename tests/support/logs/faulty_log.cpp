@@ -51,11 +51,11 @@ class Loop {
   Loop(const FaultyLogRequest& request, const PlantedFault& fault)
       : request_(request),
         fault_(fault),
-        plant_(wafer_stage_modes(request.plant), request.plant.info.delay_s,
-               request.plant.info.sample_rate_hz),
-        late_(wafer_stage_modes(request.plant),
-              request.plant.info.delay_s + (fault.kind == Kind::wired_skew ? fault.value : 0.0),
-              request.plant.info.sample_rate_hz),
+        plant_(plant_modes(request.stage.info, request.stage.plant), request.stage.info.delay_s,
+               request.stage.info.sample_rate_hz),
+        late_(plant_modes(request.stage.info, request.stage.plant),
+              request.stage.info.delay_s + (fault.kind == Kind::wired_skew ? fault.value : 0.0),
+              request.stage.info.sample_rate_hz),
         controller_(request.configured.controller),
         y_(plant_.sensors()),
         y_late_(plant_.sensors()),
@@ -63,7 +63,8 @@ class Loop {
         force_(plant_.actuators()),
         window_m_(1e-3) {
     if (fault.kind != Kind::drifting_mode) return;
-    const PlantMode mode = wafer_stage_modes(request.plant)[static_cast<std::size_t>(fault.a)];
+    const PlantMode mode =
+        plant_modes(request.stage.info, request.stage.plant)[static_cast<std::size_t>(fault.a)];
     mode_hz_ = mode.natural_frequency_hz;
     mode_damping_ = mode.damping_ratio;
   }
@@ -113,7 +114,7 @@ class Loop {
     if (kind == Kind::wired_swap && fault_.of_sensor) std::swap(y_[fault_.a], y_[fault_.b]);
     if (kind == Kind::wired_gain && fault_.of_sensor) y_[fault_.a] *= fault_.value;
     if (kind == Kind::dead_sensor) y_[fault_.a] = 0.0;
-    for (double& value : y_) value += request_.plant.sensor_noise_m * random.normal();
+    for (double& value : y_) value += request_.stage.simulation.sensor_noise_m * random.normal();
     if (kind == Kind::saturation && fault_.of_sensor)
       y_[fault_.a] = std::clamp(y_[fault_.a], -fault_.value, fault_.value);
     if (kind == Kind::stuck_sensor) {
@@ -154,7 +155,7 @@ class Loop {
 };
 
 FrequencyGrid grid_of(const FaultyLogRequest& request) {
-  const double rate_hz = request.plant.info.sample_rate_hz;
+  const double rate_hz = request.stage.info.sample_rate_hz;
   const int period = static_cast<int>(std::lround(request.period_s * rate_hz));
   std::vector<int> lines;
   for (int line = 1; line * rate_hz / period < 0.2 * rate_hz; line += 2) lines.push_back(line);
@@ -163,22 +164,22 @@ FrequencyGrid grid_of(const FaultyLogRequest& request) {
 
 }  // namespace
 
-WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nominal) {
+SimulatedSpec random_wafer_stage(std::uint64_t seed, const SimulatedSpec& nominal) {
   RandomNumbers random(seed);
-  WaferStageSpec spec = nominal;
+  SimulatedSpec spec = nominal;
   const auto off = [&](double share) { return 1.0 + random.uniform(-share, share); };
-  spec.mass_kg *= off(0.03);
-  for (double& inertia : spec.inertia_kg_m2) inertia *= off(0.03);
+  spec.plant.mass_kg *= off(0.03);
+  for (double& inertia : spec.plant.inertia_kg_m2) inertia *= off(0.03);
   for (auto* channels : {&spec.info.actuators, &spec.info.sensors})
     for (Channel& channel : *channels)
       for (int axis = 0; axis < 2; ++axis)
         channel.position_m[axis] -= std::copysign(random.uniform(0.0, 4e-3),
                                                   channel.position_m[axis]);  // stays on the plate
-  for (double& frequency_hz : spec.suspension_hz) frequency_hz *= off(0.2);
-  spec.first_mode_hz = random.uniform(150.0, 220.0);
-  for (double& damping : spec.flexible_damping) damping *= random.uniform(0.7, 2.0);
+  for (double& frequency_hz : spec.plant.suspension_hz) frequency_hz *= off(0.2);
+  spec.plant.first_mode_hz = random.uniform(150.0, 220.0);
+  for (double& damping : spec.plant.flexible_damping) damping *= random.uniform(0.7, 2.0);
   spec.info.delay_s *= off(0.05);
-  spec.sensor_noise_m = 1e-9 * std::exp(random.uniform(std::log(0.3), std::log(3.0)));
+  spec.simulation.sensor_noise_m = 1e-9 * std::exp(random.uniform(std::log(0.3), std::log(3.0)));
   return spec;
 }
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/simulator/simulated_stage.hpp"
 #include "tests/support/logs/memory_log.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 
 /// Logs of random stages with planted faults. The loop is closed here, sample by sample, around the modal plant and
 /// motion controller of hal, so that faults can be inside or outside the recording.
@@ -42,9 +42,9 @@ struct PlantedFault {
 };
 
 struct FaultyLogRequest {
-  WaferStageSpec plant;       ///< the true one
-  WaferStageSpec configured;  ///< the loop is closed by its controller
-  int axes = 13;              ///< the first actuators, one an experiment
+  SimulatedSpec stage;       ///< the true one
+  SimulatedSpec configured;  ///< the loop is closed by its controller
+  int axes = 13;             ///< the first actuators, one an experiment
   double period_s = 1.0;
   int transient_periods = 1;
   int periods = 3;
@@ -55,7 +55,7 @@ struct FaultyLogRequest {
 
 /// Masses 3 % off the nominal ones, positions up to 4 mm, first mode 150 to 220 Hz, other damping, suspension
 /// and delay, noise 0.3 to 3 nm.
-WaferStageSpec random_wafer_stage(std::uint64_t seed, const WaferStageSpec& nominal);
+SimulatedSpec random_wafer_stage(std::uint64_t seed, const SimulatedSpec& nominal);
 
 /// @returns a log without runs if the loop did not stay in its sensors' windows: no measurement then.
 MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFault& fault);

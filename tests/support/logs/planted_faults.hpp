@@ -13,7 +13,7 @@
 
 namespace stageid::test {
 
-inline constexpr int kFirstFlexibleMode = 6;  // of wafer_stage_modes()
+inline constexpr int kFirstFlexibleMode = 6;  // of plant_modes()
 
 /// A fault and what ought to be said of it.
 struct NamedFault {

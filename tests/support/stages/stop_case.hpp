@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limited_stage.hpp"
+#include "tests/support/stages/simulated_spec.hpp"
 
 namespace stageid::test {
 
@@ -22,23 +22,23 @@ inline constexpr double kStopMass = 20.0;      // kg
 inline constexpr std::uint64_t kFaultCycle = 2000;
 
 /// One levitated axis: 20 kg, 650 N, a window of 200 um, 10 kHz, crossover 60 Hz.
-inline WaferStageSpec stop_stage_spec(double controller_gain = 1.0) {
-  WaferStageSpec spec;
+inline SimulatedSpec stop_stage_spec(double controller_gain = 1.0) {
+  SimulatedSpec spec;
   spec.info.name = "one axis";
   spec.info.sample_rate_hz = 10e3;
   spec.info.actuators = {{"f", "N", {0, 0, 0}, {0, 0, 1}}};
   spec.info.sensors = {{"s", "m", {0, 0, 0}, {0, 0, 1}}};
   spec.info.delay_s = 130e-6;
-  spec.mass_kg = kStopMass;
-  spec.inertia_kg_m2[0] = spec.inertia_kg_m2[1] = spec.inertia_kg_m2[2] = 1.0;
-  spec.suspension_hz[2] = 0.3;
-  spec.suspension_damping = 0.1;
-  spec.length_x_m = spec.length_y_m = 0.5;
-  spec.first_mode_hz = 200.0;
-  spec.flexible_damping = {0.01};
-  spec.sensor_noise_m = 1e-9;
-  spec.force_noise_n = 1e-3;
-  spec.seed = 1;
+  spec.plant.mass_kg = kStopMass;
+  spec.plant.inertia_kg_m2[0] = spec.plant.inertia_kg_m2[1] = spec.plant.inertia_kg_m2[2] = 1.0;
+  spec.plant.suspension_hz[2] = 0.3;
+  spec.plant.suspension_damping = 0.1;
+  spec.plant.length_x_m = spec.plant.length_y_m = 0.5;
+  spec.plant.first_mode_hz = 200.0;
+  spec.plant.flexible_damping = {0.01};
+  spec.simulation.sensor_noise_m = 1e-9;
+  spec.simulation.force_noise_n = 1e-3;
+  spec.simulation.seed = 1;
   std::array<AxisController, kRigidAxes> axes;
   AxisController& axis = axes[2];
   axis.crossover_hz = 60.0;
@@ -60,26 +60,26 @@ inline WaferStageSpec stop_stage_spec(double controller_gain = 1.0) {
 /// Watches where the stage really is and which forces it is given.
 class WatchedStage final : public CyclicStage {
  public:
-  explicit WatchedStage(const WaferStageSpec& spec)
-      : stage_(spec),
+  explicit WatchedStage(const SimulatedSpec& spec)
+      : stage_(simulated(spec)),
         rate_hz_(spec.info.sample_rate_hz),
-        suspension_rad_s_(2.0 * std::numbers::pi * spec.suspension_hz[2]),
-        damping_(spec.suspension_damping),
+        suspension_rad_s_(2.0 * std::numbers::pi * spec.plant.suspension_hz[2]),
+        damping_(spec.plant.suspension_damping),
         now_m_(spec.info.sensors.size()) {
     before_m_ = now_m_;
   }
-  const StageInfo& info() const noexcept override { return stage_.info(); }
-  void start(std::uint64_t run_seed, Inputs& first) override { stage_.start(run_seed, first); }
+  const StageInfo& info() const noexcept override { return stage_->info(); }
+  void start(std::uint64_t run_seed, Inputs& first) override { stage_->start(run_seed, first); }
   Outcome exchange(const Outputs& outputs, Inputs& inputs, Deadline deadline) noexcept override {
     ++cycles;
     for (const double u : outputs.u) largest_n = std::max(largest_n, std::abs(u));
-    const Outcome outcome = stage_.exchange(outputs, inputs, deadline);
+    const Outcome outcome = stage_->exchange(outputs, inputs, deadline);
     std::swap(now_m_, before_m_);
-    stage_.displacement(now_m_);
+    stage_->displacement(now_m_);
     for (const double y : now_m_) largest_m = std::max(largest_m, std::abs(y));
     return outcome;
   }
-  void stop() noexcept override { stage_.stop(); }
+  void stop() noexcept override { stage_->stop(); }
 
   /// Largest excursion in the second after the forces were cut, on the suspension alone.
   double coasted_m() const {
@@ -106,7 +106,7 @@ class WatchedStage final : public CyclicStage {
   std::uint64_t cycles = 0;
 
  private:
-  SimulatedStage stage_;
+  std::unique_ptr<SimulatedStage> stage_;
   double rate_hz_;
   double suspension_rad_s_;
   double damping_;

@@ -259,7 +259,8 @@ TEST_F(Workflow, ReplayGivesTheSameLogAndNoticesADifference) {
 TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
   make_log();
   const ExperimentConfig config = load_experiment_config(config_);
-  const DesignPrediction prediction = predict_closed_loop(make_plan(config), config.stage.spec);
+  const DesignPrediction prediction =
+      predict_closed_loop(make_plan(config), config.stage.spec, config.stage.plant);
   const std::unique_ptr<LogReader> log = open_log(at("run.slog"));
   const auto N = static_cast<std::uint64_t>(log->info().period_samples);
   // Of the last period of all runs, the actuators before the sensors.

@@ -116,8 +116,9 @@ void expect_same_channels(const std::vector<Channel>& a, const std::vector<Chann
 }
 
 TEST(Configs, TheWaferStageIsTheOneThatTheLibrariesAreTestedWith) {
-  const WaferStageSpec file = load_stage_config(kConfigs / "stage/wafer_stage.yaml").spec;
-  const WaferStageSpec code = test::wafer_stage_spec();
+  const StageConfig config = load_stage_config(kConfigs / "stage/wafer_stage.yaml");
+  const StageSpec& file = config.spec;
+  const test::SimulatedSpec code = test::wafer_stage_spec();
   expect_same_channels(file.info.actuators, code.info.actuators);
   expect_same_channels(file.info.sensors, code.info.sensors);
   EXPECT_EQ(file.info.sample_rate_hz, code.info.sample_rate_hz);
@@ -126,11 +127,11 @@ TEST(Configs, TheWaferStageIsTheOneThatTheLibrariesAreTestedWith) {
   EXPECT_EQ(file.limits.slew_n_s, code.limits.slew_n_s);
   EXPECT_EQ(file.limits.thermal_rms_n, code.limits.thermal_rms_n);
   EXPECT_EQ(file.limits.position_window_m, code.limits.position_window_m);
-  EXPECT_EQ(file.sensor_noise_m, code.sensor_noise_m);
-  EXPECT_EQ(file.sensor_noise_coloured_m, code.sensor_noise_coloured_m);
-  EXPECT_EQ(file.force_noise_n, code.force_noise_n);
-  const std::vector<PlantMode> a = wafer_stage_modes(file);
-  const std::vector<PlantMode> b = wafer_stage_modes(code);
+  EXPECT_EQ(config.simulation.sensor_noise_m, code.simulation.sensor_noise_m);
+  EXPECT_EQ(config.simulation.sensor_noise_coloured_m, code.simulation.sensor_noise_coloured_m);
+  EXPECT_EQ(config.simulation.force_noise_n, code.simulation.force_noise_n);
+  const std::vector<PlantMode> a = plant_modes(file.info, config.plant.value());
+  const std::vector<PlantMode> b = plant_modes(code.info, code.plant);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].natural_frequency_hz, b[i].natural_frequency_hz);
@@ -148,13 +149,15 @@ TEST(Configs, TheWaferStageIsTheOneThatTheLibrariesAreTestedWith) {
 }
 
 TEST(Configs, SeventeenModesOfTheWaferStageAreSeenBelowTwoKilohertz) {
-  const WaferStageSpec spec = load_stage_config(kConfigs / "stage/wafer_stage.yaml").spec;
+  const StageConfig config = load_stage_config(kConfigs / "stage/wafer_stage.yaml");
   int below = 0;
   for (const PlantMode& mode :
-       flexible_modes_seen(spec, {"z1", "z5", "z13"}, {"sz1", "sz2", "sz3", "sz4"}))
+       flexible_modes_seen(config.spec.info, config.plant.value(), {"z1", "z5", "z13"},
+                           {"sz1", "sz2", "sz3", "sz4"}))
     below += mode.natural_frequency_hz < 2000.0 ? 1 : 0;
   EXPECT_EQ(below, test::kModesInBand);
-  EXPECT_EQ(flexible_modes_seen(spec, {"z1"}, {"sx1"}).size(), 0U);  // x sensors observe none of z
+  EXPECT_EQ(flexible_modes_seen(config.spec.info, *config.plant, {"z1"}, {"sx1"}).size(),
+            0U);  // x sensors observe none of z
 }
 
 TEST(Configs, TheMeasurementIsAnotherIfStageOrExcitationChange) {

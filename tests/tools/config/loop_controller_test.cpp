@@ -75,18 +75,18 @@ class LoopController : public testing::Test {
       const Eigen::MatrixXcd exact = controller_.response(hz);
       EXPECT_LT((controller.response(hz) - exact).norm(), 1e-9 * exact.norm()) << form << hz;
     }
-    const LoopStability loop = loop_stability(config.spec);
+    const LoopStability loop = loop_stability(config.spec, config.plant.value());
     EXPECT_TRUE(loop.tested && loop.stable()) << form;
     EXPECT_GT(config.spec.limits.motion.bandwidth_rad_s, 0.0) << form;
     // The health checks of a log know the same controller.
-    const NominalStage nominal = nominal_stage(config.spec);
+    const NominalStage nominal = nominal_stage(config.spec, config.plant);
     EXPECT_LT((nominal.controller(20.0) - controller_.response(20.0)).norm(),
               1e-9 * controller_.response(20.0).norm())
         << form;
   }
 
   test::TemporaryDirectory directory_;
-  WaferStageSpec axes_;
+  StageSpec axes_;
   MotionController controller_;
   ControllerStateSpace system_;
   std::string head_;
@@ -172,8 +172,8 @@ TEST_F(LoopController, RefusesWhatCannotBeComputedSampleBySample) {
 TEST_F(LoopController, OfAPeerNothingIsKnown) {
   const StageConfig config = stage("controller: peer");
   EXPECT_TRUE(config.spec.controller.by_peer);
-  EXPECT_FALSE(loop_stability(config.spec).tested);
-  const NominalStage nominal = nominal_stage(config.spec);
+  EXPECT_FALSE(loop_stability(config.spec, config.plant.value()).tested);
+  const NominalStage nominal = nominal_stage(config.spec, config.plant);
   EXPECT_FALSE(nominal.controller);
   EXPECT_TRUE(nominal.rigid_body);
 }
@@ -186,9 +186,9 @@ TEST_F(LoopController, OnlyASimulatedStageNeedsAPlant) {
   EXPECT_THAT(error_of("controller:\n  " + matrices()), HasSubstr("key 'plant' is missing"));
   head_.replace(head_.find("backend: sim"), 12, "backend: plugin\nplugin: {library: ./stage.so}");
   const StageConfig config = stage("controller:\n  " + matrices());
-  EXPECT_FALSE(config.spec.has_plant());
+  EXPECT_FALSE(config.plant.has_value());
   EXPECT_EQ(config.spec.limits.motion.acceleration_per_n.size(), 0);  // unknown inertia
-  EXPECT_FALSE(nominal_stage(config.spec).rigid_body);
+  EXPECT_FALSE(nominal_stage(config.spec, config.plant).rigid_body);
   const StageConfig axes = stage(
       "controller:\n  z: {crossover_hz: 20, gain: 1e5, lead_zero_hz: 6, "
       "lead_pole_hz: 80}");

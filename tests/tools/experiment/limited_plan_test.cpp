@@ -109,14 +109,14 @@ TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
 
 // Against the exact sampled plant of the stage, far below the lines that are known.
 TEST_F(LimitedPlanTest, BelowItsLinesAPriorIsARigidBodyWithCompliance) {
-  const WaferStageSpec stage = load_stage_config(at("small_stage.yaml")).spec;
+  const StageConfig stage = load_stage_config(at("small_stage.yaml"));
   const auto write_prior = [&](double low_hz, double high_hz) {
     write_frf(at("prior.h5"), exact_pilot(stage, Eigen::VectorXd::LinSpaced(60, low_hz, high_hz)));
   };
   write_prior(50.0, 286.0);  // over the modes from 170 Hz on
   const Eigen::VectorXd below{{5.0, 20.0, 40.0}};
   const Eigen::VectorXd lines{{60.0, 100.0}};
-  const PlantPrior prior = read_plant_prior(at("prior.h5"), stage.info, lines, below);
+  const PlantPrior prior = read_plant_prior(at("prior.h5"), stage.spec.info, lines, below);
   EXPECT_EQ(prior.extrapolated_below_hz, 50.0);
   EXPECT_LT(prior.extrapolation_misfit, 0.02);
   const FrfEstimate exact = exact_pilot(stage, below);
@@ -124,13 +124,13 @@ TEST_F(LimitedPlanTest, BelowItsLinesAPriorIsARigidBodyWithCompliance) {
     const Eigen::MatrixXcd G = exact.response.col(b).reshaped(2, 3);
     EXPECT_LT((prior.below_band[static_cast<std::size_t>(b)] - G).norm(), 0.03 * G.norm());
   }
-  const PlantPrior all = read_plant_prior(at("prior.h5"), stage.info, lines);
+  const PlantPrior all = read_plant_prior(at("prior.h5"), stage.spec.info, lines);
   EXPECT_EQ(all.extrapolated_below_hz, 0.0);
   EXPECT_TRUE(all.below_band.empty());
 
   write_prior(150.0, 209.0);  // nothing of the rigid body
   const PlantPrior doubtful =
-      read_plant_prior(at("prior.h5"), stage.info, Eigen::VectorXd{{160.0, 180.0}}, below);
+      read_plant_prior(at("prior.h5"), stage.spec.info, Eigen::VectorXd{{160.0, 180.0}}, below);
   EXPECT_GT(doubtful.extrapolation_misfit, 0.05);
 }
 
@@ -228,16 +228,16 @@ TEST_F(LimitedPlanTest, APriorOfAnotherStageIsRefused) {
 TEST_F(LimitedPlanTest, WithTheExactPlantThePredictionIsThatOfTheStage) {
   const ExperimentConfig config = load_experiment_config(config_);
   const ExperimentPlan plan = make_plan(config);
-  const WaferStageSpec& stage = config.stage.spec;
+  const StageSpec& stage = config.stage.spec;
   PlantPrior exact;
-  const FrfEstimate pilot = exact_pilot(stage, plan.grid().frequency_hz());
+  const FrfEstimate pilot = exact_pilot(config.stage, plan.grid().frequency_hz());
   for (const auto& column : pilot.response.colwise())
     exact.response.push_back(column.reshaped(2, 3));
   exact.sensor_known.assign(2, true);
   exact.actuator_known.assign(3, true);
   const BoundedLoop loop =
       bounded_loop(plan.grid(), plan.spec(), stage, exact, {}, Eigen::VectorXd());
-  const DesignPrediction other = predict_closed_loop(plan, stage);
+  const DesignPrediction other = predict_closed_loop(plan, stage, config.stage.plant);
   std::vector<SignalPeak> peaks(loop.signals.size());
   SignalPredictor predictor(plan.grid());
   for (const RunId run : plan.runs()) {

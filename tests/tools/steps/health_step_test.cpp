@@ -27,7 +27,7 @@ using testing::Not;
 test::FaultyLogRequest request_of(std::uint64_t seed) {
   test::FaultyLogRequest request;
   request.configured = test::wafer_stage_spec();
-  request.plant = test::random_wafer_stage(seed, request.configured);
+  request.stage = test::random_wafer_stage(seed, request.configured);
   request.seed = seed;
   return request;
 }
@@ -42,7 +42,7 @@ std::string told(const std::vector<Finding>& findings) {
 /// Every kind of fault on one plant; 100 plants are in the study (docs/benchmarks.md).
 TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
   const test::FaultyLogRequest request = request_of(3);
-  const auto nominal = std::optional(nominal_stage(request.configured));
+  const auto nominal = std::optional(nominal_stage(request.configured, request.configured.plant));
   const MemoryLog clean = test::simulate_faulty_log(request, {});
   ASSERT_FALSE(clean.log_runs.empty());
   for (const test::NamedFault& planted : test::faults_to_plant(3, clean)) {
@@ -64,10 +64,10 @@ TEST(DataHealth, EveryPlantedFaultIsNamedAndNothingElse) {
 // A cubic spring stiffens the suspension beyond the configured one. Above it, the mass is right.
 TEST(DataHealth, AStifferSuspensionIsNoWrongScale) {
   test::FaultyLogRequest request = request_of(5);
-  for (double& hz : request.plant.suspension_hz) hz *= 4.0;
+  for (double& hz : request.stage.plant.suspension_hz) hz *= 4.0;
   const MemoryLog log = test::simulate_faulty_log(request, {});
-  const auto findings =
-      check_health(read_health_record({&log}, {}), nominal_stage(request.configured));
+  const auto findings = check_health(read_health_record({&log}, {}),
+                                     nominal_stage(request.configured, request.configured.plant));
   EXPECT_TRUE(health_notes(findings).empty()) << told(findings);
 }
 
@@ -91,7 +91,7 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
 TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStandsStill) {
   for (const std::uint64_t seed : {2002U, 2004U}) {
     const test::FaultyLogRequest request = request_of(seed);
-    const auto nominal = std::optional(nominal_stage(request.configured));
+    const auto nominal = std::optional(nominal_stage(request.configured, request.configured.plant));
     const MemoryLog clean = test::simulate_faulty_log(request, {});
     for (const test::NamedFault& planted : test::faults_to_plant(seed, clean)) {
       if (planted.fault.kind != test::PlantedFault::Kind::hidden_excitation) continue;
@@ -106,7 +106,8 @@ TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStands
 class RecordingFault : public ::testing::Test {
  protected:
   std::vector<Finding> findings_of(const MemoryLog& log) const {
-    return check_health(read_health_record({&log}, {}), nominal_stage(request_.configured));
+    return check_health(read_health_record({&log}, {}),
+                        nominal_stage(request_.configured, request_.configured.plant));
   }
   /// The one finding in the recording with this fault.
   Finding only_finding(const test::PlantedFault& fault) const {
@@ -175,7 +176,8 @@ TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded)
   const ChannelScan& scan = record.scan[static_cast<std::size_t>(record.n_y() + kActuator)];
   EXPECT_LE(scan.high().count, 10U);
   EXPECT_LE(scan.low().count, 10U);
-  const auto findings = check_health(record, nominal_stage(request.configured));
+  const auto findings =
+      check_health(record, nominal_stage(request.configured, request.configured.plant));
   ASSERT_EQ(health_notes(findings).size(), 1U) << told(findings);
   EXPECT_EQ(findings.front().cause, Cause::saturated) << told(findings);
   EXPECT_EQ(findings.front().channel, "z8");
@@ -186,7 +188,7 @@ TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
   test::FaultyLogRequest request = request_of(5);
   request.axes = 3;
   const MemoryLog log = test::simulate_faulty_log(request, {});
-  const auto nominal = std::optional(nominal_stage(request.configured));
+  const auto nominal = std::optional(nominal_stage(request.configured, request.configured.plant));
   const auto findings = check_health(read_health_record({&log}, {}), nominal);
   ASSERT_FALSE(findings.empty());
   for (const Finding& f : findings)

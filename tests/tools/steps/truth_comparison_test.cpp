@@ -22,7 +22,7 @@ Submodel mode(double frequency_hz, double damping, const Eigen::MatrixXd& B0) {
 }
 
 /// The small stage of two actuators and one sensor as a model: every mode in its own submodel.
-AdditiveModel exact_model(const WaferStageSpec& stage) {
+AdditiveModel exact_model(const test::SimulatedSpec& stage) {
   AdditiveModel model;
   model.inputs = {{"a1", "a2"}, {"N", "N"}};
   model.outputs = {{"s1"}, {"m"}};
@@ -30,7 +30,7 @@ AdditiveModel exact_model(const WaferStageSpec& stage) {
   model.hold = HoldModel::exact;
   model.input_delay_s = Eigen::VectorXd::Constant(2, stage.info.delay_s);
   model.output_delay_s = Eigen::VectorXd::Zero(1);
-  for (const PlantMode& m : wafer_stage_modes(stage))
+  for (const PlantMode& m : plant_modes(stage.info, stage.plant))
     model.submodels.push_back(mode(m.natural_frequency_hz, m.damping_ratio,
                                    m.sensor_shape * m.actuator_shape.transpose()));
   return model;
@@ -47,16 +47,16 @@ FrfEstimate lines(const AdditiveModel& model) {
   return frf;
 }
 
-WaferStageSpec small_stage() {
-  WaferStageSpec stage = test::small_stage_spec();
+test::SimulatedSpec small_stage() {
+  test::SimulatedSpec stage = test::small_stage_spec();
   stage.info.delay_s = 0.4e-3;
   return stage;
 }
 
 TEST(TruthComparison, TheExactModelHasNoError) {
-  const WaferStageSpec stage = small_stage();
+  const test::SimulatedSpec stage = small_stage();
   const AdditiveModel model = exact_model(stage);
-  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage.info, stage.plant);
   // hal and estimation share no code: two independent computations of the same numbers, through sampled responses
   // whose closed forms cancel by (f / f_mode)^2 at most, 400^2 here.
   EXPECT_LT(truth.relative_rms_error, 1e-9);
@@ -67,13 +67,13 @@ TEST(TruthComparison, TheExactModelHasNoError) {
 }
 
 TEST(TruthComparison, CountsDeviationsInStandardDeviations) {
-  const WaferStageSpec stage = small_stage();
+  const test::SimulatedSpec stage = small_stage();
   AdditiveModel model = exact_model(stage);
   Submodel& flexible = model.submodels.at(6);
   flexible = mode(80.4, 0.019, flexible.numerator[0]);
   flexible.natural_frequency_std_hz = 0.2;
   flexible.damping_ratio_std = 0.0005;
-  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage.info, stage.plant);
   EXPECT_NEAR(truth.modes.at(0).frequency_deviation(), 2.0, 1e-9);
   EXPECT_NEAR(truth.modes.at(0).damping_deviation(), -2.0, 1e-9);
   EXPECT_GT(truth.relative_rms_error, 1e-3);
@@ -81,7 +81,7 @@ TEST(TruthComparison, CountsDeviationsInStandardDeviations) {
 
 // An actuator that moves nothing: the exact response is zero, the measured one noise.
 TEST(TruthComparison, WhatIsDecoupledDoesNotDecideTheRelativeError) {
-  WaferStageSpec stage = small_stage();
+  test::SimulatedSpec stage = small_stage();
   stage.info.actuators[1].direction[2] = 0.0;
   stage.info.actuators[1].direction[0] = 1.0;
   const AdditiveModel exact = exact_model(stage);
@@ -92,18 +92,18 @@ TEST(TruthComparison, WhatIsDecoupledDoesNotDecideTheRelativeError) {
   frf.response.row(1).setConstant(1e-15);
   AdditiveModel model = exact;
   for (Submodel& s : model.submodels) s.numerator[0] *= 1.01;
-  const TruthComparison truth = compare_with_truth(model, frf, stage);
+  const TruthComparison truth = compare_with_truth(model, frf, stage.info, stage.plant);
   EXPECT_NEAR(truth.relative_rms_error, 0.01, 1e-6);
   EXPECT_TRUE(truth_json(truth)["relative_rms_error"].is_number());
 }
 
 TEST(TruthComparison, MatchesOneToOneAndNamesTheRest) {
-  const WaferStageSpec stage = small_stage();
+  const test::SimulatedSpec stage = small_stage();
   AdditiveModel model = exact_model(stage);
   model.submodels.erase(model.submodels.begin(), model.submodels.begin() + 6);
   model.submodels.push_back(mode(81.0, 0.02, model.submodels[0].numerator[0]));
   model.submodels.push_back(mode(200.0, 0.02, model.submodels[0].numerator[0]));
-  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage.info, stage.plant);
   EXPECT_NEAR(truth.modes.at(0).frequency_hz, 80.0, 1e-9);
   ASSERT_EQ(truth.extra_hz.size(), 2U);
   EXPECT_NEAR(truth.extra_hz[0], 81.0, 1e-9);
@@ -124,10 +124,10 @@ TEST(TruthComparison, ModesThatDifferByFivePercentAreNotPaired) {
 }
 
 TEST(TruthComparison, AModeThatIsMissingIsSaid) {
-  const WaferStageSpec stage = small_stage();
+  const test::SimulatedSpec stage = small_stage();
   AdditiveModel model = exact_model(stage);
   model.submodels.resize(6);
-  const TruthComparison truth = compare_with_truth(model, lines(model), stage);
+  const TruthComparison truth = compare_with_truth(model, lines(model), stage.info, stage.plant);
   EXPECT_FALSE(truth.modes.at(0).found);
   EXPECT_NE(truth_table(truth).at(1).find("not found"), std::string::npos);
   EXPECT_FALSE(truth_json(truth)["modes"][0]["found"].get<bool>());
