@@ -164,6 +164,7 @@ FrfEstimate read_frf_csv(const std::filesystem::path& file) {
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values)));
   };
   frf.frequency_hz = column("frequency_hz");
+  if (frf.lines() == 0) arrays.fail("frequency_hz", "is empty; expected at least one frequency");
   const auto has = [&](const char* part) {
     return std::ranges::any_of(arrays.arrays, [part](const NamedArray& array) {
       return array.name.starts_with(std::string(part) + " ");
