@@ -8,6 +8,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import zipfile
 
 PROGRAM, SOURCE, OUTPUT = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 WORK = OUTPUT.parent / "seed_work"
@@ -54,6 +55,8 @@ def main():
     seed("uff", WORK / "frf.uff", WORK / "frf.unv", WORK / "model.uff")
     seed("mat", WORK / "frf.mat", WORK / "model.mat", WORK / "model73.mat")
     seed("npz", WORK / "frf.npz", WORK / "model.npz")
+    with zipfile.ZipFile(WORK / "frf.npz") as archive:
+        seed("npy", *(archive.read(name) for name in archive.namelist()))
     seed("csv", b"".join((WORK / "frf.csv").read_bytes().splitlines(True)[:8]), b'time,"a b"\n0,1\n1,2\n', b"0;1,5\n1;2,5\n")
     seed("touchstone", b"! x\n# HZ S RI R 50\n" + b"".join(b"%d 1 0 0.5 0.1 0.5 0.1 1 0\n" % k for k in range(1, 5)))
     seed("modbus", bytes.fromhex("00010000000601030000000a"), bytes.fromhex("0103000000044409"),

@@ -6,6 +6,7 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#include <zip.h>
 
 #include <algorithm>
 #include <array>
@@ -139,6 +140,17 @@ void read_csv_tables(Bytes bytes) {
   if (is_frf_csv(file.path())) read_frf_csv(file.path());
 }
 
+/// The bytes as the only member of an archive, because mutations of a whole archive fail at its checksum.
+void read_npy(Bytes bytes) {
+  const ScratchFile file({}, ".npz");
+  zip_t* archive = zip_open(file.path().c_str(), ZIP_CREATE | ZIP_TRUNCATE, nullptr);
+  if (archive == nullptr) throw std::runtime_error("no archive in /dev/shm");
+  zip_source_t* member = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
+  if (zip_file_add(archive, "array.npy", member, ZIP_FL_OVERWRITE) < 0 || zip_close(archive) != 0)
+    throw std::runtime_error("the archive was not written");
+  read_npz(file.path());
+}
+
 class Registers final : public ModbusRegisters {
  public:
   void begin_request(ModbusConnection) override {}
@@ -230,6 +242,7 @@ constexpr std::array kTargets = {Target{"yaml", read_yaml},
                                  Target{"uff", read_file<read_uff>},
                                  Target{"mat", read_file<read_mat>},
                                  Target{"npz", read_file<read_npz>},
+                                 Target{"npy", read_npy},
                                  Target{"csv", read_csv_tables},
                                  Target{"touchstone", read_file<read_touchstone, kTouchstone>},
                                  Target{"modbus", answer_modbus},
