@@ -110,8 +110,7 @@ class Identification {
     check_model();
     write_outputs();
     print_summary();
-    return exit_code_ != kDone || verdict_.trustworthy ? exit_code_
-                                                       : static_cast<int>(kNotTrustworthy);
+    return verdict_.trustworthy ? kDone : kNotTrustworthy;
   }
 
  private:
@@ -269,7 +268,7 @@ class Identification {
       validation_ =
           validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
     }
-    verdict_ = judge_model(model_, health_, validation_);
+    verdict_ = judge_model(model_, health_, validation_, open_log(path("run.slog"), false)->runs());
     if (config_.stage.plant)
       truth_ =
           compare_with_truth(model_, setup_->frf, config_.stage.spec.info, *config_.stage.plant);
@@ -306,7 +305,7 @@ class Identification {
                  {"configuration", config_.file.filename().string()},
                  {"configuration_fingerprint", fingerprint_of(config_.text)},
                  {"stage_fingerprint", fingerprint_of(config_.stage.text)},
-                 {"trustworthy", verdict_.trustworthy && exit_code_ == kDone},
+                 {"trustworthy", verdict_.trustworthy},
                  {"reasons", verdict_.reasons},
                  {"fit",
                   {{"status", model_.fit.status_word()},

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -118,14 +119,17 @@ void validate_model(const ValidateFlags& flags, Console& console) {
                                  {"data", flags.data.string()},
                                  {"band_hz", {low_hz, high_hz}},
                                  {"frequency_domain", validation_json(validation)}};
+  std::vector<LogRun> runs;
   if (!from_frf) {
     for (const std::string& line : health_lines(health)) console.result(line);
     json["health"] = health_json(health);
-    const PredictionError error = prediction_error(model, *open_log(flags.data), low_hz, high_hz);
+    const std::unique_ptr<LogReader> log = open_log(flags.data);
+    runs = log->runs();
+    const PredictionError error = prediction_error(model, *log, low_hz, high_hz);
     for (const std::string& line : prediction_lines(error)) console.result(line);
     json["time_domain"] = prediction_json(error);
   }
-  const ModelVerdict verdict = judge_model(model, health, validation);
+  const ModelVerdict verdict = judge_model(model, health, validation, runs);
   console.result(verdict_line(verdict));
   json.update(verdict_json(verdict));
   if (!verdict.trustworthy) console.exit_code = kNotTrustworthy;

@@ -16,7 +16,7 @@ using Reasons = std::vector<std::string>;
 
 /// @returns whether the model is trustworthy.
 bool judge_fit(const ReportData& data, Reasons& reasons) {
-  const ModelVerdict verdict = judge_model(*data.model, data.findings, data.validation);
+  const ModelVerdict verdict = judge_model(*data.model, data.findings, data.validation, data.runs);
   for (const std::string& reason : verdict.reasons) {
     // Findings of the data are already reasons, without their remedy.
     const auto said = [&](const std::string& other) { return reason.starts_with(other); };
@@ -57,15 +57,10 @@ void add_findings(const ReportData& data, Reasons& reasons) {
 }
 
 void judge_runs(const ReportData& data, Reasons& reasons) {
-  RunHealth health;
-  for (const LogRun& run : data.runs) health += run.health;
   const auto incomplete = std::ranges::count(data.runs, false, &LogRun::complete);
-  const auto add = [&](auto count, const char* noun, const char* plural, const char* what) {
-    if (count > 0) reasons.push_back(counted(count, noun, plural) + what);
-  };
-  add(health.missing, "cycle is", "cycles are", " missing");
-  add(health.marked, "cycle is", "cycles are", " marked as invalid");
-  add(incomplete, "run is", "runs are", " incomplete");
+  if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
+  if (data.model) return;  // judge_model() knows the losses
+  for (const std::string& loss : losses_of(data.runs)) reasons.push_back(loss);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ template <>
 inline constexpr std::array kWords<Verdict::Level> = {"none", "good", "doubt", "bad"};
 
 /// Bad: judge_model() does not trust the model, or without a model the data have a fault. Doubts are the other reasons of
-/// judge_model(), the health of the runs, the truth if known (3 standard deviations and 1e-4) and the doubts of the job.
+/// judge_model(), incomplete runs, the truth if known (3 standard deviations and 1e-4) and the doubts of the job.
 Verdict judge(const ReportData& data);
 
 }  // namespace stageid

@@ -6,14 +6,26 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimation/problem/fit_options.hpp"
+#include "acquisition/files/counted.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
 
 namespace stageid {
 
+std::vector<std::string> losses_of(const std::vector<LogRun>& runs) {
+  RunHealth health;
+  for (const LogRun& run : runs) health += run.health;
+  std::vector<std::string> losses;
+  if (health.missing > 0)
+    losses.push_back(counted(health.missing, "cycle is", "cycles are") + " missing");
+  if (health.marked > 0)
+    losses.push_back(counted(health.marked, "sample is", "samples are") + " marked as invalid");
+  return losses;
+}
+
 ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
-                         const std::optional<Validation>& validation) {
+                         const std::optional<Validation>& validation,
+                         const std::vector<LogRun>& runs) {
   const FitRecord& fit = model.fit;
   ModelVerdict verdict;
   const auto add = [&](std::string reason) {
@@ -35,6 +47,7 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
   if (fit.status == FitStatus::faulty_data) judge_fit();
   for (std::string& fault : health_notes(health, Severity::fault)) distrust(std::move(fault));
   judge_fit();
+  for (std::string& loss : losses_of(runs)) distrust(std::move(loss));
   // Doubts come before the residual, because they are the cause if it is too large.
   for (std::string& doubt : doubts_of(model)) add(std::move(doubt));
   for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/record/log_info.hpp"
 #include "estimation/modal/validation.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "frf/periods/health_finding.hpp"
@@ -18,11 +19,16 @@ struct ModelVerdict {
   std::vector<std::string> reasons;  ///< the gravest first; for a trustworthy model, warnings
 };
 
-/// Checks, in this order: faults of the data, the status of the fit, doubts about the data, then the residual on
-/// held-back data. Doubts alone leave the model trustworthy.
+/// What the recording lost: "3 cycles are missing", "4 samples are marked as invalid".
+std::vector<std::string> losses_of(const std::vector<LogRun>& runs);
+
+/// Checks, in this order: faults of the data, the status of the fit, losses of the recording, doubts about the data,
+/// then the residual on held-back data. Doubts alone leave the model trustworthy.
 /// @param health of the data to which the model is compared, or was fitted
+/// @param runs of their log, if it is known
 ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
-                         const std::optional<Validation>& validation);
+                         const std::optional<Validation>& validation,
+                         const std::vector<LogRun>& runs = {});
 
 /// One sentence for people: "verdict: trustworthy, ...".
 std::string verdict_line(const ModelVerdict& verdict);

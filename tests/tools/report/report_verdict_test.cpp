@@ -79,15 +79,18 @@ TEST(Verdict, AnErrorIsComparedWithItsExpectation) {
   EXPECT_EQ(judge(data).level, Level::good);
 }
 
-TEST(Verdict, LostAndMarkedCyclesAreDoubtedLateOnesAreNot) {
+TEST(Verdict, LostAndMarkedSamplesAreNotTrustedLateOnesAreNoReason) {
   ReportData data = sound();
   data.runs[0].health.late = 7;
   EXPECT_EQ(judge(data).level, Level::good);
   data.runs[0].health.missing = 3;
-  expect_doubt(data, "3 cycles are missing");
+  expect_bad(data, "3 cycles are missing");
   data.runs[0].health.missing = 0;
   data.runs[1].health.marked = 4;
-  expect_doubt(data, "4 cycles are marked");
+  expect_bad(data, "4 samples are marked");
+  data.model.reset();
+  expect_doubt(data, "4 samples are marked");
+  data.model = sound().model;
   data.runs[1].health.marked = 0;
   data.runs[0].complete = false;
   expect_doubt(data, "incomplete");

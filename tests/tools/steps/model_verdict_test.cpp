@@ -57,5 +57,16 @@ TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("z1: dead"));
 }
 
+TEST(ModelVerdict, DistrustsARecordingThatLostSamples) {
+  LogRun first, second;
+  first.health.missing = 3;
+  first.health.late = 7;  // late cycles are complete
+  second.health.marked = 1;
+  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, {}, {first, second});
+  EXPECT_FALSE(verdict.trustworthy);
+  EXPECT_THAT(verdict.reasons, ElementsAre("3 cycles are missing", "1 sample is marked as invalid",
+                                           "a mode drifts"));
+}
+
 }  // namespace test_model_verdict
 }  // namespace stageid
