@@ -127,13 +127,13 @@ std::shared_ptr<LogReader> log_of_state(const py::tuple& state) {
   LogInfo info;
   info.sample_rate_hz = state[1].cast<double>();
   info.period_samples = state[2].cast<int>();
-  info.transient_periods = state[2].cast<int>();
-  info.excitation = channels_of(state[3]);
-  info.actuators = channels_of(state[4]);
-  info.sensors = channels_of(state[5]);
-  info.metadata_json = state[6].cast<std::string>();
+  info.transient_periods = state[3].cast<int>();
+  info.excitation = channels_of(state[4]);
+  info.actuators = channels_of(state[5]);
+  info.sensors = channels_of(state[6]);
+  info.metadata_json = state[7].cast<std::string>();
   return std::make_shared<ArrayLog>(name, std::move(info),
-                                    experiment_arrays(state[7], state[8], state[9], state[10]));
+                                    experiment_arrays(state[8], state[9], state[10], state[11]));
 }
 
 }  // namespace stageid
