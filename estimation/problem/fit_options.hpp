@@ -31,6 +31,12 @@ inline constexpr std::array kWords<Weighting> = {
     "unit",           "inverse_magnitude", "relative", "noise_variance",
     "total_variance", "likelihood",        "user"};
 
+/// True if the weighting is defined as the inverse covariance of the noise.
+constexpr bool weighs_by_variance(Weighting weighting) noexcept {
+  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
+         weighting == Weighting::likelihood;
+}
+
 enum class FitMethod : std::uint8_t {
   riv,  ///< refined instrumental variables, as in the paper
   gn,   ///< Gauss-Newton

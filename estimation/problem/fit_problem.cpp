@@ -188,4 +188,18 @@ std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
   return out;
 }
 
+bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
+  return !(problem.W->row(channel).maxCoeff() > 0.0);
+}
+
+double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
+  Eigen::Index weighted = 0;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c)
+    weighted += has_no_weight(problem, c) ? 0 : 1;
+  const Eigen::Index without = (problem.channels() - weighted) * problem.functions();
+  const double data = static_cast<double>(problem.size() * weighted);
+  return 2.0 * static_cast<double>(problem.size()) * cost /
+         std::max(data - 0.5 * static_cast<double>(parameters - without), 1.0);
+}
+
 }  // namespace stageid

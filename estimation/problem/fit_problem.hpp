@@ -116,6 +116,12 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
                                                   const std::vector<BasisGroup>& groups);
 
+/// Whether the weight of a channel is zero on all lines, so that the data do not determine it.
+bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
+
+/// sum W |E|^2 per complex degree of freedom; 1 if W is the inverse variance and the model is right.
+double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters);
+
 /// The diagonal weights of a fit; for weight matrices, their best diagonal. Variances with few degrees of freedom are
 /// smoothed over neighbouring lines, so that a weight does not depend on the noise of its own line.
 /// @throws std::invalid_argument if data required by the weighting are missing, zero or not finite.

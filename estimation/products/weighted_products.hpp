@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimation/problem/fit_problem.hpp"
-#include "estimation/problem/pair_reduction.hpp"
+#include "estimation/products/pair_reduction.hpp"
 
 namespace stageid {
 

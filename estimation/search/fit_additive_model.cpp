@@ -280,7 +280,7 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
     raise(covariance, frf.correlated_lines);
     use_covariance(problem, covariance, weighs_by_variance(options.weighting), result);
     if (!low_rank)
-      result.residue_ranks = residue_rank_tests(result.model, independent_numbers(frf));
+      result.residue_ranks = residue_rank_tests(result.model, frf.independent_numbers());
     judge(problem, beta, covariance.globals, options.judge_modes, result);
   }
   return result;

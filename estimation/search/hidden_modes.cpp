@@ -6,7 +6,6 @@
 #include "estimation/equations/numerators.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/search_constants.hpp"
-#include "estimation/uncertainty/data_noise.hpp"
 #include "frf/response/neighbour_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 

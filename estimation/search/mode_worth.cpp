@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimation/uncertainty/data_noise.hpp"
-
 namespace stageid {
 
 double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
-  const double data = independent_numbers(frf);
+  const double data = frf.independent_numbers();
   return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
          static_cast<double>(fit.parameters) * std::log(data);
 }
@@ -30,14 +28,14 @@ double in_squares(double squares, double cost, double data) {
 
 double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters) {
   const auto lines = static_cast<double>(frf.lines());
-  const double data = independent_numbers(frf);
+  const double data = frf.independent_numbers();
   return in_squares(2.0 * lines * fit.model.fit.cost, cost_of_mode(parameters, data, lines), data);
 }
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),
-      data_(independent_numbers(frf)),
+      data_(frf.independent_numbers()),
       parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) *
                                     static_cast<double>(frf.response.rows())),
       rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}

@@ -15,7 +15,6 @@
 #include "estimation/search/overlapping_modes.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/search/settled_fit.hpp"
-#include "estimation/uncertainty/data_noise.hpp"
 
 namespace stageid {
 namespace {
@@ -33,7 +32,7 @@ class RankedFit {
         options_(options),
         evidence_(evidence),
         number_(evidence.number),
-        data_(independent_numbers(frf)) {}
+        data_(frf.independent_numbers()) {}
 
   FitResult run(const AdditiveModel& start) {
     tied_ = with_coincident_tied(start);

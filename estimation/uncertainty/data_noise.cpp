@@ -29,29 +29,6 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   return noise;
 }
 
-double independent_numbers(const FrfEstimate& frf) {
-  return 2.0 * static_cast<double>(frf.response.size()) / frf.correlated_lines;
-}
-
-bool weighs_by_variance(Weighting weighting) noexcept {
-  return weighting == Weighting::noise_variance || weighting == Weighting::total_variance ||
-         weighting == Weighting::likelihood;
-}
-
-bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
-  return !(problem.W->row(channel).maxCoeff() > 0.0);
-}
-
-double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
-  Eigen::Index weighted = 0;
-  for (Eigen::Index c = 0; c < problem.channels(); ++c)
-    weighted += has_no_weight(problem, c) ? 0 : 1;
-  const Eigen::Index without = (problem.channels() - weighted) * problem.functions();
-  const double data = static_cast<double>(problem.size() * weighted);
-  return 2.0 * static_cast<double>(problem.size()) * cost /
-         std::max(data - 0.5 * static_cast<double>(parameters - without), 1.0);
-}
-
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
                          IndexRange lines, SplitMatrix columns) {
   Eigen::ArrayXd scale = problem.W->row(c).segment(lines.first, lines.count).transpose();

@@ -64,18 +64,6 @@ struct DataNoise {
 /// changes an estimate from realization to realization as noise does. `frf` must outlive the result.
 DataNoise data_noise(const FrfEstimate& frf, Weighting weighting);
 
-/// Number of independent real numbers of the response.
-double independent_numbers(const FrfEstimate& frf);
-
-/// True if the weighting is defined as the inverse covariance of the noise.
-bool weighs_by_variance(Weighting weighting) noexcept;
-
-/// Whether the weight of a channel is zero on all lines, so that the data do not determine it.
-bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
-
-/// sum W |E|^2 per complex degree of freedom; 1 if W is the inverse variance and the model is right.
-double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters);
-
 /// Factor of the variances: 1 if the variance is given separately from the weights, or if the weights are inverse
 /// variances and the residual is not clearly larger than predicted, else the residual per degree of freedom.
 double covariance_scale(const FitProblem& problem, double cost, Eigen::Index parameters,

@@ -111,6 +111,10 @@ struct FrfEstimate {
   std::string provenance_json = "{}";  ///< inputs (hash), configuration, version, seeds
 
   Eigen::Index lines() const noexcept { return frequency_hz.size(); }
+  /// Number of independent real numbers of the response.
+  double independent_numbers() const noexcept {
+    return 2.0 * static_cast<double>(response.size()) / correlated_lines;
+  }
   Eigen::Index n_outputs() const noexcept { return std::ssize(outputs); }
   Eigen::Index n_inputs() const noexcept { return std::ssize(inputs); }
   Eigen::VectorXd omega_rad_s() const;

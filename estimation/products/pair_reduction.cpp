@@ -1,4 +1,4 @@
-#include "estimation/problem/pair_reduction.hpp"
+#include "estimation/products/pair_reduction.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // Functions as fractions, and sums of their products from sums of fractions, against the functions on
 // the lines and their products written out.
 
-#include "estimation/problem/pair_reduction.hpp"
+#include "estimation/products/pair_reduction.hpp"
 
 #include <gtest/gtest.h>
 
