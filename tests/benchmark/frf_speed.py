@@ -38,7 +38,7 @@ def shortened(config):
 def child(*words):
     """Runs the program: seconds by the wall's clock, of the processors, peak memory in MB."""
     begin = time.perf_counter()
-    process = subprocess.Popen([PROGRAM, "--quiet", *words], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([PROGRAM, "--verbosity", "quiet", *words], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     seconds = time.perf_counter() - begin
     if os.waitstatus_to_exitcode(status) not in (0, 3):  # 3: the data are not healthy

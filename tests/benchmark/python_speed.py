@@ -39,7 +39,7 @@ def timed(work, who=resource.RUSAGE_SELF):
 
 def program(folder, *words):
     """Times of the process."""
-    seconds, done = timed(lambda: subprocess.run([PROGRAM, "--quiet", *words], cwd=folder,
+    seconds, done = timed(lambda: subprocess.run([PROGRAM, "--verbosity", "quiet", *words], cwd=folder,
                                                  capture_output=True, text=True), resource.RUSAGE_CHILDREN)
     if done.returncode not in (0, 3):
         sys.exit(done.stderr)

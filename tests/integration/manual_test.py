@@ -71,7 +71,7 @@ class ManualTest(unittest.TestCase):
                 self.assertEqual([word for word in self.completed_by_zsh(*path, "") if word != "FILES"],
                                  self.completed(*path, ""))
         self.assertEqual(self.completed_by_zsh("frf", "run.slog", "--method", ""), ["periodic", "lpm"])
-        self.assertEqual(self.completed_by_zsh("--quiet", "log", ""), self.completed("log", ""))
+        self.assertEqual(self.completed_by_zsh("--verbosity", "debug", "log", ""), self.completed("log", ""))
         self.assertEqual(self.completed_by_zsh("frf", "run.sl"), ["FILES"])
 
     @unittest.skipUnless(shutil.which("zsh"), "no zsh here")
@@ -95,8 +95,8 @@ class ManualTest(unittest.TestCase):
 
     def test_completion_narrows_what_was_begun(self):
         self.assertEqual(self.completed("va"), ["validate"])
-        self.assertEqual(self.completed("--qui"), ["--quiet"])
-        self.assertEqual(self.completed("--quiet", "log", "inf"), ["info"])
+        self.assertEqual(self.completed("--verbosity", "de"), ["debug"])
+        self.assertEqual(self.completed("--verbosity", "debug", "log", "inf"), ["info"])
         self.assertEqual(self.completed("frf", "run.slog", "--method", ""), ["periodic", "lpm"])
         self.assertEqual(self.completed("frf", "run.sl"), [])  # bash completes files then
 

@@ -109,7 +109,9 @@ class Program {
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
     app_.add_flag("--json", console_.json, "print the result as one JSON object on stdout");
-    app_.add_flag("--quiet", console_.quiet, "print only warnings and errors on stderr");
+    add_choice(
+        app_, "--verbosity", console_.verbosity,
+        "messages on stderr: quiet: only warnings and errors | normal, debug: also progress");
     app_.require_subcommand(0, 1);
     app_.footer(kFooter);
   }
@@ -139,7 +141,8 @@ class Program {
   void refuse_unknown_command(int argc, const char* const* argv) const {
     const std::vector<std::string> names = names_of(command_tree(app_).commands);
     int first = 1;
-    while (first < argc && argv[first][0] == '-') ++first;
+    while (first < argc && argv[first][0] == '-')
+      first += std::string_view(argv[first]) == "--verbosity" ? 2 : 1;
     if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
     const std::string nearest = nearest_word(argv[first], names);
     throw std::invalid_argument(fmt::format("unknown command '{}'; {}", argv[first],

@@ -84,7 +84,7 @@ std::string page(const std::string& path, const CommandTree& command, const Comm
   out += items(".SH ARGUMENTS\n", command.arguments);
   out += items(".SH OPTIONS\n", command.options);
   if (&command != &program)
-    out += ".PP\n\\fB\\-\\-json\\fR and \\fB\\-\\-quiet\\fR, see \\fBstageid\\fR(1).\n";
+    out += ".PP\n\\fB\\-\\-json\\fR and \\fB\\-\\-verbosity\\fR, see \\fBstageid\\fR(1).\n";
   if (!command.commands.empty()) out += ".SH COMMANDS\n";
   for (const CommandTree& sub : command.commands) {
     if (&command == &program) {

@@ -25,8 +25,8 @@ std::string described(const std::string& name, const std::string& help) {
   return quoted(entry + ":" + help.substr(0, help.find(';')));
 }
 
-/// The options accepted after a command: its own, and the program's --json and --quiet, which are accepted before and
-/// after it.
+/// The options accepted after a command: its own, and the program's --json and --verbosity, which are accepted before
+/// and after it.
 std::vector<CommandOption> options_taken(const CommandTree& command, const CommandTree& program) {
   std::vector<CommandOption> options = command.options;
   if (&command == &program) return options;
@@ -49,16 +49,19 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
                const std::function<std::string(const CommandTree&)>& assign_words,
                const char* assign_values) {
   Cases cases;
-  // `path`: the words that lead to the command: "", "log", "log info".
-  const auto visit = [&](const auto& self, const std::string& path,
-                         const CommandTree& command) -> void {
-    cases.words += fmt::format("    {}) {} ;;\n", quoted(path), assign_words(command));
+  const auto add_values = [&](const std::string& path, const CommandTree& command) {
     for (const CommandOption& option : command.options)
       for (const std::string& flag : option.flags)
         if (!option.words.empty())
           cases.values +=
-              fmt::format("    {}{}) {} ;;\n", quoted(path), quoted(" " + flag),
+              fmt::format("    {}{}) {} ;;\n", path, quoted(" " + flag),
                           fmt::format(fmt::runtime(assign_values), fmt::join(option.words, " ")));
+  };
+  // `path`: the words that lead to the command: "", "log", "log info".
+  const auto visit = [&](const auto& self, const std::string& path,
+                         const CommandTree& command) -> void {
+    cases.words += fmt::format("    {}) {} ;;\n", quoted(path), assign_words(command));
+    if (!path.empty()) add_values(quoted(path), command);
     const std::string prefix = path.empty() ? "" : path + " ";
     for (const CommandTree& sub : command.commands)
       cases.paths += fmt::format("      {}) {}={} ;;\n", quoted(path + " " + sub.name),
@@ -66,6 +69,7 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
     for (const CommandTree& sub : command.commands) self(self, prefix + sub.name, sub);
   };
   visit(visit, "", program);
+  add_values("*", program);
   return cases;
 }
 

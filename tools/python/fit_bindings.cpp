@@ -115,7 +115,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
   request.threads = threads.value_or(0);
   const std::shared_ptr<FrfHandle> of = frf_of(given);
   Console silent;
-  silent.quiet = true;
+  silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
     const std::string fingerprint =
         of->fingerprint.empty() ? fingerprint_of_content(of->frf) : of->fingerprint;

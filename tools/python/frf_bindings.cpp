@@ -116,7 +116,7 @@ FrfHandle frf(const py::object& given, const Choice<std::string>& inputs,
   std::vector<const LogReader*> logs;
   for (const auto& log : kept) logs.push_back(log.get());
   Console silent;
-  silent.quiet = true;
+  silent.verbosity = Verbosity::quiet;
   return interruptible([&] {
     return FrfHandle{estimate_frf(logs, options, {health, stage.value_or("")}, silent).frf};
   });

@@ -90,7 +90,7 @@ void Console::result(const nlohmann::ordered_json& object) const {
                  object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 void Console::message(const std::string& line) const {
-  if (!quiet) tell("{}\n", shown(line));
+  if (verbosity >= Verbosity::normal) tell("{}\n", shown(line));
 }
 void Console::warning(const std::string& line) const {
   std::string one_line = shown(line);
@@ -114,7 +114,7 @@ double Progress::seconds() const {
 }
 
 void Progress::update(double done, double total, const std::string& note) {
-  if (console_.quiet) return;
+  if (console_.verbosity == Verbosity::quiet) return;
   const Clock::time_point now = Clock::now();
   if (now - last_ < (terminal_ ? Clock::duration(kRedraw) : Clock::duration(kPlainLine))) return;
   last_ = now;

@@ -1,16 +1,24 @@
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
+
 namespace stageid {
+
+enum class Verbosity : std::uint8_t { quiet, normal, debug };
+template <>
+inline constexpr std::array kWords<Verbosity> = {"quiet", "normal", "debug"};
 
 /// Output of a command: results on stdout (a text, or with --json one object), messages and progress on stderr.
 class Console {
  public:
-  bool quiet = false;
+  Verbosity verbosity = Verbosity::normal;
   bool json = false;
   int exit_code = 0;  ///< of the executed command
 
