@@ -24,7 +24,7 @@ class RunMeasurement {
         lines_(lines),
         channels_(channels),
         w_(workspace),
-        comparison_(used, lines, channels, workspace) {
+        dropped_(used, lines, channels, workspace) {
     // Groups of equal size: outliers cannot be found in a last group of one or two periods.
     const int groups = (used.periods + kMostTogether - 1) / kMostTogether;
     together_ = (used.periods + groups - 1) / groups;
@@ -54,7 +54,7 @@ class RunMeasurement {
     line_spectra(w_.samples.sensors, channels_.outputs, lines_.lines, 0, w_.dft, spectra);
     line_spectra(w_.samples.actuators, channels_.estimated, lines_.lines,
                  std::ssize(channels_.outputs), w_.dft, spectra);
-    if (compare_) comparison_.keep_samples(waiting_.size());
+    if (compare_) dropped_.keep_samples(waiting_.size());
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
       w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
@@ -76,7 +76,7 @@ class RunMeasurement {
  private:
   void include_waiting() {
     const std::vector<char> in =
-        compare_ ? comparison_.settle(waiting_, run_) : std::vector<char>(waiting_.size(), 1);
+        compare_ ? dropped_.settle(waiting_, run_) : std::vector<char>(waiting_.size(), 1);
     std::vector<const Eigen::MatrixXcd*> periods;
     std::vector<double> numbers;
     for (std::size_t i = 0; i < waiting_.size(); ++i) {
@@ -170,7 +170,7 @@ class RunMeasurement {
   const SpectrumLines& lines_;
   const ChannelChoice& channels_;
   RunWorkspace& w_;
-  DroppedPeriods comparison_;
+  DroppedPeriods dropped_;
   int together_ = 1;  // periods that are compared and included together
   bool compare_ = true;
   int unmarked_ = 0;

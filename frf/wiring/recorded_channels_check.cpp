@@ -89,8 +89,8 @@ class Search {
     }
   }
 
-  ControllerCheck run() {
-    ControllerCheck check;
+  RecordedChannelsCheck run() {
+    RecordedChannelsCheck check;
     refresh();
     for (int i = 0; i < kMostChanges; ++i) {
       candidates_.clear();
@@ -398,7 +398,7 @@ double unexplained_motion(HealthRecord& record, const NominalStage& nominal) {
   return Search(record, nominal).unexplained_motion();
 }
 
-ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal) {
+RecordedChannelsCheck check_recorded_channels(HealthRecord& record, const NominalStage& nominal) {
   return Search(record, nominal).run();
 }
 

@@ -16,7 +16,7 @@ struct ControllerMisfit {
   bool of_all = false;     ///< most actuators are affected, so the controller is the cause
 };
 
-struct ControllerCheck {
+struct RecordedChannelsCheck {
   std::vector<ChannelError> errors;       ///< ordered by what they explain; undone in the record
   std::vector<ControllerMisfit> misfits;  ///< not explained by an error of one channel
 };
@@ -40,15 +40,15 @@ struct ControllerCheck {
 ///
 /// @pre the excited excitation channels of record.info have names of actuators; all channels are known to `nominal`,
 /// and all its sensors are recorded.
-ControllerCheck check_controller(HealthRecord& record, const NominalStage& nominal);
+RecordedChannelsCheck check_recorded_channels(HealthRecord& record, const NominalStage& nominal);
 
 /// Whether u = r - C y holds, without a search: the F test of the misfit over all lines, with 1 / w for the noise and
-/// for any size. @pre as check_controller()
+/// for any size. @pre as check_recorded_channels()
 bool follows_controller(HealthRecord& record, const NominalStage& nominal);
 
 /// Power of what does not repeat in u - r + C y, relative to that in C y: below one where u answers to y (it is not near
 /// zero, because single periods leak), one where u does not answer to a slow motion, as of a setpoint.
-/// @pre as check_controller()
+/// @pre as check_recorded_channels()
 double unexplained_motion(HealthRecord& record, const NominalStage& nominal);
 
 }  // namespace stageid

@@ -129,7 +129,7 @@ void Examination::check_recording() {
                    fmt::format("needs channel {} without faults", name(spoilt_.front())));
     return;
   }
-  const ControllerCheck check = check_controller(record_, *nominal_);
+  const RecordedChannelsCheck check = check_recorded_channels(record_, *nominal_);
   for (const ChannelError& error : check.errors)
     findings_.push_back(to_finding(error, record_.info, true));
   if (!check.misfits.empty() && check.misfits.front().of_all) {
@@ -179,7 +179,7 @@ void Examination::check_stage() {
   if (record_.zippered)
     return needs("all axes excited on the same lines; use a scheme other than zippered");
   const std::vector<PlantLine> lines = plant_lines(record_, *nominal_, outputs, inputs);
-  const RigidBodyCheck check = check_rigid_body(lines, outputs, inputs);
+  const StageWiringCheck check = check_stage_wiring(lines, outputs, inputs);
   if (!check.unchecked.empty()) {
     find_unchecked(Cause::rigid_body, what, "there are " + check.unchecked);
     return;

@@ -150,7 +150,7 @@ std::optional<ChannelError> gain_error(ChannelError error, const Gains& gains) {
   return error;
 }
 
-std::optional<ChannelError> best_change(const Body& body) {
+std::optional<ChannelError> best_error(const Body& body) {
   using Kind = ChannelError::Kind;
   std::vector<ChannelError> candidates;
   const auto try_gain = [&](const ChannelError& error) {
@@ -189,10 +189,10 @@ ChannelError in_log(ChannelError error, const std::vector<Index>& outputs,
 
 }  // namespace
 
-RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
-                                const std::vector<Index>& outputs,
-                                const std::vector<Index>& inputs) {
-  RigidBodyCheck check;
+StageWiringCheck check_stage_wiring(const std::vector<PlantLine>& all,
+                                    const std::vector<Index>& outputs,
+                                    const std::vector<Index>& inputs) {
+  StageWiringCheck check;
   const std::vector<PlantLine> lines = lines_of_body(all);
   if (static_cast<Index>(lines.size()) < kFewestRigidLines) {
     check.unchecked =
@@ -212,7 +212,7 @@ RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& all,
   const Gains recorded = body.all;
   std::vector<ChannelError> errors;
   for (Index i = 0; i < recorded.A.rows() + recorded.A.cols(); ++i) {
-    const std::optional<ChannelError> chosen = best_change(body);
+    const std::optional<ChannelError> chosen = best_error(body);
     if (!chosen) break;
     undo(*chosen, body);
     errors.push_back(*chosen);

@@ -11,7 +11,7 @@ namespace stageid {
 /// Deviation above which the rigid body itself differs from the configuration.
 inline constexpr double kLargestRigidDeviation = 0.3;
 
-struct RigidBodyCheck {
+struct StageWiringCheck {
   std::string unchecked;                     ///< the missing data; empty: it was checked
   std::vector<ChannelError> errors;          ///< gains and exchanges, not undone in the record
   std::vector<Eigen::Index> dead_actuators;  ///< excited but without any effect
@@ -38,8 +38,8 @@ struct RigidBodyCheck {
 /// The band ends at 0.7 of the frequency at which omega^2 |G| exceeds its median by half.
 ///
 /// @param outputs, inputs channels of the log for `lines`, see plant_lines().
-RigidBodyCheck check_rigid_body(const std::vector<PlantLine>& lines,
-                                const std::vector<Eigen::Index>& outputs,
-                                const std::vector<Eigen::Index>& inputs);
+StageWiringCheck check_stage_wiring(const std::vector<PlantLine>& lines,
+                                    const std::vector<Eigen::Index>& outputs,
+                                    const std::vector<Eigen::Index>& inputs);
 
 }  // namespace stageid

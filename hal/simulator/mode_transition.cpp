@@ -31,10 +31,10 @@ ModeTransition mode_transition(double omega_rad_s, double damping_ratio, double 
     integral += e * integral;
     e = e * e;
   }
-  ModeTransition propagator;
-  propagator.transition << e(0, 0), e(0, 1) * h, e(1, 0) / h, e(1, 1);
-  propagator.input << integral(0, 1) * h * h, integral(1, 1) * h;
-  return propagator;
+  ModeTransition mode;
+  mode.transition << e(0, 0), e(0, 1) * h, e(1, 0) / h, e(1, 1);
+  mode.input << integral(0, 1) * h * h, integral(1, 1) * h;
+  return mode;
 }
 
 }  // namespace stageid

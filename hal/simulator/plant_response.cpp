@@ -1,5 +1,5 @@
 // Frequency responses in closed form, by partial fractions over the poles. They share no code with the
-// simulator, which uses propagators in the time domain.
+// simulator, which uses transitions in the time domain.
 //
 // One mode, 1 / ((s - p)(s - p*)), is the divided difference over p and p* of 1 / (s - p). Through
 // a hold delayed by (d + e) samples, 0 <= e < 1, and a sampler, 1 / (s - p) becomes

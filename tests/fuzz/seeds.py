@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Writes small inputs for each fuzz target, made by the program itself.
+"""Writes small inputs for each fuzz target that has none yet, made by the program itself.
 
     seeds.py PROGRAM SOURCE_DIR OUTPUT_DIR
 """
@@ -22,15 +22,16 @@ def stageid(*arguments):
 
 def seed(target, *files):
     folder = OUTPUT / target
-    folder.mkdir(parents=True, exist_ok=True)
+    if folder.exists():
+        return
+    folder.mkdir(parents=True)
     for file in files:
         data = file if isinstance(file, bytes) else file.read_bytes()
         (folder / f"seed{len(list(folder.iterdir()))}").write_bytes(data)
 
 
 def main():
-    for folder in (OUTPUT, WORK):
-        shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     shutil.copytree(SOURCE / "configs", WORK / "configs")
     stageid("identify", "configs/experiment/small_stage_pilot.yaml", "-o", ".")

@@ -14,7 +14,8 @@ namespace stageid {
 
 std::vector<std::string> losses_of(const std::vector<LogRun>& runs) {
   RunHealth health;
-  for (const LogRun& run : runs) health += run.health;
+  for (const LogRun& run : runs)
+    if (run.complete) health += run.health;
   std::vector<std::string> losses;
   if (health.missing > 0)
     losses.push_back(counted(health.missing, "cycle is", "cycles are") + " missing");

@@ -19,7 +19,8 @@ struct ModelVerdict {
   std::vector<std::string> reasons;  ///< the gravest first; for a trustworthy model, warnings
 };
 
-/// What the recording lost: "3 cycles are missing", "4 samples are marked as invalid".
+/// What the complete runs lost: "3 cycles are missing", "4 samples are marked as invalid". Incomplete runs are not used,
+/// and the ramp of a controlled stop is marked.
 std::vector<std::string> losses_of(const std::vector<LogRun>& runs);
 
 /// Checks, in this order: faults of the data, the status of the fit, losses of the recording, doubts about the data,

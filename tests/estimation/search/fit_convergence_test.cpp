@@ -208,7 +208,6 @@ TEST(FitStatus, IterationLimit) {
       fit_additive_model(test::frf_of(problem), moved(problem.model, 1.01, 3.0), options);
   EXPECT_EQ(fit.status(), FitStatus::iteration_limit);
   EXPECT_FALSE(fit.trustworthy());
-  EXPECT_EQ(fit.status(), FitStatus::iteration_limit);
   EXPECT_EQ(fit.model.fit.iterations, 1);
   EXPECT_THAT(fit.message(), testing::HasSubstr("1 iterations"));
 }
@@ -221,7 +220,6 @@ TEST(FitStatus, GradientSmall) {
       fit_additive_model(test::frf_of(problem), moved(problem.model, 1.002, 1.5), options);
   EXPECT_EQ(fit.status(), FitStatus::gradient_small) << fit.message();
   EXPECT_TRUE(fit.trustworthy());
-  EXPECT_EQ(fit.status(), FitStatus::gradient_small);
 }
 
 TEST(FitStatus, StepSmall) {

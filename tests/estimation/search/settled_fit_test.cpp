@@ -142,7 +142,6 @@ TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined
   EXPECT_THAT(fit.findings[0], HasSubstr("at its bound"));
   EXPECT_EQ(fit.status(), FitStatus::undetermined);
   EXPECT_EQ(fit.message(), fit.findings[0]);
-  EXPECT_EQ(fit.status(), FitStatus::undetermined);
   EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::weak);
   EXPECT_EQ(fit.model.submodels[1].verdict, ModeVerdict::at_bound);
   fit.findings.clear();

@@ -157,7 +157,7 @@ TEST_P(Colour, GlitchesAreFound) {
 }
 
 // So smooth that only octaves whose last wavelet ends some samples before the period show it.
-TEST(OutlierDetection, ADeviationInTheLastCoefficientReachesTheEnd) {
+TEST(Outliers, ADeviationInTheLastCoefficientReachesTheEnd) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     NoisyRun run = run_of(white, 8, 1, seed);
     for (Eigen::Index n = 0; n < 160; ++n) {
@@ -178,7 +178,7 @@ NoisyRun run_with_a_noisy_period(int periods, double factor, std::uint64_t seed)
 }
 
 // From the first to the last one of any channel.
-TEST(OutlierDetection, TheDeviatingSamplesAreThoseOfAllChannels) {
+TEST(Outliers, TheDeviatingSamplesAreThoseOfAllChannels) {
   NoisyRun run = run_of(white, 6, 2, 7);
   run.add(2, 300, 0, 1000.0);
   run.add(2, 500, 1, 1000.0);
@@ -191,7 +191,7 @@ TEST(OutlierDetection, TheDeviatingSamplesAreThoseOfAllChannels) {
 }
 
 // For the variance of the mean, n + 1 periods with 2 + 1 / n times the noise in one are as bad as n periods.
-TEST(OutlierDetection, PeriodsThatCostLessThanTheirLossStay) {
+TEST(Outliers, PeriodsThatCostLessThanTheirLossStay) {
   int dropped_below = 0;
   int dropped_above = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
@@ -202,7 +202,7 @@ TEST(OutlierDetection, PeriodsThatCostLessThanTheirLossStay) {
   EXPECT_GE(dropped_above, 49);
 }
 
-TEST(OutlierDetection, SeveralAreFoundButNeverHalfOfAll) {
+TEST(Outliers, SeveralAreFoundButNeverHalfOfAll) {
   NoisyRun run = run_of(drifting, 10, 2, 7);
   for (const Eigen::Index p : {2, 3, 8}) run.add(p, 500, 0, 3000.0);
   EXPECT_THAT(run.which(), testing::ElementsAre(2U, 3U, 8U));
@@ -218,7 +218,7 @@ TEST(OutlierDetection, SeveralAreFoundButNeverHalfOfAll) {
 }
 
 // A missing period separates the record; the neighbours of a glitch at the border are kept.
-TEST(OutlierDetection, OnlyThePeriodWithTheGlitchIsFound) {
+TEST(Outliers, OnlyThePeriodWithTheGlitchIsFound) {
   for (const Eigen::Index at : {Eigen::Index{0}, Eigen::Index{3}, kSamples - 1}) {
     NoisyRun run = run_of(slow, 8, 1, 3);
     run.number = {0, 1, 2, 4, 5, 6, 7, 8};
@@ -227,7 +227,7 @@ TEST(OutlierDetection, OnlyThePeriodWithTheGlitchIsFound) {
   }
 }
 
-TEST(OutlierDetection, WithoutNoiseRoundingIsNotAnOutlier) {
+TEST(Outliers, WithoutNoiseRoundingIsNotAnOutlier) {
   NoisyRun run =
       run_of([](Eigen::Index count,
                 test::ComplexNoise&) -> Eigen::VectorXd { return Eigen::VectorXd::Ones(count); },
@@ -259,7 +259,7 @@ MemoryLog coloured_log(std::uint64_t seed, int periods) {
   return log;
 }
 
-TEST(OutlierDetection, ColouredNoiseCostsNoPeriod) {
+TEST(Outliers, ColouredNoiseCostsNoPeriod) {
   std::size_t dropped = 0;
   for (std::uint64_t seed = 1; seed <= 150; ++seed) {
     const MemoryLog log = coloured_log(seed, 4);
@@ -306,7 +306,7 @@ Eigen::ArrayXd squared_errors(const MemoryLog& log, PeriodChoice periods) {
 
 // Slow noise leaks into all lines; the leakage of neighbouring periods cancels in their mean, so a dropped period costs
 // more than its share.
-TEST(OutlierDetection, SlowNoiseAndItsGlitchesCostNoAccuracy) {
+TEST(Outliers, SlowNoiseAndItsGlitchesCostNoAccuracy) {
   for (const double deviations : {5.0, 50.0, 500.0}) {
     Eigen::ArrayXd plain = Eigen::ArrayXd::Zero(600);
     Eigen::ArrayXd clean = plain;
@@ -338,7 +338,7 @@ void spoil(MemoryLog& log, bool bump) {
   }
 }
 
-TEST(OutlierDetection, BumpsAreLeftOutWithTheirDegreeOfFreedom) {
+TEST(Outliers, BumpsAreLeftOutWithTheirDegreeOfFreedom) {
   MemoryLog log = coloured_log(3, 8);
   spoil(log, true);
   const FrfEstimate frf = estimate_plant_frf({&log});
@@ -365,7 +365,7 @@ TEST(OutlierDetection, BumpsAreLeftOutWithTheirDegreeOfFreedom) {
   EXPECT_GT((all.noise_variance.array() / frf.noise_variance.array()).maxCoeff(), 3.0);
 }
 
-TEST(OutlierDetection, OnlyTheSamplesOfAGlitchAreReplaced) {
+TEST(Outliers, OnlyTheSamplesOfAGlitchAreReplaced) {
   MemoryLog log = coloured_log(3, 8);
   const FrfEstimate clean = estimate_plant_frf({&log});
   spoil(log, false);
@@ -391,7 +391,7 @@ TEST(OutlierDetection, OnlyTheSamplesOfAGlitchAreReplaced) {
 }
 
 // What began before the period, or goes on after it, is no glitch.
-TEST(OutlierDetection, ADeviationAtAnEndOfAPeriodCostsTheWholePeriod) {
+TEST(Outliers, ADeviationAtAnEndOfAPeriodCostsTheWholePeriod) {
   for (const Eigen::Index at : {0, 399}) {
     MemoryLog log = coloured_log(3, 8);
     log.records[1].sensors((3 + 5) * 400 + at, 0) += 40.0;
@@ -415,13 +415,13 @@ double change_by(const std::function<void(MemoryLog&)>& spoil, std::size_t repla
 }
 
 // The first period of a run is the one that the others are compared with.
-TEST(OutlierDetection, AGlitchInTheFirstPeriodIsReplacedAsWell) {
+TEST(Outliers, AGlitchInTheFirstPeriodIsReplacedAsWell) {
   EXPECT_LT(change_by([](MemoryLog& log) { log.records[1].sensors(3 * 400 + 200, 0) += 40.0; }, 1),
             0.01);
 }
 
 // Neither may be replaced by a mean that contains the other.
-TEST(OutlierDetection, TwoGlitchesInOnePlaceAreReplacedByTheOtherPeriods) {
+TEST(Outliers, TwoGlitchesInOnePlaceAreReplacedByTheOtherPeriods) {
   EXPECT_LT(change_by(
                 [](MemoryLog& log) {
                   for (const int period : {2, 6})
@@ -431,7 +431,7 @@ TEST(OutlierDetection, TwoGlitchesInOnePlaceAreReplacedByTheOtherPeriods) {
             0.02);
 }
 
-TEST(OutlierDetection, ADeviationOfMoreThanATenthCostsThePeriod) {
+TEST(Outliers, ADeviationOfMoreThanATenthCostsThePeriod) {
   for (const int width : {30, 60}) {
     MemoryLog log = coloured_log(3, 8);
     for (int n = 0; n < width; ++n)
@@ -443,7 +443,7 @@ TEST(OutlierDetection, ADeviationOfMoreThanATenthCostsThePeriod) {
 }
 
 // Some of its samples stand out by themselves, but replacing them is not enough.
-TEST(OutlierDetection, ANoisyPeriodIsDroppedWhole) {
+TEST(Outliers, ANoisyPeriodIsDroppedWhole) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     MemoryLog log = coloured_log(3, 8);
     test::ComplexNoise random(seed);
@@ -457,7 +457,7 @@ TEST(OutlierDetection, ANoisyPeriodIsDroppedWhole) {
 }
 
 // Smooth, so that only octaves with long wavelets show it.
-TEST(OutlierDetection, ADeviationAcrossTheEndOfAPeriodCostsBoth) {
+TEST(Outliers, ADeviationAcrossTheEndOfAPeriodCostsBoth) {
   for (const double deviations : {5.0, 50.0}) {
     MemoryLog log = slow_log(5);
     add_half_sine(log, 4 * 4000 - 40, deviations);
@@ -470,7 +470,7 @@ TEST(OutlierDetection, ADeviationAcrossTheEndOfAPeriodCostsBoth) {
 }
 
 // More than 16 periods are compared in groups; in each, outliers are found as in a separate run.
-TEST(OutlierDetection, LongRunsAreComparedInGroups) {
+TEST(Outliers, LongRunsAreComparedInGroups) {
   MemoryLog log = coloured_log(5, 20);
   log.records[0].sensors(3 * 400 + 112, 1) += 40.0;         // in the first group
   log.records[0].sensors((3 + 19) * 400 + 112, 1) += 40.0;  // in the last

@@ -43,18 +43,18 @@ std::vector<PlantLine> body(std::uint64_t seed, double distortion, double factor
 }
 
 std::vector<ChannelError> errors(std::uint64_t seed, double distortion, double factor) {
-  return check_rigid_body(body(seed, distortion, factor), kAll, kAll).errors;
+  return check_stage_wiring(body(seed, distortion, factor), kAll, kAll).errors;
 }
 
 // A nonlinear plant distorts the lines, the same in all periods.
-TEST(RigidBodyCheck, DistortionIsNoFactorOfAChannel) {
+TEST(StageWiring, DistortionIsNoFactorOfAChannel) {
   int told = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed)
     if (!errors(seed, 0.5, 1.0).empty()) ++told;
   EXPECT_LE(told, 2);
 }
 
-TEST(RigidBodyCheck, AFactorIsFoundInSpiteOfDistortion) {
+TEST(StageWiring, AFactorIsFoundInSpiteOfDistortion) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     const std::vector<ChannelError> found = errors(seed, 0.05, 2.0);
     ASSERT_EQ(found.size(), 1U) << seed;
@@ -67,7 +67,7 @@ TEST(RigidBodyCheck, AFactorIsFoundInSpiteOfDistortion) {
 
 // A spring below the heave, as stiff as a cubic one becomes: it resonates just below the lines, at 4 to 5.5 Hz, and
 // moves all sensors alike.
-TEST(RigidBodyCheck, ASuspensionThatTheMotionStiffensIsNotAFactor) {
+TEST(StageWiring, ASuspensionThatTheMotionStiffensIsNotAFactor) {
   int told = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     test::RandomNumbers random(seed);
@@ -80,7 +80,7 @@ TEST(RigidBodyCheck, ASuspensionThatTheMotionStiffensIsNotAFactor) {
       line.G0 += heave;
       line.G += omega2 / (omega2 - resonance_rad_s * resonance_rad_s) * heave;
     }
-    if (!check_rigid_body(lines, kAll, kAll).errors.empty()) ++told;
+    if (!check_stage_wiring(lines, kAll, kAll).errors.empty()) ++told;
   }
   EXPECT_EQ(told, 0);
 }

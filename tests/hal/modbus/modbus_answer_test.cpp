@@ -13,7 +13,7 @@ namespace test_modbus_answer {
 
 using Bytes = std::vector<std::uint8_t>;
 
-class ModbusPdu : public testing::Test {
+class ModbusAnswer : public testing::Test {
  protected:
   Bytes answer(const Bytes& request) {
     std::array<std::uint8_t, kLargestPdu> reply{};
@@ -24,7 +24,7 @@ class ModbusPdu : public testing::Test {
 };
 
 // The frames of the application protocol V1.1b3, chapter 6, with other numbers.
-TEST_F(ModbusPdu, EveryFunctionAnswersAsTheProtocolSays) {
+TEST_F(ModbusAnswer, EveryFunctionAnswersAsTheProtocolSays) {
   EXPECT_EQ(answer({3, 0, 5, 0, 2}), (Bytes{3, 4, 0, 5, 0, 6}));
   EXPECT_EQ(answer({4, 0, 5, 0, 1}), (Bytes{4, 2, 0, 5}));
   EXPECT_EQ(answer({6, 0, 7, 0x12, 0x34}), (Bytes{6, 0, 7, 0x12, 0x34}));
@@ -38,7 +38,7 @@ TEST_F(ModbusPdu, EveryFunctionAnswersAsTheProtocolSays) {
   EXPECT_EQ(registers_.requests, 5);
 }
 
-TEST_F(ModbusPdu, TheLargestRequestsAreTakenAndOneMoreIsRefused) {
+TEST_F(ModbusAnswer, TheLargestRequestsAreTakenAndOneMoreIsRefused) {
   EXPECT_EQ(answer({3, 0, 0, 0, 125}).size(), 252U);
   EXPECT_EQ(answer({3, 0, 0, 0, 126}), (Bytes{0x83, 3}));
   const auto both = [](std::uint8_t count) {
@@ -50,7 +50,7 @@ TEST_F(ModbusPdu, TheLargestRequestsAreTakenAndOneMoreIsRefused) {
   EXPECT_EQ(answer(both(122)), (Bytes{0x97, 3}));
 }
 
-TEST_F(ModbusPdu, WhatIsNotThereOrContradictsItselfIsRefused) {
+TEST_F(ModbusAnswer, WhatIsNotThereOrContradictsItselfIsRefused) {
   EXPECT_EQ(answer({3, 0, 129, 0, 2}), (Bytes{0x83, 2}));
   EXPECT_EQ(answer({6, 0xFF, 0xFF, 0, 0}), (Bytes{0x86, 2}));
   EXPECT_EQ(answer({3, 0, 0, 0, 0}), (Bytes{0x83, 3}));
@@ -63,7 +63,7 @@ TEST_F(ModbusPdu, WhatIsNotThereOrContradictsItselfIsRefused) {
   EXPECT_TRUE(answer({}).empty());
 }
 
-TEST_F(ModbusPdu, GarbageGetsAReplyThatIsNoLongerThanAPdu) {
+TEST_F(ModbusAnswer, GarbageGetsAReplyThatIsNoLongerThanAPdu) {
   std::mt19937 engine(1);
   for (int i = 0; i < 20000; ++i) {
     Bytes request(engine() % (kLargestPdu + 1));

@@ -22,7 +22,7 @@ using Pair = std::array<std::uint16_t, 2>;
 using testing::HasSubstr;
 
 /// TCP (false) and RTU (true).
-class ModbusLinkTest : public testing::TestWithParam<bool> {
+class ModbusWire : public testing::TestWithParam<bool> {
  protected:
   void serve(const std::vector<std::string>& faults) {
     script_ = ModbusFaultScript(test::modbus_faults(faults));
@@ -38,7 +38,7 @@ class ModbusLinkTest : public testing::TestWithParam<bool> {
   std::unique_ptr<ModbusClient> link_;
 };
 
-TEST_P(ModbusLinkTest, WritesBeforeItReads) {
+TEST_P(ModbusWire, WritesBeforeItReads) {
   serve({});
   Pair values{};
   EXPECT_EQ(read(40, values), LinkStatus::ok);
@@ -47,7 +47,7 @@ TEST_P(ModbusLinkTest, WritesBeforeItReads) {
   EXPECT_EQ(values, (Pair{40, 7}));
 }
 
-TEST_P(ModbusLinkTest, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
+TEST_P(ModbusWire, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
   serve({"late_reply:0.6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
@@ -57,7 +57,7 @@ TEST_P(ModbusLinkTest, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
   EXPECT_EQ(values, (Pair{10, 11}));
 }
 
-TEST_P(ModbusLinkTest, HalfAReplyIsNone) {
+TEST_P(ModbusWire, HalfAReplyIsNone) {
   serve({"half_frame"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
@@ -66,7 +66,7 @@ TEST_P(ModbusLinkTest, HalfAReplyIsNone) {
   EXPECT_EQ(values, (Pair{10, 11}));
 }
 
-TEST_P(ModbusLinkTest, ARefusalIsNamed) {
+TEST_P(ModbusWire, ARefusalIsNamed) {
   serve({"exception:6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::refused);
@@ -75,14 +75,14 @@ TEST_P(ModbusLinkTest, ARefusalIsNamed) {
   EXPECT_THAT(link_->describe(link_->last()), HasSubstr("Illegal data address"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Wires, ModbusLinkTest, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Wires, ModbusWire, testing::Bool(),
                          [](const auto& wire) { return wire.param ? "Rtu" : "Tcp"; });
 
-using ModbusRtuLink = ModbusLinkTest;
-INSTANTIATE_TEST_SUITE_P(Wires, ModbusRtuLink, testing::Values(true));
+using ModbusRtuWire = ModbusWire;
+INSTANTIATE_TEST_SUITE_P(Wires, ModbusRtuWire, testing::Values(true));
 
 // drain() is needed because RTU replies have no number.
-TEST_P(ModbusRtuLink, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
+TEST_P(ModbusRtuWire, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
   serve({"late_reply:0.6"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::timeout);
@@ -91,7 +91,7 @@ TEST_P(ModbusRtuLink, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
   EXPECT_EQ(values, (Pair{0, 1}));
 }
 
-TEST_P(ModbusRtuLink, AnotherUnitsReplyIsCorrupt) {
+TEST_P(ModbusRtuWire, AnotherUnitsReplyIsCorrupt) {
   serve({"wrong_unit"});
   Pair values{};
   EXPECT_EQ(read(0, values), LinkStatus::corrupt);

@@ -11,13 +11,13 @@ using Bytes = std::vector<std::uint8_t>;
 
 // The check value of CRC-16/MODBUS in every catalogue, and the example of the serial line guide's
 // implementation notes: 02 07 -> 41 12 on the line.
-TEST(ModbusFrame, TheCrcIsTheStandardOne) {
+TEST(ModbusRequestFrame, TheCrcIsTheStandardOne) {
   constexpr std::string_view kCheck = "123456789";
   EXPECT_EQ(modbus_crc16(Bytes(kCheck.begin(), kCheck.end())), 0x4B37);
   EXPECT_EQ(modbus_crc16(Bytes{0x02, 0x07}), 0x1241);
 }
 
-TEST(ModbusFrame, ATcpRequestIsFoundOnceItIsWhole) {
+TEST(ModbusRequestFrame, ATcpRequestIsFoundOnceItIsWhole) {
   const Bytes request = {0x12, 0x34, 0, 0, 0, 6, 7, 3, 0, 200, 0, 2};
   for (std::size_t size = 0; size < request.size(); ++size)
     EXPECT_EQ(parse_tcp_request(std::span(request).first(size)).status, FrameStatus::incomplete);
@@ -30,7 +30,7 @@ TEST(ModbusFrame, ATcpRequestIsFoundOnceItIsWhole) {
   EXPECT_EQ(tcp_frame(0x1234, 7, found.pdu), request);
 }
 
-TEST(ModbusFrame, AnotherProtocolOrAnImpossibleLengthIsBroken) {
+TEST(ModbusRequestFrame, AnotherProtocolOrAnImpossibleLengthIsBroken) {
   EXPECT_EQ(parse_tcp_request(Bytes{0, 1, 0, 1, 0, 6, 1}).status, FrameStatus::broken);
   EXPECT_EQ(parse_tcp_request(Bytes{0, 1, 0, 0, 0, 1, 1}).status, FrameStatus::broken);
   EXPECT_EQ(parse_tcp_request(Bytes{0, 1, 0, 0, 0, 255, 1}).status, FrameStatus::broken);
@@ -38,7 +38,7 @@ TEST(ModbusFrame, AnotherProtocolOrAnImpossibleLengthIsBroken) {
             FrameStatus::broken);
 }
 
-TEST(ModbusFrame, AnRtuRequestEndsWhereItsFunctionSays) {
+TEST(ModbusRequestFrame, AnRtuRequestEndsWhereItsFunctionSays) {
   const Bytes read = rtu_frame(7, Bytes{3, 0, 200, 0, 2});
   const Bytes write = rtu_frame(7, Bytes{16, 0, 0, 0, 1, 2, 0xAB, 0xCD});
   const Bytes both = rtu_frame(7, Bytes{23, 0, 200, 0, 2, 0, 0, 0, 1, 2, 0xAB, 0xCD});
@@ -55,7 +55,7 @@ TEST(ModbusFrame, AnRtuRequestEndsWhereItsFunctionSays) {
   }
 }
 
-TEST(ModbusFrame, OneFlippedBitBreaksAnRtuRequest) {
+TEST(ModbusRequestFrame, OneFlippedBitBreaksAnRtuRequest) {
   const Bytes sound = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
   for (std::size_t bit = 0; bit < 8 * sound.size(); ++bit) {
     if (bit / 8 == 1) continue;  // the function may change the length
@@ -71,7 +71,7 @@ Bytes joined(const std::vector<Bytes>& pieces) {
   return all;
 }
 
-TEST(ModbusFrame, OurRequestIsFoundBetweenWhatOthersSay) {
+TEST(ModbusRequestFrame, OurRequestIsFoundBetweenWhatOthersSay) {
   const Bytes ours = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
   const Bytes asked = rtu_frame(2, Bytes{3, 0, 0, 0, 4});
   const Bytes told = rtu_frame(2, Bytes{3, 8, 1, 3, 0, 200, 0, 2, 1, 16});
@@ -86,7 +86,7 @@ TEST(ModbusFrame, OurRequestIsFoundBetweenWhatOthersSay) {
   }
 }
 
-TEST(ModbusFrame, OnlyWhatMayBecomeARequestIsKept) {
+TEST(ModbusRequestFrame, OnlyWhatMayBecomeARequestIsKept) {
   const Bytes told = rtu_frame(2, Bytes{3, 8, 1, 3, 0, 200, 0, 2, 1, 16});
   const Bytes ours = rtu_frame(1, Bytes{3, 0, 200, 0, 2});
   const Bytes begun = joined({told, Bytes(ours.begin(), ours.begin() + 5)});

@@ -242,13 +242,13 @@ TEST(ModalPlant, RefusesWhatCannotBeSimulated) {
                std::invalid_argument);
 }
 
-struct PropagatorCase {
+struct TransitionCase {
   double frequency_hz, damping, duration_s;
 };
-class Propagator : public testing::TestWithParam<PropagatorCase> {};
+class ModeTransitions : public testing::TestWithParam<TransitionCase> {};
 
 // In a unit of time in which all entries are of order one, as the general exponential requires.
-TEST_P(Propagator, IsTheMatrixExponential) {
+TEST_P(ModeTransitions, IsTheMatrixExponential) {
   const auto [frequency_hz, damping, duration_s] = GetParam();
   const double wt = kTwoPi * frequency_hz * duration_s;
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
@@ -265,12 +265,12 @@ TEST_P(Propagator, IsTheMatrixExponential) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    AllKinds, Propagator,
-    testing::Values(PropagatorCase{0.0, 0.0, 1e-4}, PropagatorCase{0.3, 0.1, 1e-4},
-                    PropagatorCase{2600.0, 0.005, 1e-4}, PropagatorCase{5000.0, 0.9, 1e-3},
-                    PropagatorCase{100.0, 1.0, 1e-3}, PropagatorCase{100.0, 2.0, 1e-3}));
+    AllKinds, ModeTransitions,
+    testing::Values(TransitionCase{0.0, 0.0, 1e-4}, TransitionCase{0.3, 0.1, 1e-4},
+                    TransitionCase{2600.0, 0.005, 1e-4}, TransitionCase{5000.0, 0.9, 1e-3},
+                    TransitionCase{100.0, 1.0, 1e-3}, TransitionCase{100.0, 2.0, 1e-3}));
 
-TEST(Propagator, OverNoTimeIsTheIdentity) {
+TEST(ModeTransitions, OverNoTimeIsTheIdentity) {
   const ModeTransition p = mode_transition(10.0, 0.1, 0.0);
   EXPECT_EQ(p.transition, Eigen::Matrix2d::Identity());
   EXPECT_EQ(p.input, Eigen::Vector2d::Zero());

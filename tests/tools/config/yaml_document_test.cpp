@@ -18,7 +18,7 @@ std::string error_of(const std::string& text) {
   return test::error_message<FormatError>([&] { YamlDocument::parse("f.yaml", text); });
 }
 
-TEST(StrictYaml, KnowsWhereEverythingStands) {
+TEST(YamlText, KnowsWhereEverythingStands) {
   const YamlDocument d = YamlDocument::parse("f.yaml", "a: 1\nlist:\n  - {x: 'y'}\n");
   const YamlNode& root = d.root();
   ASSERT_EQ(root.kind, YamlNode::Kind::map);
@@ -34,7 +34,7 @@ TEST(StrictYaml, KnowsWhereEverythingStands) {
   EXPECT_TRUE(d.value(root, "a")->plain);
 }
 
-TEST(StrictYaml, AnchorsAliasesAndMergeKeysWork) {
+TEST(YamlText, AnchorsAliasesAndMergeKeysWork) {
   const YamlDocument d =
       YamlDocument::parse("f.yaml", "base: &b {p: 1, q: 2}\nsame: *b\nmore:\n  <<: *b\n  q: 3\n");
   const YamlNode& same = *d.value(d.root(), "same");
@@ -45,12 +45,12 @@ TEST(StrictYaml, AnchorsAliasesAndMergeKeysWork) {
   EXPECT_EQ(d.value(more, "q")->text, "3");
 }
 
-TEST(StrictYaml, ADuplicateKeyIsAnErrorAtItsPlace) {
+TEST(YamlText, ADuplicateKeyIsAnErrorAtItsPlace) {
   EXPECT_EQ(error_of("a: 1\nb: 2\na: 3\n"),
             "f.yaml:3:1: duplicate key 'a', first in line 1; keep one");
 }
 
-TEST(StrictYaml, RefusesWhatIsNotOneTextDocument) {
+TEST(YamlText, RefusesWhatIsNotOneTextDocument) {
   EXPECT_THAT(error_of(""), HasSubstr("f.yaml:1:1: the file is empty"));
   EXPECT_THAT(error_of("# only a comment\n"), HasSubstr("is empty"));
   EXPECT_THAT(error_of("a: 1\n---\nb: 2\n"), HasSubstr("a second YAML document"));
@@ -60,7 +60,7 @@ TEST(StrictYaml, RefusesWhatIsNotOneTextDocument) {
   EXPECT_THAT(error_of("a: &x [1, *x]\n"), HasSubstr("refers to itself"));
 }
 
-TEST(StrictYaml, BinaryAndForeignEncodingsAreNamedByPlace) {
+TEST(YamlText, BinaryAndForeignEncodingsAreNamedByPlace) {
   EXPECT_EQ(error_of("a: 1\nb: \xE9t\xE9\n"),
             "f.yaml:2:4: byte 0xE9 is not UTF-8 text; save the file as UTF-8");
   EXPECT_THAT(error_of(std::string("a: \0b\n", 6)), HasSubstr("f.yaml:1:4: byte 0x00 is not text"));
@@ -73,7 +73,7 @@ TEST(StrictYaml, BinaryAndForeignEncodingsAreNamedByPlace) {
   EXPECT_EQ(error_of("a: \xC3\xA9\n"), "no error");
 }
 
-TEST(StrictYaml, HostileNestingEndsInOneLine) {
+TEST(YamlText, HostileNestingEndsInOneLine) {
   for (const char* bracket : {"[", "{a: "}) {
     std::string text;
     for (int i = 0; i < 100000; ++i) text += bracket;
@@ -87,13 +87,13 @@ TEST(StrictYaml, HostileNestingEndsInOneLine) {
   EXPECT_EQ(error_of(laughs), "no error");
 }
 
-TEST(StrictYaml, AKeyThatIsMissingIsAnErrorAtItsPlace) {
+TEST(YamlText, AKeyThatIsMissingIsAnErrorAtItsPlace) {
   for (const char* text : {": x\n", "? \n", "a: {: 1}\n", "a:\n  : 1\n"})
     EXPECT_THAT(error_of(text), HasSubstr("a key must be a word; write 'key: value'")) << text;
   EXPECT_EQ(error_of("null: 1\n"), "f.yaml:1:1: a key must be a word; write 'key: value'");
 }
 
-TEST(StrictYaml, MergingIsBoundedWork) {
+TEST(YamlText, MergingIsBoundedWork) {
   std::string chain = "a0: &a0 {k0: 1}\n";
   for (int i = 1; i < 20000; ++i)
     chain += fmt::format("a{0}: &a{0} {{<<: *a{1}, k{0}: 1}}\n", i, i - 1);
@@ -104,7 +104,7 @@ TEST(StrictYaml, MergingIsBoundedWork) {
             "f.yaml:1001:1: more than 1000 keys in one map; split it or remove keys");
 }
 
-TEST(StrictYaml, EveryCutOfAFileIsEitherReadOrOneLine) {
+TEST(YamlText, EveryCutOfAFileIsEitherReadOrOneLine) {
   const std::string whole =
       "format: x\nlist:\n  - {name: \"a b\", p: [1, 2, 3]}\n  - {name: 'c', p: &q [4]}\nlast: *q\n";
   for (std::size_t n = 0; n <= whole.size(); ++n) {
@@ -116,13 +116,13 @@ TEST(StrictYaml, EveryCutOfAFileIsEitherReadOrOneLine) {
   }
 }
 
-TEST(StrictYaml, AFileThatCannotBeReadIsAFileError) {
+TEST(YamlText, AFileThatCannotBeReadIsAFileError) {
   const test::TemporaryDirectory directory;
   EXPECT_THROW(YamlDocument::read(directory / "missing.yaml"), FileError);
   EXPECT_THROW(YamlDocument::read(directory.path()), FileError);
 }
 
-TEST(StrictYaml, AFileOfMoreThanAMegabyteIsRefused) {
+TEST(YamlText, AFileOfMoreThanAMegabyteIsRefused) {
   EXPECT_THAT(error_of(std::string((1U << 20) + 1, ' ')), HasSubstr("longer than 1 MiB"));
 }
 

@@ -79,7 +79,7 @@ TEST(Verdict, AnErrorIsComparedWithItsExpectation) {
   EXPECT_EQ(judge(data).level, Level::good);
 }
 
-TEST(Verdict, LostAndMarkedSamplesAreNotTrustedLateOnesAreNoReason) {
+TEST(Verdict, LostAndMarkedSamplesAreNotTrusted) {
   ReportData data = sound();
   data.runs[0].health.late = 7;
   EXPECT_EQ(judge(data).level, Level::good);

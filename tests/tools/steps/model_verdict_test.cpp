@@ -60,12 +60,19 @@ TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
 TEST(ModelVerdict, DistrustsARecordingThatLostSamples) {
   LogRun first, second;
   first.health.missing = 3;
-  first.health.late = 7;  // late cycles are complete
-  second.health.marked = 1;
+  first.health.late = 7;  // these are marked as well
+  second.health.marked = 8;
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, {}, {first, second});
   EXPECT_FALSE(verdict.trustworthy);
-  EXPECT_THAT(verdict.reasons, ElementsAre("3 cycles are missing", "1 sample is marked as invalid",
-                                           "a mode drifts"));
+  EXPECT_THAT(verdict.reasons, ElementsAre("3 cycles are missing",
+                                           "8 samples are marked as invalid", "a mode drifts"));
+}
+
+TEST(ModelVerdict, TrustsARecordingThatWasInterruptedAndResumed) {
+  LogRun stopped, again;
+  stopped.complete = false;
+  stopped.health.marked = 200;  // the ramp of the stop
+  EXPECT_TRUE(judge_model(fitted_to_drifting_data(), {}, {}, {stopped, again}).trustworthy);
 }
 
 }  // namespace test_model_verdict
