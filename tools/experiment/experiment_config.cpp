@@ -123,8 +123,10 @@ void describe_frf(ConfigVisitor& v, FrfOptions& f) {
   v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
   choose(v, "covariance", f.covariance, kOptional,
          "diagonal: variances; full: also the covariances between channels");
-  choose(v, "method", f.method, kOptional,
-         "periodic: means over periods; lpm: whole records, transient modelled");
+  choose(
+      v, "method", f.method, kOptional,
+      "periodic: means over periods; lpm: local polynomial method, which models the transient in "
+      "whole records");
   choose(v, "periods", f.periods, kOptional,
          "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
          "discard periods with glitches); "

@@ -36,9 +36,8 @@ constexpr const char* kRemedy =
 
 std::string poor_margin(double sensitivity, double frequency_hz) {
   return fmt::format(
-      "the loop has little margin: its largest sensitivity is {:.2g} at {:.4g} Hz (above {} a gain "
-      "{} "
-      "times as large may make it unstable). Lower crossover_hz in the stage file",
+      "the loop has little margin: its sensitivity function reaches {:.2g} at {:.4g} Hz. Above {}, "
+      "a gain {} times as large may make it unstable. Lower crossover_hz in the stage file",
       sensitivity, frequency_hz, kPoorSensitivity, kPoorSensitivity / (kPoorSensitivity - 1.0));
 }
 
