@@ -89,15 +89,16 @@ void LimitedStage::stop() noexcept {
 void LimitedStage::apply(std::uint64_t cycle) noexcept {
   const Eigen::VectorXd& largest_n = guard_.limits().actuator_n;
   const double fresh = 1.0 - decay_;
-  bool outside = false;
+  int outside = 0;  // a bool is not vectorized
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     const double u = wanted_[i];
     // This form counts NaN as outside.
-    outside |= !(std::abs(u) <= largest_n[i]);
-    outside |= !(std::abs(u - applied_[i]) <= step_n_[i]);
-    outside |= !(decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]);
+    outside |= static_cast<int>(!(std::abs(u) <= largest_n[i]));
+    outside |= static_cast<int>(!(std::abs(u - applied_[i]) <= step_n_[i]));
+    outside |=
+        static_cast<int>(!(decay_ * mean_square_[i] + fresh * u * u <= mean_square_limit_n2_[i]));
   }
-  for (Eigen::Index i = 0; outside && i < wanted_.size(); ++i)
+  for (Eigen::Index i = 0; outside != 0 && i < wanted_.size(); ++i)
     wanted_[i] = limit_channel(i, wanted_[i], cycle);
   for (Eigen::Index i = 0; i < wanted_.size(); ++i) {
     applied_[i] = wanted_[i];
