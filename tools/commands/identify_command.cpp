@@ -106,7 +106,7 @@ class Identification {
     estimate();
     pick();
     fit();
-    if (exit_code_ == kInterrupted) return exit_code_;
+    if (model_.fit.status == FitStatus::interrupted) return kInterrupted;
     check_model();
     write_outputs();
     print_summary();
@@ -161,20 +161,19 @@ class Identification {
     request.resume = flags_.resume;
     request.backend = config_.stage.backend;
     const MeasurementResult result = measure(config_, plan_, request, console_);
-    exit_code_ = result.exit_code;
-    if (exit_code_ == kNotTrustworthy) notes_.push_back(result.message);
+    if (result.exit_code == kNotTrustworthy) notes_.push_back(result.message);
     const double stage_s =
         static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
     finish_step("run", result.seconds,
                 fmt::format("{:.0f} s of stage time, {:.0f} times real-time speed, {:.0f} MB",
                             stage_s, result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
                             static_cast<double>(result.log_bytes) / 1e6));
-    if (exit_code_ != kDone && exit_code_ != kNotTrustworthy)
+    if (result.exit_code != kDone && result.exit_code != kNotTrustworthy)
       console_.warning(fmt::format("{}; {} of {} runs are kept{}",
                                    named(request.log, result.message),
                                    result.runs_before + result.experiment.runs_done,
                                    result.runs_total, advice_behind(result)));
-    return exit_code_;
+    return result.exit_code;
   }
 
   std::vector<int> fitted_realizations() const {
@@ -251,11 +250,9 @@ class Identification {
     model_variance_ = std::move(step.result.response_variance);
     add_notes(findings_beside_message(step.result));
     write_model(path("model.json"), model_);
-    if (step.result.status() == FitStatus::interrupted) {
-      exit_code_ = kInterrupted;
+    if (step.result.status() == FitStatus::interrupted)
       console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
                                    step.result.message()));
-    }
     finish_step("fit", step.seconds,
                 fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
                             relative_error_text(model_.fit), cost_line(step.result.cost)));
@@ -342,7 +339,6 @@ class Identification {
   const IdentifyFlags& flags_;
   Console& console_;
   ExperimentPlan plan_;
-  int exit_code_ = 0;
   ModelVerdict verdict_;
   std::vector<Step> steps_;
   std::vector<std::string> notes_;
