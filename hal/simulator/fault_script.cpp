@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
+#include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/require.hpp"
 
 namespace stageid {
@@ -15,26 +17,76 @@ using Kind = Fault::Kind;
 
 constexpr double kLongestExtraDelay = 1000.0;  // samples
 
-bool of_sensor(Kind kind) {
-  return kind == Kind::dead_sensor || kind == Kind::nan_sensor || kind == Kind::stuck_sensor ||
-         kind == Kind::sensor_offset || kind == Kind::sensor_drift;
-}
-bool of_actuator(Kind kind) { return kind == Kind::stuck_actuator || kind == Kind::actuator_gain; }
-bool may_be_all(Kind kind) {
-  return kind == Kind::sensor_offset || kind == Kind::sensor_drift || kind == Kind::actuator_gain;
-}
+// In the order of Kind.
+constexpr FaultTraits kTraits[] = {
+    {FaultTarget::stage, false, false},     // none
+    {FaultTarget::sensor, false, false},    // dead_sensor
+    {FaultTarget::sensor, false, false},    // nan_sensor
+    {FaultTarget::stage, false, false},     // missed_cycle
+    {FaultTarget::stage, false, false},     // interlock
+    {FaultTarget::actuator, false, false},  // stuck_actuator
+    {FaultTarget::sensor, false, false},    // stuck_sensor
+    {FaultTarget::sensor, true, true},      // sensor_offset
+    {FaultTarget::sensor, true, false},     // sensor_drift
+    {FaultTarget::actuator, true, true},    // actuator_gain
+    {FaultTarget::stage, false, true},      // extra_delay
+    {FaultTarget::mode, true, true},        // mode_frequency
+    {FaultTarget::mode, true, true},        // mode_damping
+    {FaultTarget::sensor, true, true},      // sensor_gain
+    {FaultTarget::sensor, true, true},      // sensor_noise
+};
+static_assert(std::size(kTraits) == kWords<Kind>.size());
+
+FaultTarget target_of(const Fault& fault) { return fault_traits(fault.kind).target; }
+
 bool hits(const Fault& fault, std::size_t channel) {
-  return fault.channel < 0 || static_cast<std::size_t>(fault.channel) == channel;
+  if (fault.channel >= 0) return static_cast<std::size_t>(fault.channel) == channel;
+  return target_of(fault) != FaultTarget::mode || channel >= kRigidAxes;
 }
 
-void check(const Fault& fault, std::size_t number, const StageInfo& info) {
-  const std::size_t channels = of_sensor(fault.kind) ? info.sensors.size() : info.actuators.size();
-  const bool all = may_be_all(fault.kind) && fault.channel == -1;
-  if ((of_sensor(fault.kind) || of_actuator(fault.kind)) && !all) {
-    require(fault.channel >= 0, "faults: entry {}: channel {} is negative", number, fault.channel);
-    require(static_cast<std::size_t>(fault.channel) < channels,
-            "faults: entry {}: channel {} is out of range; there are {} {}", number, fault.channel,
-            channels, of_sensor(fault.kind) ? "sensors" : "actuators");
+void check_mode(const Fault& fault, std::size_t number, std::size_t index, const PlantMode& mode) {
+  const double factor = 1.0 + fault.value;
+  const double hz = factor * mode.natural_frequency_hz;
+  require(fault.kind != Kind::mode_frequency || (hz > 0.0 && std::isfinite(hz)),
+          "faults: entry {}: the natural frequency of mode {} would be {:.6g} Hz; must be positive",
+          number, index, hz);
+  const double ratio = factor * mode.damping_ratio;
+  require(
+      fault.kind != Kind::mode_damping || (ratio > 0.0 && ratio < 1.0),
+      "faults: entry {}: the damping ratio of mode {} would be {:.6g}; must be above 0 and below 1",
+      number, index, ratio);
+}
+
+void check_channel(const Fault& fault, std::size_t number, const StageInfo& info) {
+  const FaultTraits traits = fault_traits(fault.kind);
+  if (traits.may_be_all && fault.channel == -1) return;
+  const bool sensor = traits.target == FaultTarget::sensor;
+  const std::size_t channels = sensor ? info.sensors.size() : info.actuators.size();
+  require(fault.channel >= 0, "faults: entry {}: channel {} is negative", number, fault.channel);
+  require(static_cast<std::size_t>(fault.channel) < channels,
+          "faults: entry {}: channel {} is out of range; there are {} {}", number, fault.channel,
+          channels, sensor ? "sensors" : "actuators");
+}
+
+void check_modes(const Fault& fault, std::size_t number, const std::vector<PlantMode>& modes) {
+  const auto last = static_cast<int>(modes.size()) - 1;
+  require(
+      fault.channel >= -1 && fault.channel <= last,
+      "faults: entry {}: mode {} is out of range; allowed: 0 to {}, or -1 for all flexible modes",
+      number, fault.channel, last);
+  require(fault.channel >= 0 || modes.size() > kRigidAxes,
+          "faults: entry {}: the plant has no flexible mode", number);
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    if (hits(fault, i)) check_mode(fault, number, i, modes[i]);
+}
+
+void check(const Fault& fault, std::size_t number, const StageInfo& info,
+           const std::vector<PlantMode>& modes) {
+  const FaultTraits traits = fault_traits(fault.kind);
+  if (traits.target == FaultTarget::mode) {
+    check_modes(fault, number, modes);
+  } else if (traits.target != FaultTarget::stage) {
+    check_channel(fault, number, info);
   }
   require(fault.kind != Kind::missed_cycle || fault.cycles > 0,
           "faults: entry {}: missed_cycle needs cycles of at least 1", number);
@@ -44,18 +96,31 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info) {
                                           fault.value == std::floor(fault.value)),
       "faults: entry {}: extra_delay is {} samples; allowed: whole numbers 1 to {}", number,
       fault.value, kLongestExtraDelay);
+  require(fault.kind != Kind::sensor_noise || fault.value >= 0.0,
+          "faults: entry {}: sensor_noise is {}; must be 0 or more", number, fault.value);
+  require(fault.ramp_s >= 0.0 && std::isfinite(fault.ramp_s),
+          "faults: entry {}: ramp_s is {}; must be 0 or more", number, fault.ramp_s);
+  require(fault.ramp_s == 0.0 || traits.may_ramp,
+          "faults: entry {}: {} cannot be gradual; remove ramp_s", number, to_string(fault.kind));
 }
 
 }  // namespace
 
-FaultScript::FaultScript(std::vector<SimulationSpec::Fault> faults, const StageInfo& info)
+FaultTraits fault_traits(Kind kind) noexcept { return kTraits[static_cast<std::size_t>(kind)]; }
+
+FaultScript::FaultScript(std::vector<SimulationSpec::Fault> faults, const StageInfo& info,
+                         const std::vector<PlantMode>& modes)
     : faults_(std::move(faults)), period_s_(1.0 / info.sample_rate_hz) {
   for (std::size_t i = 0; i < faults_.size(); ++i) {
-    check(faults_[i], i + 1, info);
+    check(faults_[i], i + 1, info, modes);
+    if (target_of(faults_[i]) == FaultTarget::mode && modes_.empty())
+      for (const PlantMode& mode : modes)
+        modes_.push_back({mode.natural_frequency_hz, mode.damping_ratio});
     if (faults_[i].kind == Kind::extra_delay)
       history_cycles_ = std::max(history_cycles_, static_cast<std::size_t>(faults_[i].value) + 1);
   }
   history_.assign(history_cycles_ * info.actuators.size(), 0.0);
+  tuned_ = modes_;
 }
 
 void FaultScript::start_run(int run) noexcept {
@@ -69,6 +134,19 @@ bool FaultScript::active(const Fault& fault, std::uint64_t cycle) const noexcept
   return fault.kind != Fault::Kind::missed_cycle || cycle - fault.from_cycle < fault.cycles;
 }
 
+// The part of the full change that is reached.
+double FaultScript::growth(const Fault& fault, std::uint64_t cycle) const noexcept {
+  if (fault.ramp_s == 0.0) return 1.0;
+  const double instant = target_of(fault) == FaultTarget::sensor ? 1.0 : 0.5;
+  const double since_s = (static_cast<double>(cycle - fault.from_cycle) + instant) * period_s_;
+  return std::min(1.0, since_s / fault.ramp_s);
+}
+
+double FaultScript::factor(const Fault& fault, std::uint64_t cycle) const noexcept {
+  const double full = target_of(fault) == FaultTarget::mode ? 1.0 + fault.value : fault.value;
+  return std::lerp(1.0, full, growth(fault, cycle));
+}
+
 bool FaultScript::any(Fault::Kind kind, std::uint64_t cycle) const noexcept {
   return std::any_of(faults_.begin(), faults_.end(), [&](const Fault& fault) {
     return fault.kind == kind && active(fault, cycle);
@@ -79,10 +157,33 @@ void FaultScript::drive(std::uint64_t cycle, std::span<const double> applied,
                         std::span<double> u) noexcept {
   if (!history_.empty()) delay(cycle, u);
   for (const Fault& fault : faults_) {
-    if (!of_actuator(fault.kind) || !active(fault, cycle)) continue;
+    if (target_of(fault) != FaultTarget::actuator || !active(fault, cycle)) continue;
     for (std::size_t i = 0; i < u.size(); ++i)
       if (hits(fault, i))
-        u[i] = fault.kind == Kind::stuck_actuator ? applied[i] : fault.value * u[i];
+        u[i] = fault.kind == Kind::stuck_actuator ? applied[i] : factor(fault, cycle) * u[i];
+  }
+}
+
+void FaultScript::retune(std::uint64_t cycle, ModalPlant& plant) noexcept {
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    Mode mode = modes_[i];
+    for (const Fault& fault : faults_) {
+      if (target_of(fault) != FaultTarget::mode || !hits(fault, i) || !active(fault, cycle))
+        continue;
+      (fault.kind == Kind::mode_frequency ? mode.natural_frequency_hz : mode.damping_ratio) *=
+          factor(fault, cycle);
+    }
+    if (mode == tuned_[i]) continue;
+    tuned_[i] = mode;
+    plant.retune(static_cast<Eigen::Index>(i), mode.natural_frequency_hz, mode.damping_ratio);
+  }
+}
+
+void FaultScript::amplify(std::uint64_t cycle, std::span<double> noise) const noexcept {
+  for (const Fault& fault : faults_) {
+    if (fault.kind != Kind::sensor_noise || !active(fault, cycle)) continue;
+    for (std::size_t i = 0; i < noise.size(); ++i)
+      if (hits(fault, i)) noise[i] *= factor(fault, cycle);
   }
 }
 
@@ -94,7 +195,7 @@ void FaultScript::delay(std::uint64_t cycle, std::span<double> u) noexcept {
   std::uint64_t samples = 0;
   for (const Fault& fault : faults_)
     if (fault.kind == Kind::extra_delay && active(fault, cycle))
-      samples = std::max(samples, static_cast<std::uint64_t>(fault.value));
+      samples = std::max(samples, static_cast<std::uint64_t>(growth(fault, cycle) * fault.value));
   if (samples == 0 || samples > cycle) return;
   const auto from = slot(cycle - samples);
   std::copy(from, from + static_cast<std::ptrdiff_t>(u.size()), u.begin());
@@ -108,9 +209,12 @@ std::uint64_t FaultScript::spoil(std::uint64_t cycle, std::span<double> fresh,
     const auto channel = static_cast<std::size_t>(fault.channel);
     if (fault.kind == Kind::sensor_offset || fault.kind == Kind::sensor_drift) {
       const double since_s = static_cast<double>(cycle + 1 - fault.from_cycle) * period_s_;
-      const double scale = fault.kind == Kind::sensor_drift ? since_s : 1.0;
+      const double scale = fault.kind == Kind::sensor_drift ? since_s : growth(fault, cycle);
       for (std::size_t i = 0; i < fresh.size(); ++i)
         if (hits(fault, i)) fresh[i] += scale * fault.value;
+    } else if (fault.kind == Kind::sensor_gain) {
+      for (std::size_t i = 0; i < fresh.size(); ++i)
+        if (hits(fault, i)) fresh[i] *= factor(fault, cycle);
     } else if (fault.kind == Fault::Kind::dead_sensor) {
       fresh[channel] = last[channel];
       missing |= std::uint64_t{1} << channel;

@@ -49,6 +49,7 @@ class StageNoise {
   /// Of the current sample: size actuators, size sensors.
   const double* force_n() const noexcept { return force_.data(); }
   const double* sensor_m() const noexcept { return sensor_.data(); }
+  double* sensor_m() noexcept { return sensor_.data(); }
 
  private:
   const double* row() noexcept;

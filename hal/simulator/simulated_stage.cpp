@@ -62,10 +62,11 @@ struct SimulatedStage::State {
       : spec(of_simulation),
         plant_spec(of_plant),
         info(info_of(stage, pace)),
-        plant(plant_modes(stage, plant_spec), stage.delay_s, stage.sample_rate_hz),
+        modes(plant_modes(stage, plant_spec)),
+        plant(modes, stage.delay_s, stage.sample_rate_hz),
         noise(noise_of(stage, spec)),
         pacer(stage.sample_rate_hz, pace),
-        faults(spec.faults, stage),
+        faults(spec.faults, stage, modes),
         u(Eigen::ArrayXd::Zero(plant.actuators())),
         commanded(Eigen::ArrayXd::Zero(plant.actuators())),
         applied(Eigen::ArrayXd::Zero(plant.actuators())),
@@ -76,6 +77,7 @@ struct SimulatedStage::State {
   SimulationSpec spec;
   PlantSpec plant_spec;
   StageInfo info;
+  std::vector<PlantMode> modes;
   ModalPlant plant;
   StageNoise noise;
   Pacer pacer;
@@ -171,7 +173,9 @@ Outcome SimulatedStage::exchange(const Outputs& outputs, Inputs& inputs,
   const bool missed = faulty && s.faults.any(SimulationSpec::Fault::Kind::missed_cycle, s.cycle);
   const bool off = faulty && s.faults.any(SimulationSpec::Fault::Kind::interlock, s.cycle);
   const bool accepted = s.take_command(outputs.u, missed, off);
+  if (faulty) s.faults.retune(s.cycle, s.plant);
   s.drive();
+  if (faulty) s.faults.amplify(s.cycle, {s.noise.sensor_m(), inputs.y.size()});
   s.measure();
   const std::span<double> fresh{s.y.data(), inputs.y.size()};
   const std::uint64_t missing =

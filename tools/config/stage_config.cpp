@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
+#include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/limits.hpp"
 #include "tools/config/config_reader.hpp"
@@ -75,17 +76,12 @@ void take_limits(const StageFile& file, StageLimits& limits) {
 }
 
 void take_faults(const StageFile& file, StageConfig& config) {
-  using Kind = SimulationSpec::Fault::Kind;
   const StageInfo& info = config.spec.info;
   std::vector<SimulationSpec::Fault>& faults = config.simulation.faults;
   for (const FaultConfig& fault : file.faults) {
     faults.push_back(fault.fault);
-    if (fault.channel.empty()) {
-      faults.back().channel = -1;
-      continue;
-    }
-    const bool actuator =
-        fault.fault.kind == Kind::stuck_actuator || fault.fault.kind == Kind::actuator_gain;
+    if (fault.channel.empty()) continue;
+    const bool actuator = fault_traits(fault.fault.kind).target == FaultTarget::actuator;
     faults.back().channel =
         require_channel(config, actuator ? info.actuators : info.sensors, fault.channel,
                         actuator ? "actuator" : "sensor", "faults");

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "hal/can/can_frame.hpp"
+#include "hal/simulator/fault_script.hpp"
 
 namespace stageid {
 namespace {
@@ -252,19 +253,33 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   v.choice("kind", kind, kinds, kRequired, "kind of the fault");
   f.fault.kind = static_cast<Kind>(kind + 1);
   v.text("channel", f.channel, kOptional,
-         "name of the sensor or actuator; if omitted, the last four kinds act on all");
-  const bool needs_channel =
-      f.fault.kind == Kind::dead_sensor || f.fault.kind == Kind::nan_sensor ||
-      f.fault.kind == Kind::stuck_actuator || f.fault.kind == Kind::stuck_sensor;
-  v.require(!needs_channel || !f.channel.empty(), "channel",
+         "name of the sensor or actuator; if omitted, kinds with a value act on all");
+  f.fault.channel = -1;
+  count(v, "mode", f.fault.channel, -1, std::numeric_limits<int>::max(), kOptional,
+        "mode_frequency, mode_damping: 0 to 5 for x y z Rx Ry Rz on the suspension, then flexible "
+        "modes of the plate by frequency, then in_plane_modes; -1: all flexible modes");
+  const FaultTraits traits = fault_traits(f.fault.kind);
+  const bool of_mode = traits.target == FaultTarget::mode;
+  const bool of_channel =
+      traits.target == FaultTarget::sensor || traits.target == FaultTarget::actuator;
+  v.require(!of_channel || traits.may_be_all || !f.channel.empty(), "channel",
             "a fault of this kind needs 'channel: NAME'");
+  v.require(!of_mode || f.channel.empty(), "channel",
+            "channel: a fault of this kind acts on a mode; write 'mode: NUMBER'");
+  v.require(of_mode || f.fault.channel == -1, "mode",
+            "mode: a fault of this kind does not act on a mode; remove the key");
   count(v, "from_cycle", f.fault.from_cycle, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
         "cycle of the run, 0-based");
   count(v, "cycles", f.fault.cycles, 1, std::numeric_limits<std::int64_t>::max(), kOptional,
         "missed_cycle: number of cycles");
   v.number("value", f.fault.value, any_number(""), kOptional,
-           "sensor_offset: m; sensor_drift: m/s; actuator_gain: factor, -1 reversed, 0 dead; "
+           "sensor_offset: m; sensor_drift: m/s; actuator_gain, sensor_gain: factor, -1 reversed, "
+           "0 dead; sensor_noise: factor; mode_frequency, mode_damping: relative change; "
            "extra_delay: samples");
+  v.number("ramp_s", f.fault.ramp_s, not_negative("s"), kOptional,
+           "the change grows linearly over this time; 0: a step");
+  v.require(f.fault.ramp_s == 0.0 || traits.may_ramp, "ramp_s",
+            "ramp_s: a fault of this kind cannot be gradual; remove the key");
   v.require(f.fault.kind != Kind::extra_delay || f.fault.value >= 1.0, "value",
             "value: extra_delay needs at least 1 sample");
   count(v, "run", f.fault.run, -1, 1000000, kOptional, "0-based; -1: every run");
@@ -352,7 +367,7 @@ void describe_stage_file(ConfigVisitor& v, StageFile& f) {
       config.backend == Backend::plugin ? kRequired : kOptional,
       "a user-written back end, see docs/plugins.md");
   items(v, "faults", describe_fault, f.faults, {}, kOptional,
-        "injected faults, to test the safety functions");
+        "injected faults and changes of the plant, to test the safety functions and monitoring");
   v.group(
       "can",
       [&](ConfigVisitor& can) {

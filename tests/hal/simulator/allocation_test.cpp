@@ -71,6 +71,10 @@ TEST_F(Allocation, ACycleWithEveryOptionHasNone) {
                             {Kind::missed_cycle, 0, 200, 5, -1},
                             {Kind::dead_sensor, 4, 300, 1, -1},
                             {Kind::nan_sensor, 0, 400, 1, -1},
+                            {Kind::sensor_gain, -1, 500, 1, -1, 1.01, 0.02},
+                            {Kind::sensor_noise, -1, 500, 1, -1, 2.0, 0.02},
+                            {Kind::mode_frequency, -1, 500, 1, -1, -0.01, 0.02},
+                            {Kind::mode_damping, 6, 600, 1, -1, 0.5},
                             {Kind::interlock, 0, 1500, 1, -1}};
   int seen = 0;
   EXPECT_EQ(cycles(spec, seen), 0U);

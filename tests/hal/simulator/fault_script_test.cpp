@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -135,6 +137,95 @@ TEST_F(FaultTest, ActuatorsGiveAMultipleOfTheirForce) {
     const double gain = n < 4 ? 1.0 : -1.0;
     EXPECT_EQ(step({0.5, 1.0 + n}, {gain * 0.5, gain * (1.0 + n)}), Outcome::ok);
     EXPECT_EQ(faulty_->y, healthy_->y);
+  }
+}
+
+// Full at the 4th sample after cycle 2: y[2] is the last without the fault.
+TEST_F(FaultTest, ASensorGainGrows) {
+  test::SimulatedSpec spec = with_value(Kind::sensor_gain, 1, 2, 0.6);
+  spec.simulation.faults[0].ramp_s = 4.0 / spec.info.sample_rate_hz;
+  begin(spec);
+  for (int n = 0; n < 10; ++n) {
+    EXPECT_EQ(step(1.0, -1.0), Outcome::ok);
+    EXPECT_EQ(faulty_->y[0], healthy_->y[0]);
+    const double gain = 1.0 - 0.4 * std::clamp((n - 1) / 4.0, 0.0, 1.0);
+    EXPECT_DOUBLE_EQ(faulty_->y[1], gain * healthy_->y[1]) << n;
+  }
+}
+
+TEST_F(FaultTest, AnActuatorGainGrows) {
+  test::SimulatedSpec spec = with_value(Kind::actuator_gain, 1, 2, 0.6);
+  spec.simulation.faults[0].ramp_s = 4.0 / spec.info.sample_rate_hz;
+  begin(spec);
+  for (int n = 0; n < 10; ++n) {
+    const double gain = 1.0 - 0.4 * std::clamp((n - 1.5) / 4.0, 0.0, 1.0);
+    EXPECT_EQ(step({0.5, 1.0 + n}, {0.5, gain * (1.0 + n)}), Outcome::ok);
+    for (std::size_t i : {0U, 1U})
+      EXPECT_NEAR(faulty_->y[i], healthy_->y[i], 1e-14 * std::abs(healthy_->y[i])) << n;
+  }
+}
+
+// White and coloured noise, of one sensor and of all: the same numbers, three times as large.
+TEST(SensorNoise, IsMultiplied) {
+  for (const int channel : {1, -1}) {
+    test::SimulatedSpec spec = with_value(Kind::sensor_noise, channel, 5, 3.0);
+    spec.simulation.sensor_noise_m = 1e-3;
+    spec.simulation.sensor_noise_coloured_m = 2e-3;
+    Bench loud(spec);
+    spec.simulation.faults.clear();
+    Bench usual(spec);
+    loud.start();
+    usual.start();
+    for (int n = 0; n < 20; ++n) {
+      EXPECT_EQ(loud.step(), Outcome::ok);
+      EXPECT_EQ(usual.step(), Outcome::ok);
+      for (int i : {0, 1}) {
+        const auto sensor = static_cast<std::size_t>(i);
+        const double factor = n >= 5 && (channel == -1 || channel == i) ? 3.0 : 1.0;
+        EXPECT_DOUBLE_EQ(loud.y[sensor], factor * usual.y[sensor]) << n;
+      }
+    }
+  }
+}
+
+void refuses_fault(
+    const SimulationSpec::Fault& fault, const std::string& text,
+    const std::function<void(PlantSpec&)>& change = [](PlantSpec&) {}) {
+  test::SimulatedSpec spec = with_fault(Kind::none, 0, 0);
+  spec.simulation.faults = {fault};
+  change(spec.plant);
+  EXPECT_THAT([&] { test::simulated(spec); }, test::refuses<std::invalid_argument>(text));
+}
+
+TEST(Faults, ThatCannotBe) {
+  const auto of = [](Kind kind, int channel, double value, double ramp_s = 0.0) {
+    return SimulationSpec::Fault{kind, channel, 0, 1, -1, value, ramp_s};
+  };
+  refuses_fault(of(Kind::mode_frequency, 7, 0.1), "mode 7 is out of range; allowed: 0 to 6");
+  refuses_fault(of(Kind::mode_frequency, -2, 0.1), "mode -2 is out of range");
+  refuses_fault(of(Kind::mode_frequency, 6, -1.0), "frequency of mode 6 would be 0 Hz");
+  refuses_fault(of(Kind::mode_frequency, 2, 0.1), "frequency of mode 2 would be 0 Hz",
+                [](PlantSpec& plant) { plant.suspension_hz[2] = 0.0; });
+  refuses_fault(of(Kind::mode_frequency, -1, 0.1), "no flexible mode",
+                [](PlantSpec& plant) { plant.flexible_modes = 0; });
+  refuses_fault(of(Kind::mode_damping, 6, -1.5), "damping ratio of mode 6 would be -0.01");
+  refuses_fault(of(Kind::mode_damping, -1, 49.0), "damping ratio of mode 6 would be 1;");
+  refuses_fault(of(Kind::sensor_gain, 2, 1.1), "channel 2 is out of range; there are 2 sensors");
+  refuses_fault(of(Kind::sensor_noise, -1, -1.0), "sensor_noise is -1");
+  refuses_fault(of(Kind::sensor_gain, -1, 1.1, -1.0), "ramp_s is -1");
+  refuses_fault(of(Kind::sensor_drift, -1, 1.0, 1.0), "sensor_drift cannot be gradual");
+  refuses_fault(of(Kind::dead_sensor, 0, 0.0, 1.0), "dead_sensor cannot be gradual");
+}
+
+// One sample more after every second cycle.
+TEST_F(FaultTest, AnExtraDelayGrowsInWholeSamples) {
+  test::SimulatedSpec spec = with_value(Kind::extra_delay, -1, 4, 2.0);
+  spec.simulation.faults[0].ramp_s = 4.0 / spec.info.sample_rate_hz;
+  begin(spec);
+  for (int n = 0; n < 12; ++n) {
+    const int samples = n < 6 ? 0 : n < 8 ? 1 : 2;
+    EXPECT_EQ(step({1.0 + n, -1.0}, {1.0 + n - samples, -1.0}), Outcome::ok);
+    EXPECT_EQ(faulty_->y, healthy_->y) << n;
   }
 }
 

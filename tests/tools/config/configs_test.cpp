@@ -60,6 +60,39 @@ TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
   EXPECT_TRUE(link_loads(load_stage_config(kConfigs / "stage/small_stage.yaml")).empty());
 }
 
+TEST(Configs, AFaultIsReadWithItsChannelOrMode) {
+  using Kind = SimulationSpec::Fault::Kind;
+  const std::filesystem::path file = kConfigs / "stage/small_stage.yaml";
+  const auto faults =
+      parse_stage_config(
+          file,
+          load_stage_config(file).text +
+              "\nfaults:\n"
+              "  - {kind: mode_frequency, mode: 6, from_cycle: 2000, value: -0.02, ramp_s: 5}\n"
+              "  - {kind: mode_damping, value: 0.5}\n"
+              "  - {kind: sensor_gain, channel: s2, value: 1.1, run: 1}\n"
+              "  - {kind: sensor_noise, value: 3}\n"
+              "  - {kind: actuator_gain, channel: a2, value: 0.9, ramp_s: 0.5}\n",
+          "")
+          .simulation.faults;
+  ASSERT_EQ(faults.size(), 5U);
+  EXPECT_EQ(faults[0].kind, Kind::mode_frequency);
+  EXPECT_EQ(faults[0].channel, 6);
+  EXPECT_EQ(faults[0].from_cycle, 2000U);
+  EXPECT_EQ(faults[0].value, -0.02);
+  EXPECT_EQ(faults[0].ramp_s, 5.0);
+  EXPECT_EQ(faults[1].kind, Kind::mode_damping);
+  EXPECT_EQ(faults[1].channel, -1);
+  EXPECT_EQ(faults[1].ramp_s, 0.0);
+  EXPECT_EQ(faults[2].kind, Kind::sensor_gain);
+  EXPECT_EQ(faults[2].channel, 1);
+  EXPECT_EQ(faults[2].run, 1);
+  EXPECT_EQ(faults[3].kind, Kind::sensor_noise);
+  EXPECT_EQ(faults[3].channel, -1);
+  EXPECT_EQ(faults[4].channel, 1);
+  EXPECT_EQ(faults[4].ramp_s, 0.5);
+}
+
 // Otherwise the node stops the stage before the host has sent a lost frame again.
 TEST(Configs, TheWatchdogOutlastsARepetition) {
   const std::filesystem::path file = kConfigs / "stage/small_stage_can.yaml";

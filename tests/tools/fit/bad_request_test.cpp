@@ -92,6 +92,9 @@ TEST_F(BadRequest, StageFiles) {
   wrong("Ry: *loop", "Rx: *loop", "stage_bad.yaml: ");  // no sensor observes Rx
   wrong("[-0.26, 0, 0]", "[-2.6, 0, 0]", "is not on the plate");
   wrong("noise:", "faults: [{kind: extra_delay}]\nnoise:", "extra_delay needs at least 1 sample");
+  wrong("noise:", "faults: [{kind: mode_damping, channel: s1}]\nnoise:", "write 'mode: NUMBER'");
+  wrong("noise:", "faults: [{kind: sensor_gain, mode: 6}]\nnoise:", "does not act on a mode");
+  wrong("noise:", "faults: [{kind: sensor_drift, ramp_s: 1}]\nnoise:", "cannot be gradual");
   wrong("window_m: 1e-3}", "window_m: 1e-3, hard_window_m: 9e-4}", "is less than window_m");
   wrong("crossover_hz: 20,", "crossover_hz: 20, emergency: stop,", "emergency");
 }
