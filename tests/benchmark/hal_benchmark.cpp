@@ -51,8 +51,7 @@ void noise_sample(benchmark::State& state) {
 }
 BENCHMARK(noise_sample);
 
-void limited_closed_loop_cycle(benchmark::State& state) {
-  const test::SimulatedSpec spec = test::wafer_stage_spec();
+void closed_loop_cycle(benchmark::State& state, const test::SimulatedSpec& spec) {
   LimitedStage stage(test::simulated(spec), spec.limits);
   MotionController controller(spec.controller);
   std::vector<double> y(7);
@@ -71,7 +70,18 @@ void limited_closed_loop_cycle(benchmark::State& state) {
       benchmark::Counter(static_cast<double>(state.iterations()) / spec.info.sample_rate_hz,
                          benchmark::Counter::kIsRate);
 }
+
+void limited_closed_loop_cycle(benchmark::State& state) {
+  closed_loop_cycle(state, test::wafer_stage_spec());
+}
 BENCHMARK(limited_closed_loop_cycle);
+
+void cycle_in_a_ramp_of_all_modes(benchmark::State& state) {
+  test::SimulatedSpec spec = test::wafer_stage_spec();
+  spec.simulation.faults = {{SimulationSpec::Fault::Kind::mode_frequency, -1, 0, 1, -1, 1e-3, 1e6}};
+  closed_loop_cycle(state, spec);
+}
+BENCHMARK(cycle_in_a_ramp_of_all_modes);
 
 }  // namespace
 
