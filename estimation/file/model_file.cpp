@@ -211,6 +211,12 @@ FitRecord fit_from_json(const JsonNode& node) {
           fmt::format("must be one of {}", fmt::join(words_of<FitStatus>(), ", ")));
   }
   fit.message = node.text_or_empty("message");
+  for (const JsonNode& reason : node.elements_of("reasons")) {
+    const auto status = from_word<FitStatus>(reason.text_or_empty("status"));
+    fit.reasons.push_back({status.value_or(fit.status.value_or(FitStatus::unexplained)),
+                           reason.text_or_empty("what"), reason.text_or_empty("remedy"),
+                           reason.text_or_empty("flags")});
+  }
   fit.relative_rms_error =
       node.number_or("relative_rms_error", std::numeric_limits<double>::quiet_NaN());
   if (node.has("band_hz")) {
@@ -261,6 +267,11 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
                  {"seconds", model.fit.seconds}};
   if (!model.fit.trustworthy() && !model.fit.message.empty())
     root["fit"]["message"] = model.fit.message;
+  for (const FitReason& reason : model.fit.reasons)
+    root["fit"]["reasons"].push_back({{"status", to_string(reason.status)},
+                                      {"what", reason.what},
+                                      {"remedy", reason.remedy},
+                                      {"flags", reason.flags}});
   if (std::isfinite(model.fit.relative_rms_error))
     root["fit"]["relative_rms_error"] = model.fit.relative_rms_error;
   root["cost_history"] = model.cost_history;

@@ -1,5 +1,8 @@
 #include "estimation/model/fit_record.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace stageid {
 namespace {
 
@@ -25,19 +28,31 @@ int gravity(std::optional<FitStatus> status) noexcept {
   }
 }
 
+/// In a message; smaller comes first.
+int rank_of(const FitReason& reason) noexcept {
+  const int rank = -gravity(reason.status);
+  const bool by_user_or_data = rank <= -gravity(FitStatus::faulty_data);
+  return reason.flags.empty() || by_user_or_data ? rank : -gravity(FitStatus::faulty_data) + 1;
+}
+
 }  // namespace
 
 bool FitRecord::trustworthy() const noexcept { return gravity(status) == 0; }
 
-void FitRecord::distrust(FitStatus why, const std::string& reason) {
-  const bool graver = gravity(why) > gravity(status);
-  if (trustworthy())
-    message = reason;
-  else if (graver)
-    message = reason + "; " + message;
-  else
-    message += "; " + reason;
-  if (graver) status = why;
+std::vector<FitReason> FitRecord::why() const {
+  if (!reasons.empty() || trustworthy()) return reasons;
+  return {{*status, message.empty() ? "the fit ended with status " + status_word() : message}};
+}
+
+void FitRecord::distrust(FitReason reason) {
+  reasons = why();
+  if (gravity(reason.status) > gravity(status)) status = reason.status;
+  const bool known = !reason.flags.empty() &&
+                     std::ranges::find(reasons, reason.flags, &FitReason::flags) != reasons.end();
+  if (!known) reasons.push_back(std::move(reason));
+  std::ranges::stable_sort(reasons, {}, rank_of);
+  message.clear();
+  for (const FitReason& one : reasons) message += (message.empty() ? "" : "; ") + one.text();
 }
 
 }  // namespace stageid

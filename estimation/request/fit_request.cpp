@@ -258,6 +258,46 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
   return request;
 }
 
+/// The members that are set, as flags of `stageid fit` with their values.
+nlohmann::ordered_json flags_of(const FitRequest& request) {
+  using Kind = ModesRequest::Kind;
+  nlohmann::ordered_json flags = nlohmann::ordered_json::object();
+  if (request.band_hz)
+    flags["--band"] = fmt::format("{} {}", (*request.band_hz)[0], (*request.band_hz)[1]);
+  if (request.modes.kind == Kind::search) flags["--modes"] = "auto";
+  if (request.modes.kind == Kind::none) flags["--modes"] = "none";
+  if (request.modes.kind == Kind::count) flags["--modes"] = fmt::format("{}", request.modes.count);
+  if (request.modes.kind == Kind::given) {
+    std::vector<double> frequency_hz;
+    for (const ModeCandidate& mode : request.modes.given) frequency_hz.push_back(mode.frequency_hz);
+    flags["--modes"] = fmt::format("{}", fmt::join(frequency_hz, ","));
+  }
+  if (request.weighting)
+    flags["--weighting"] = *request.weighting == Weighting::user
+                               ? request.weight_file.filename().string()
+                               : to_string(*request.weighting);
+  if (request.hold) flags["--hold"] = to_string(*request.hold);
+  if (request.delay)
+    flags["--delay"] = request.delay->model == DelayModel::fixed
+                           ? fmt::format("{}", request.delay->delay_s)
+                           : to_string(request.delay->model);
+  if (request.rigid_body.kind != RigidBodyRequest::Kind::by_submodels)
+    flags["--rigid-body"] = rigid_body_text(request);
+  if (request.residue_rank > 0) flags["--residue-rank"] = fmt::format("{}", request.residue_rank);
+  if (request.general_damping)
+    flags["--damping"] = *request.general_damping ? "general" : "proportional";
+  if (request.direct_term) flags["--direct-term"] = *request.direct_term ? "full" : "none";
+  for (const SubmodelRequest& submodel : request.submodels)
+    flags["--submodel"].push_back(submodel_text(submodel));
+  const FitRequest usual;
+  if (request.method != usual.method) flags["--method"] = to_string(request.method);
+  if (request.max_iterations != usual.max_iterations)
+    flags["--max-iterations"] = fmt::format("{}", request.max_iterations);
+  if (request.search_seconds != usual.search_seconds)
+    flags["--search-seconds"] = fmt::format("{}", request.search_seconds);
+  return flags;
+}
+
 /// Keys and words as on the command line, because model.json contains the request.
 std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
   using Json = nlohmann::ordered_json;
@@ -300,6 +340,7 @@ std::string provenance_of(const FitRequest& request, const FitSetup& setup) {
     add(o.user_weight_matrices);
     json["weights_fingerprint"] = fingerprint.hex();
   }
+  json["flags"] = flags_of(request);
   return json.dump();
 }
 

@@ -117,10 +117,7 @@ class AutomaticFit {
       evidence.alike = alike_modes(frf_, last, result);
     evidence.growth_ended = watch_.finding();
     evidence.delay_explains_more = watch_.by_delay();
-    if (cut_short) {
-      evidence.limit = options_.limit->status();
-      evidence.limit_message = limit_message(frf_, options_, result);
-    }
+    if (cut_short) evidence.limit = limit_reason(frf_, options_, result);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
     result.cost.insert(result.cost.begin(), history_.begin(), history_.end());

@@ -222,7 +222,7 @@ void judge(const FitProblem& problem, const FitParameters& beta, const Eigen::Ma
     reason = undetermined_poles(problem, beta, gn, covariance, judge_modes, result);
   }
   if (reason.empty()) return;
-  result.model.fit.distrust(FitStatus::undetermined, reason);
+  result.model.fit.distrust({FitStatus::undetermined, reason});
 }
 
 }  // namespace

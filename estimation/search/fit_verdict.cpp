@@ -62,32 +62,44 @@ std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) 
                                   : "with a standard deviation as large";
 }
 
+/// What the data do not support, in one sentence, and the details of each mode.
+struct ModeDoubt {
+  std::string what;
+  std::string details;
+};
+
 void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit,
-                 std::vector<std::string>& reasons) {
+                 std::vector<ModeDoubt>& doubts) {
   std::vector<std::string> places;
+  std::vector<std::string> frequencies;
   for (std::size_t i = 0; i < fit.model.submodels.size(); ++i) {
     Submodel& s = fit.model.submodels[i];
     s.verdict.reset();
     if (!s.is_mode()) continue;
     s.verdict = mode_verdict(frf, evidence.number, fit, i);
-    if (is_unsupported(*s.verdict))
-      places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
-                                   s.damping_ratio(), reason_of(fit, i, *s.verdict)));
+    if (!is_unsupported(*s.verdict)) continue;
+    frequencies.push_back(fmt::format("{:.6g}", s.natural_frequency_hz()));
+    places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
+                                 s.damping_ratio(), reason_of(fit, i, *s.verdict)));
   }
   // Modes that were requested as a list have been judged by the fit itself.
   if (!places.empty() && evidence.number != ModeNumber::given)
-    reasons.push_back(
-        fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
-                    "the cost as much; do not interpret them as resonances",
-                    listed(places, kNamed)));
+    doubts.push_back(
+        {fmt::format("the data do not support the modes at {} Hz: a mode placed anywhere would "
+                     "lower the cost as much",
+                     listed(frequencies, kNamed)),
+         fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
+                     "the cost as much; do not interpret them as resonances",
+                     listed(places, kNamed))});
   for (const AlikeModes& pair : evidence.alike) {
     Submodel& one = fit.model.submodels[pair.first];
     Submodel& other = fit.model.submodels[pair.second];
     one.verdict = other.verdict = ModeVerdict::coincident;
-    reasons.push_back(fmt::format(
+    const std::string what = fmt::format(
         "the data do not distinguish the modes at {:.6g} and {:.6g} Hz: one mode fits as well "
-        "(BIC), cost {:.6g} -> {:.6g}; request fewer modes",
-        one.natural_frequency_hz(), other.natural_frequency_hz(), fit.model.fit.cost, pair.cost));
+        "(BIC), cost {:.6g} -> {:.6g}",
+        one.natural_frequency_hz(), other.natural_frequency_hz(), fit.model.fit.cost, pair.cost);
+    doubts.push_back({what, what + "; request fewer modes"});
   }
 }
 
@@ -157,35 +169,41 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
     fit.findings.push_back(text);
   };
   if (!evidence.low_ranks.empty()) tell(evidence.low_ranks);
-  std::vector<std::string> reasons;
+  std::vector<ModeDoubt> doubts;
+  const bool asked = evidence.number == ModeNumber::asked;
   // Without the delay, modes describe it; what the data say about them is of no use.
   if (fit.status() != FitStatus::singular && !evidence.delay_explains_more)
-    judge_modes(frf, evidence, fit, reasons);
-  for (const std::string& reason : reasons) {
-    tell(reason);
-    if (fit.trustworthy()) fit.model.fit.distrust(FitStatus::undetermined, reason);
+    judge_modes(frf, evidence, fit, doubts);
+  for (const ModeDoubt& doubt : doubts) {
+    tell(doubt.details);
+    if (fit.trustworthy())
+      fit.model.fit.distrust(
+          {FitStatus::undetermined, doubt.what,
+           asked ? "Let the fit choose the number of modes" : "Do not interpret them as resonances",
+           asked ? "--modes auto" : ""});
   }
   if (!evidence.growth_ended.empty()) {
     fit.findings.push_back(evidence.growth_ended);
     if (evidence.delay_explains_more) {
       // Without the delay, a fit need not converge; that is not the reason.
-      if (fit.status() == FitStatus::iteration_limit)
-        fit.model.fit.status = FitStatus::gradient_small;
-      fit.model.fit.distrust(FitStatus::unexplained, evidence.growth_ended);
+      if (fit.status() != FitStatus::singular) fit.model.fit.status = FitStatus::gradient_small;
+      fit.model.fit.distrust(
+          {FitStatus::unexplained, evidence.growth_ended, "", "--delay estimate"});
     }
   }
   if (evidence.limit) {
-    fit.decisions.push_back(evidence.limit_message);
-    if (*evidence.limit == FitStatus::search_budget) fit.findings.push_back(evidence.limit_message);
+    fit.decisions.push_back(evidence.limit->text());
+    if (evidence.limit->status == FitStatus::search_budget)
+      fit.findings.push_back(evidence.limit->text());
     // The message of its own status is less helpful.
     if (ended_by_limit(fit)) fit.model.fit.status = FitStatus::gradient_small;
-    fit.model.fit.distrust(*evidence.limit, evidence.limit_message);
+    fit.model.fit.distrust(*evidence.limit);
   }
   if (!evidence.late_channels.empty()) tell(evidence.late_channels);
-  if (!evidence.unexplained.empty()) {
-    fit.decisions.push_back(evidence.unexplained);
-    fit.findings.insert(fit.findings.begin(), evidence.unexplained);
-    fit.model.fit.distrust(FitStatus::unexplained, evidence.unexplained);
+  if (evidence.unexplained) {
+    fit.decisions.push_back(evidence.unexplained->text());
+    fit.findings.insert(fit.findings.begin(), evidence.unexplained->text());
+    fit.model.fit.distrust(*evidence.unexplained);
   }
 }
 

@@ -32,10 +32,9 @@ struct FitEvidence {
   std::string low_ranks = {};           ///< residues need a higher rank than requested
   std::string growth_ended = {};        ///< why the search stopped adding modes early
   bool delay_explains_more = false;     ///< that reason
-  std::optional<FitStatus> limit = {};  ///< the search was interrupted or reached its budget
-  std::string limit_message = {};
+  std::optional<FitReason> limit = {};  ///< the search was interrupted or reached its budget
   std::string late_channels = {};
-  std::string unexplained = {};  ///< noise and known distortion do not explain the residual
+  std::optional<FitReason> unexplained = {};  ///< by noise and known distortion
 };
 
 /// The largest standard deviation of a pole: of its damping ratio relative to itself, or of its frequency relative to

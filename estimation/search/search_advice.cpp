@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/proposed_modes.hpp"
+#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/search/trial_options.hpp"
 
@@ -24,6 +27,8 @@ constexpr double kSmallEnd = 0.25;   // of the lines
 constexpr double kMoreBudget = 4.0;  // factor for the next budget to try
 constexpr double kNoiseOnly = 2.0;   // |G|^2 over its variance: the response is below the noise
 constexpr double kMostLines = 0.5;
+constexpr int kRounds = 4;  // of refits with missing modes
+constexpr std::size_t kMostNamed = 8;
 
 /// The names of inputs or outputs whose entries are all noise on most lines.
 std::vector<std::string> silent_channels(const FrfEstimate& frf, bool inputs) {
@@ -62,10 +67,68 @@ std::string without_silent_channels(const FrfEstimate& frf) {
   return {};
 }
 
-std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
-                             const FitOptions& trial, const FitResult& same, bool cut_short) {
+/// The model with the modes that its residual shows, as long as each is worth its parameters.
+/// @param together modes added by one refit
+FitResult with_missing_modes(const FrfEstimate& frf, const FitOptions& trial, const FitResult& same,
+                             int rounds, std::size_t together) {
+  FitResult out = same;
+  for (int round = 0; round < rounds; ++round) {
+    const ModelStructure structure = structure_of(out.model);
+    const double price = ModeWorth(frf, structure, trial.user_weights).price(out);
+    AdditiveModel model = out.model;
+    for (const ProposedMode& missed :
+         proposed_modes(frf, out.model, trial.user_weights, together, trial.threads))
+      if (missed.gain > price) model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
+    if (model.submodels.size() == out.model.submodels.size()) break;
+    FitResult fit = fit_additive_model(frf, model, trial);
+    if (fit.status() == FitStatus::singular ||
+        !(information_criterion(frf, fit) < information_criterion(frf, out)))
+      break;
+    out = std::move(fit);
+  }
+  return out;
+}
+
+/// "422.217, 488.232 Hz": the modes that `more` has beside those of a model with `known` submodels.
+std::string missing_frequencies(const FrfEstimate& frf, const FitOptions& trial,
+                                const FitResult& more, std::size_t known) {
+  const double price = ModeWorth(frf, structure_of(more.model), trial.user_weights).price(more);
+  const std::vector<Submodel>& all = more.model.submodels;
+  std::vector<std::size_t> found;
+  for (std::size_t i = known; i < all.size(); ++i)
+    if (const double f = all[i].natural_frequency_hz(); more.removal_cost[i] > price &&
+                                                        f >= frf.frequency_hz[0] &&
+                                                        f <= frf.frequency_hz[frf.lines() - 1])
+      found.push_back(i);
+  std::ranges::sort(found, std::ranges::greater(),
+                    [&](std::size_t i) { return more.removal_cost[i]; });
+  std::vector<double> places_hz;
+  for (const std::size_t i : found) {
+    const double f = all[i].natural_frequency_hz();
+    const auto splits = [&](double other) {  // one resonance: within its half-power width
+      return std::abs(f - other) < 2.0 * all[i].damping_ratio() * f;
+    };
+    if (places_hz.size() < kMostNamed && std::ranges::none_of(places_hz, splits))
+      places_hz.push_back(f);
+  }
+  std::ranges::sort(places_hz);
+  std::vector<std::string> places;
+  for (const double f : places_hz) places.push_back(fmt::format("{:.4g}", f));
+  return places.empty() ? "" : fmt::format("{} Hz", fmt::join(places, ", "));
+}
+
+void advise_structure(const FrfEstimate& frf, const FitOptions& options, const FitOptions& trial,
+                      const FitResult& same, ModeNumber number, bool cut_short, FitReason& reason) {
   double least = information_criterion(frf, same);
-  std::string advice;
+  const auto advise = [&](const FitResult& fit, const std::string& flags) {
+    const double criterion = information_criterion(frf, fit);
+    if (fit.status() == FitStatus::singular || !(criterion < least)) return false;
+    least = criterion;
+    reason.flags = flags;
+    reason.remedy = fmt::format("Try {}: one refit lowers the cost from {:.6g} to {:.6g}", flags,
+                                same.model.fit.cost, fit.model.fit.cost);
+    return true;
+  };
   const OpenStructure open{.rigid_body = true,
                            .direct_term = true,
                            .general_damping = options.residue_rank <= 1,
@@ -76,25 +139,23 @@ std::string better_structure(const FrfEstimate& frf, const FitOptions& options,
   std::erase_if(moves, [&](const StructureMove& move) {  // of other modes, not of the structure
     return count_modes(move.model) > count_modes(same.model);
   });
-  if (!cut_short)  // such a search would add modes in any case
-    for (const ProposedMode& missed :
-         proposed_modes(frf, same.model, trial.user_weights, 1, trial.threads)) {
-      moves.push_back({"more modes", same.model, trial});
-      moves.back().model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
-    }
-  for (const StructureMove& other : moves) {
-    const FitResult fit = fit_additive_model(frf, other.model, other.options);
-    const double criterion = information_criterion(frf, fit);
-    if (fit.status() == FitStatus::singular || !(criterion < least)) continue;
-    least = criterion;
-    advice = fmt::format("Try {}: one refit lowers the cost from {:.6g} to {:.6g}", other.flag,
-                         same.model.fit.cost, fit.model.fit.cost);
-  }
-  return advice;
+  for (const StructureMove& other : moves)
+    advise(fit_additive_model(frf, other.model, other.options), other.flag);
+  // A search for the number of modes has tried them.
+  if (cut_short || number == ModeNumber::chosen) return;
+  // One mode more competes with one other change of the structure: any number of modes imitates anything.
+  if (!advise(with_missing_modes(frf, trial, same, 1, 1), "--modes auto")) return;
+  const FitResult more = with_missing_modes(frf, trial, same, kRounds, kTried);
+  const std::string places = missing_frequencies(frf, trial, more, same.model.submodels.size());
+  reason.remedy =
+      fmt::format("Try {}: a refit with more modes lowers the cost from {:.6g} to {:.6g}",
+                  reason.flags, same.model.fit.cost, more.model.fit.cost);
+  if (!places.empty()) reason.what += ": modes are missing at " + places;
 }
 
 /// The band without its worse end, if the smaller part of the lines has the larger part of the cost.
-std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit) {
+void advise_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit,
+                 FitReason& reason) {
   const Eigen::MatrixXcd error =
       frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
   const Eigen::VectorXd squares =
@@ -102,25 +163,24 @@ std::string better_band(const FrfEstimate& frf, const FitOptions& trial, const F
   const auto end = static_cast<Eigen::Index>(kSmallEnd * static_cast<double>(frf.lines()));
   const double most = kMostOfCost * squares.sum();
   const Eigen::Index last = frf.lines() - 1;
-  if (end < 1) return {};
-  const auto advice = [&](double low_hz, double high_hz, const char* which) {
-    return fmt::format(
-        "The {} quarter of the lines causes most of the cost: try --band {:.6g} {:.6g}", which,
-        low_hz, high_hz);
+  if (end < 1) return;
+  const auto advise = [&](double low_hz, double high_hz, const char* which) {
+    reason.flags = fmt::format("--band {:.6g} {:.6g}", low_hz, high_hz);
+    reason.remedy = fmt::format("The {} quarter of the lines causes most of the cost: try {}",
+                                which, reason.flags);
   };
   if (squares.head(end).sum() > most)
-    return advice(frf.frequency_hz[end], frf.frequency_hz[last], "lowest");
-  if (squares.tail(end).sum() > most)
-    return advice(frf.frequency_hz[0], frf.frequency_hz[last - end], "highest");
-  return {};
+    advise(frf.frequency_hz[end], frf.frequency_hz[last], "lowest");
+  else if (squares.tail(end).sum() > most)
+    advise(frf.frequency_hz[0], frf.frequency_hz[last - end], "highest");
 }
 
 }  // namespace
 
-std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit,
-                       bool cut_short) {
-  std::string advice = without_silent_channels(frf);
-  if (!advice.empty()) return advice;
+FitReason with_advice(FitReason reason, const FrfEstimate& frf, const FitOptions& options,
+                      const FitResult& fit, ModeNumber number, bool cut_short) {
+  reason.remedy = without_silent_channels(frf);
+  if (!reason.remedy.empty()) return reason;
   FitOptions trial = trial_options(frf, options);
   trial.limit.reset();
   // In a search that ended early, poles have not converged.
@@ -128,20 +188,24 @@ std::string advice_for(const FrfEstimate& frf, const FitOptions& options, const 
   with_deviations.uncertainty = true;
   with_deviations.response_variance = false;
   const FitResult same = fit_additive_model(frf, fit.model, with_deviations);
-  advice = better_structure(frf, options, trial, same, cut_short);
-  if (advice.empty()) advice = better_band(frf, trial, same);
-  if (!advice.empty()) return advice;
-  return "No other structure fits better: give the number of modes with --modes N";
+  advise_structure(frf, options, trial, same, number, cut_short, reason);
+  if (reason.flags.empty()) advise_band(frf, trial, same, reason);
+  if (reason.flags.empty())
+    reason.remedy = "No other structure fits better: give the number of modes with --modes N";
+  return reason;
 }
 
-std::string limit_message(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
-  if (options.limit->was_interrupted() || fit.status() == FitStatus::singular)
-    return options.limit->message();
+FitReason limit_reason(const FrfEstimate& frf, const FitOptions& options, const FitResult& fit) {
+  FitReason reason{options.limit->status(), options.limit->message()};
+  if (options.limit->was_interrupted() || fit.status() == FitStatus::singular) return reason;
   const double budget_s = options.limit->budget_s();
-  return fmt::format(
-      "the search reached its budget of {:.6g} s at {}. {}; continue with --search-seconds {:.6g}",
-      budget_s, counted(count_modes(fit.model), "mode"), advice_for(frf, options, fit, true),
-      kMoreBudget * budget_s);
+  reason.what = fmt::format("the search reached its budget of {:.6g} s at {}", budget_s,
+                            counted(count_modes(fit.model), "mode"));
+  reason = with_advice(std::move(reason), frf, options, fit, ModeNumber::chosen, true);
+  const std::string longer = fmt::format("--search-seconds {:.6g}", kMoreBudget * budget_s);
+  reason.remedy += "; continue with " + longer;
+  reason.flags += (reason.flags.empty() ? "" : " ") + longer;
+  return reason;
 }
 
 }  // namespace stageid

@@ -190,9 +190,10 @@ void check_requests(const FrfEstimate& frf, const RequestedStructure& structure)
           frequency_hz, frf.frequency_hz[0]));
 }
 
-/// Why the residual is clearly larger than noise and known distortion, with advice; else empty.
-std::string why_unexplained(const FrfEstimate& frf, const FitOptions& options, bool cut_short,
-                            const FitResult& result) {
+/// Why the residual is clearly larger than noise and known distortion, with advice; else nothing.
+std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOptions& options,
+                                         ModeNumber number, bool cut_short,
+                                         const FitResult& result) {
   const auto lines = [&](Eigen::Index first, Eigen::Index count) {
     return response(result.model, frf.frequency_hz.segment(first, count), result.model.hold);
   };
@@ -201,13 +202,16 @@ std::string why_unexplained(const FrfEstimate& frf, const FitOptions& options, b
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);
-  if (verdict.explained && by_weights) return {};
+  if (verdict.explained && by_weights) return std::nullopt;
   if (verdict.explained)
-    return "the residual is explained by the scatter of the realizations, but not by the noise "
-           "used as weight: use --weighting total_variance";
-  if (cut_short) return verdict.reason + ": the model does not explain the data";
-  return fmt::format("{}: the model does not explain the data. {}", verdict.reason,
-                     advice_for(frf, options, result, false));
+    return FitReason{FitStatus::unexplained,
+                     "the residual is explained by the scatter of the realizations, but not by the "
+                     "noise used as weight",
+                     "Use --weighting total_variance", "--weighting total_variance"};
+  FitReason reason{FitStatus::unexplained, verdict.reason};
+  if (!cut_short) reason = with_advice(std::move(reason), frf, options, result, number, false);
+  if (reason.what == verdict.reason) reason.what += ": the model does not explain the data";
+  return reason;
 }
 
 }  // namespace
@@ -241,11 +245,10 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
     evidence.late_channels = late_channels(result.model);
   // An interrupt between two fits has shortened the search as well.
   if (options.limit->was_interrupted() && !evidence.limit) {
-    evidence.limit = FitStatus::interrupted;
-    evidence.limit_message = options.limit->message();
+    evidence.limit = FitReason{FitStatus::interrupted, options.limit->message()};
   }
-  evidence.unexplained =
-      why_unexplained(frf, options, evidence.limit.has_value() || ended_by_limit(result), result);
+  evidence.unexplained = why_unexplained(
+      frf, options, evidence.number, evidence.limit.has_value() || ended_by_limit(result), result);
   judge(frf, evidence, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);

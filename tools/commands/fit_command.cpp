@@ -14,6 +14,7 @@
 #include "tools/fit/fit_words.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
+#include "tools/steps/model_verdict.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/output_paths.hpp"
 
@@ -77,26 +78,28 @@ void fit(const FitCommandFlags& flags, Console& console) {
                              result.message()));
   const bool whole = told || flags.covariance.empty();
   console.exit_code = fit_exit_code(result, whole);
-  console.result({{"output", flags.output.string()},
-                  {"status", to_string(result.status())},
-                  {"message", result.message()},
-                  {"trustworthy", result.trustworthy()},
-                  {"relative_rms_error", result.model.fit.relative_rms_error},
-                  {"cost", result.cost},
-                  {"decisions", result.decisions},
-                  {"findings", result.findings},
-                  {"modes", modes_json(result.model)},
-                  {"delays", delays_json(result.model)},
-                  {"seconds", step.seconds}});
+  ResultFiles files;
+  files.frf = flags.frf;
+  files.model = flags.output;
+  const ModelVerdict verdict = judge_model(result.model, {}, {}, {}, files);
+  nlohmann::ordered_json json = {{"output", flags.output.string()},
+                                 {"status", to_string(result.status())},
+                                 {"message", result.message()},
+                                 {"relative_rms_error", result.model.fit.relative_rms_error},
+                                 {"cost", result.cost},
+                                 {"decisions", result.decisions},
+                                 {"findings", result.findings},
+                                 {"modes", modes_json(result.model)},
+                                 {"delays", delays_json(result.model)},
+                                 {"seconds", step.seconds}};
+  json.update(verdict_json(verdict));
+  console.result(json);
   for (const std::string& finding : findings_beside_message(result))
     console.warning(fmt::format("{}: {}", flags.output.string(), finding));
   if (!whole)
     console.warning(fmt::format("{}: not written: {}", flags.covariance.string(),
                                 result.decisions.empty() ? "" : result.decisions.back()));
-  if (!result.trustworthy())
-    console.warning(fmt::format(
-        "{}: not to be trusted: {}. The model was written; do not use it until this is resolved.",
-        flags.output.string(), result.message()));
+  if (!verdict.trustworthy) warn_of(verdict.problems, flags.output, console);
 }
 
 }  // namespace

@@ -121,6 +121,9 @@ class Identification {
   };
 
   std::filesystem::path path(const char* name) const { return flags_.output / name; }
+  ResultFiles files() const {
+    return {config_.file, flags_.output, path("run.slog"), path("frf.h5"), path("model.json")};
+  }
   void add_notes(const std::vector<std::string>& more) {
     notes_.insert(notes_.end(), more.begin(), more.end());
   }
@@ -199,6 +202,7 @@ class Identification {
     // The fitted data are examined; the findings are stored in frf.h5.
     const bool fitted = realizations == fitted_realizations();
     FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
+    note_logs(step.frf, {log}, path(name));
     write_frf(path(name), step.frf);
     finish_step("frf", step.seconds,
                 fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),
@@ -265,7 +269,8 @@ class Identification {
       validation_ =
           validate(model_, select_band(*validation_frf_, low_hz, high_hz), distortion_of(model_));
     }
-    verdict_ = judge_model(model_, health_, validation_, open_log(path("run.slog"), false)->runs());
+    verdict_ = judge_model(model_, health_, validation_, open_log(path("run.slog"), false)->runs(),
+                           files());
     if (config_.stage.plant)
       truth_ =
           compare_with_truth(model_, setup_->frf, config_.stage.spec.info, *config_.stage.plant);
@@ -289,6 +294,7 @@ class Identification {
     input.log = path("run.slog");
     input.summary = path("summary.json");
     complete_report(report, input, summary_);
+    report.files = files();
     report.title = config_.stage.spec.info.name;
     write_report(path("report.html"), report);
   }
@@ -302,8 +308,6 @@ class Identification {
                  {"configuration", config_.file.filename().string()},
                  {"configuration_fingerprint", fingerprint_of(config_.text)},
                  {"stage_fingerprint", fingerprint_of(config_.stage.text)},
-                 {"trustworthy", verdict_.trustworthy},
-                 {"reasons", verdict_.reasons},
                  {"fit",
                   {{"status", model_.fit.status_word()},
                    {"weighting", model_.fit.weighting},
@@ -311,6 +315,7 @@ class Identification {
                    {"relative_rms_error", model_.fit.relative_rms_error},
                    {"band_hz", {model_.fit.band_hz[0], model_.fit.band_hz[1]}}}},
                  {"modes", modes_json(model_)}};
+    json.update(verdict_json(verdict_));
     json.update(quality_json(*frf_));
     if (validation_) json["validation"] = validation_json(*validation_);
     if (truth_) json["truth"] = truth_json(*truth_);
@@ -330,7 +335,7 @@ class Identification {
       for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
     }
     for (const std::string& note : notes_) console_.warning(note);
-    console_.result(verdict_line(verdict_));
+    for (const std::string& line : verdict_lines(verdict_)) console_.result(line);
     console_.result(fmt::format("report: {}", path("report.html").string()));
     console_.result(summary_);
   }

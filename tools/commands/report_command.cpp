@@ -1,7 +1,6 @@
 #include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -37,15 +36,10 @@ void report(const ReportFlags& flags, Console& console) {
   write_report(flags.output, data);
   console.result(fmt::format("wrote {}", flags.output.string()));
   const Verdict verdict = judge(data);
-  console.result({{"output", flags.output.string()},
-                  {"verdict",
-                   {{"level", to_string(verdict.level)},
-                    {"text", verdict.text},
-                    {"reasons", verdict.reasons}}}});
+  console.result({{"output", flags.output.string()}, {"verdict", verdict_json(verdict)}});
   if (verdict.level != Verdict::Level::bad) return;
   console.exit_code = kNotTrustworthy;
-  console.warning(fmt::format("{}: not to be trusted: {}", flags.output.string(),
-                              fmt::join(verdict.reasons, "; ")));
+  warn_of(verdict.problems, flags.output, console);
 }
 
 }  // namespace

@@ -129,8 +129,11 @@ void validate_model(const ValidateFlags& flags, Console& console) {
     for (const std::string& line : prediction_lines(error)) console.result(line);
     json["time_domain"] = prediction_json(error);
   }
-  const ModelVerdict verdict = judge_model(model, health, validation, runs);
-  console.result(verdict_line(verdict));
+  ResultFiles files;
+  files.model = flags.model;
+  if (!from_frf) files.log = flags.data;
+  const ModelVerdict verdict = judge_model(model, health, validation, runs, files);
+  for (const std::string& line : verdict_lines(verdict)) console.result(line);
   json.update(verdict_json(verdict));
   if (!verdict.trustworthy) console.exit_code = kNotTrustworthy;
   console.result(json);

@@ -235,6 +235,9 @@ void complete_report(ReportData& data, const ReportInput& input,
                      const nlohmann::ordered_json& summary) {
   complete_response(data);
   data.title = "stageid";
+  data.files.log = input.log;
+  data.files.frf = input.frf;
+  data.files.model = input.model;
   if (data.frf) {
     add_checks(data);
     add_stabilization(data);

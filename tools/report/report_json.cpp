@@ -258,8 +258,7 @@ PageContent page_content(const ReportData& data) {
                {"steps", data.steps},
                {"documents", data.documents}};
   const Verdict verdict = judge(data);
-  json["verdict"] = {
-      {"level", to_string(verdict.level)}, {"text", verdict.text}, {"reasons", verdict.reasons}};
+  json["verdict"] = verdict_json(verdict);
   json["title"] = data.title;
   json["version"] = version();
   json["decisions"] = data.model ? decisions_of(*data.model) : std::vector<std::string>();

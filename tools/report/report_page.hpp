@@ -15,6 +15,7 @@
 #include "frf/response/frf_estimate.hpp"
 #include "frf/response/nonlinearity.hpp"
 #include "hal/stage/stage.hpp"
+#include "tools/steps/problem.hpp"
 
 namespace stageid {
 
@@ -84,6 +85,7 @@ struct ReportData {
   std::vector<std::string> doubts;    ///< about the result, besides the findings; one line each
   std::vector<std::string> notes;     ///< about the page itself; one line each
   std::vector<ReportDocument> documents;
+  ResultFiles files;  ///< for the commands in the head
 };
 
 /// Writes one self-contained page, atomically: no network, no other file. Equal data give equal bytes. All external

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
+#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "tools/report/report_modes.hpp"
@@ -13,17 +16,6 @@ namespace stageid {
 namespace {
 
 using Reasons = std::vector<std::string>;
-
-/// @returns whether the model is trustworthy.
-bool judge_fit(const ReportData& data, Reasons& reasons) {
-  const ModelVerdict verdict = judge_model(*data.model, data.findings, data.validation, data.runs);
-  for (const std::string& reason : verdict.reasons) {
-    // Findings of the data are already reasons, without their remedy.
-    const auto said = [&](const std::string& other) { return reason.starts_with(other); };
-    if (std::ranges::none_of(reasons, said)) reasons.push_back(reason);
-  }
-  return verdict.trustworthy;
-}
 
 void judge_modes(const ReportData& data, Reasons& reasons) {
   if (data.true_modes.empty()) return;
@@ -47,15 +39,6 @@ void judge_modes(const ReportData& data, Reasons& reasons) {
   }
 }
 
-void add_findings(const ReportData& data, Reasons& reasons) {
-  for (const Finding& finding : data.findings) {
-    if (finding.severity == Severity::unchecked) continue;
-    reasons.push_back(fmt::format("{}{}{}{}", finding.channel, finding.channel.empty() ? "" : ": ",
-                                  finding.what,
-                                  finding.figure.empty() ? "" : " (" + finding.figure + ")"));
-  }
-}
-
 void judge_runs(const ReportData& data, Reasons& reasons) {
   const auto incomplete = std::ranges::count(data.runs, false, &LogRun::complete);
   if (incomplete > 0) reasons.push_back(counted(incomplete, "run is", "runs are") + " incomplete");
@@ -68,18 +51,30 @@ void judge_runs(const ReportData& data, Reasons& reasons) {
 Verdict judge(const ReportData& data) {
   Verdict verdict;
   bool trustworthy = !any_fault(data.findings);
-  add_findings(data, verdict.reasons);
-  verdict.reasons.insert(verdict.reasons.end(), data.doubts.begin(), data.doubts.end());
-  judge_runs(data, verdict.reasons);
   if (data.model) {
-    trustworthy = judge_fit(data, verdict.reasons);
-    judge_modes(data, verdict.reasons);
+    ModelVerdict model =
+        judge_model(*data.model, data.findings, data.validation, data.runs, data.files);
+    trustworthy = model.trustworthy;
+    verdict.problems = std::move(model.problems);
+  } else {
+    verdict.problems = problems_of(data.findings);
+    rank(verdict.problems);
+    add_commands(verdict.problems, data.files, data.frf ? data.frf->provenance_json : "", nullptr);
   }
+  const auto is_known = [&](const std::string& doubt) {
+    return std::ranges::any_of(verdict.problems, [&](const Problem& problem) {
+      return doubt.find(problem.what) != std::string::npos ||
+             problem.text().find(doubt) != std::string::npos;
+    });
+  };
+  std::ranges::copy_if(data.doubts, std::back_inserter(verdict.remarks), std::not_fn(is_known));
+  judge_runs(data, verdict.remarks);
+  if (data.model) judge_modes(data, verdict.remarks);
 
   if (!trustworthy) {
     verdict.level = Verdict::Level::bad;
     verdict.text = "Not to be trusted";
-  } else if (!verdict.reasons.empty()) {
+  } else if (!verdict.problems.empty() || !verdict.remarks.empty()) {
     verdict.level = Verdict::Level::doubt;
     verdict.text = data.model ? "Review these findings before using the model"
                               : "Review these findings before using the measurement";
@@ -92,6 +87,13 @@ Verdict judge(const ReportData& data) {
     verdict.text = data.frf ? "Measured frequency response, no model" : "No model";
   }
   return verdict;
+}
+
+nlohmann::ordered_json verdict_json(const Verdict& verdict) {
+  nlohmann::ordered_json json = {{"level", to_string(verdict.level)}, {"text", verdict.text}};
+  json.update(head_json(verdict.problems));
+  for (const std::string& remark : verdict.remarks) json["reasons"].push_back(remark);
+  return json;
 }
 
 }  // namespace stageid

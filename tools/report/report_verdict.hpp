@@ -7,6 +7,7 @@
 
 #include "excitation/words/words.hpp"
 #include "tools/report/report_page.hpp"
+#include "tools/steps/problem.hpp"
 
 namespace stageid {
 
@@ -20,13 +21,15 @@ struct Verdict {
   };
   Level level = Level::none;
   std::string text;
-  std::vector<std::string> reasons;
+  std::vector<Problem> problems;     ///< those of judge_model(), see rank()
+  std::vector<std::string> remarks;  ///< further reasons to look closer
 };
 template <>
 inline constexpr std::array kWords<Verdict::Level> = {"none", "good", "doubt", "bad"};
 
-/// Bad: judge_model() does not trust the model, or without a model the data have a fault. Doubts are the other reasons of
-/// judge_model(), incomplete runs, the truth if known (3 standard deviations and 1e-4) and the doubts of the job.
+/// Bad: judge_model() does not trust the model, or without a model the data have a fault. Remarks are incomplete runs,
+/// the truth if known (3 standard deviations and 1e-4) and the doubts of the job that no problem contains.
 Verdict judge(const ReportData& data);
+nlohmann::ordered_json verdict_json(const Verdict& verdict);
 
 }  // namespace stageid

@@ -10,8 +10,7 @@
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
-#include "frf/response/nonlinearity_sentence.hpp"
-#include "tools/steps/health_step.hpp"
+#include "tools/steps/problem.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -30,7 +29,7 @@ Json distortion_json(const Distortion& distortion) {
 }
 
 std::string provenance(const FitSetup& setup, const FitResult& result, const std::string& frf_name,
-                       const std::string& frf_fingerprint, const std::vector<std::string>& doubts) {
+                       const std::string& frf_fingerprint, const std::vector<Problem>& problems) {
   Json json;
   json["stageid_version"] = version();
   json["made_by"] = "fit";
@@ -38,7 +37,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   json["inputs"] = {{{"file", frf_name}, {"fingerprint", frf_fingerprint}}};
   json["options"] = Json::parse(setup.request_json);
   json["decisions"] = result.decisions;
-  if (!doubts.empty()) json["doubts"] = doubts;
+  if (!problems.empty()) json["problems"] = stored(problems);
   if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
   const Json frf = parse_json<Json>(setup.frf.provenance_json);
   json["frf"] = frf.is_discarded() ? Json::object() : frf;
@@ -63,14 +62,6 @@ std::vector<PoleEstimate> poles_of(const Submodel& s) {
   if (!s.is_mode()) return s.poles;
   return {{s.natural_frequency_hz(), s.damping_ratio(), s.natural_frequency_std_hz,
            s.damping_ratio_std}};
-}
-
-/// Known problems of an FRF, causes before their consequences: distortion can be fitted as modes.
-std::vector<std::string> doubts_about(const FrfEstimate& frf, const std::vector<Finding>& health) {
-  std::vector<std::string> doubts = health_notes(health, Severity::doubt);
-  if (std::string nonlinear = nonlinearity_sentence(frf); !nonlinear.empty())
-    doubts.push_back(std::move(nonlinear));
-  return doubts;
 }
 
 std::vector<std::string> texts_in(const Json& object, const char* key) {
@@ -99,17 +90,14 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
   step.result = fit_model(setup, options);
-  const std::vector<Finding> health = health_of(setup.frf.provenance_json);
-  const std::vector<std::string> doubts = doubts_about(setup.frf, health);
-  FitRecord& record = step.result.model.fit;
-  if (!doubts.empty() && !record.trustworthy())
-    record.message = fmt::format("{}; {}", fmt::join(doubts, "; "), record.message);
-  const std::vector<std::string> faults = health_notes(health, Severity::fault);
-  if (!faults.empty())
-    record.distrust(FitStatus::faulty_data, fmt::format("{}", fmt::join(faults, "; ")));
+  std::vector<Problem> problems = problems_of(setup.frf);
+  rank(problems);
+  for (const Problem& problem : problems)
+    if (problem.grave)
+      step.result.model.fit.distrust({FitStatus::faulty_data, problem.what, problem.remedy});
   step.seconds = progress.seconds();
   step.result.model.provenance_json =
-      provenance(setup, step.result, frf_name, frf_fingerprint, doubts);
+      provenance(setup, step.result, frf_name, frf_fingerprint, problems);
   return step;
 }
 
@@ -145,10 +133,6 @@ Distortion distortion_of(const AdditiveModel& model) {
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {
   return texts_in(parse_json<Json>(model.provenance_json), "decisions");
-}
-
-std::vector<std::string> doubts_of(const AdditiveModel& model) {
-  return texts_in(parse_json<Json>(model.provenance_json), "doubts");
 }
 
 std::string relative_error_text(const FitRecord& fit) {

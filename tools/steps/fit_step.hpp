@@ -33,8 +33,6 @@ Distortion distortion_of(const AdditiveModel& model);
 
 /// The decisions in the provenance of a model.
 std::vector<std::string> decisions_of(const AdditiveModel& model);
-/// Known problems of the fitted data: doubts of their health, nonlinearity.
-std::vector<std::string> doubts_of(const AdditiveModel& model);
 
 /// "relative error 0.012", or a text that no channel responds.
 std::string relative_error_text(const FitRecord& fit);

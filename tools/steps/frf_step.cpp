@@ -57,6 +57,16 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
 
 }  // namespace
 
+void note_logs(FrfEstimate& frf, const std::vector<std::filesystem::path>& logs,
+               const std::filesystem::path& output) {
+  Json provenance = Json::parse(frf.provenance_json);
+  provenance["logs"] = Json::array();
+  for (const std::filesystem::path& log : logs)
+    provenance["logs"].push_back(
+        std::filesystem::relative(log, std::filesystem::absolute(output).parent_path()).string());
+  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
   Json provenance = Json::parse(frf.provenance_json);
   provenance["fft_plans"] = fingerprint;

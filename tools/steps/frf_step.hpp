@@ -36,6 +36,10 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const HealthRequest& health, const Console& console);
 
+/// Adds to the provenance the logs ("logs"), relative to the file to be written. Commands that are suggested name them.
+void note_logs(FrfEstimate& frf, const std::vector<std::filesystem::path>& logs,
+               const std::filesystem::path& output);
+
 /// Adds to the provenance which timed FFT plans were used ("fft_plans"), because rounding depends on them.
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint);
 

@@ -1,14 +1,12 @@
 #include "tools/steps/model_verdict.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "tools/steps/fit_step.hpp"
-#include "tools/steps/health_step.hpp"
 
 namespace stageid {
 
@@ -26,51 +24,39 @@ std::vector<std::string> losses_of(const std::vector<LogRun>& runs) {
 
 ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>& health,
                          const std::optional<Validation>& validation,
-                         const std::vector<LogRun>& runs) {
-  const FitRecord& fit = model.fit;
+                         const std::vector<LogRun>& runs, const ResultFiles& files) {
   ModelVerdict verdict;
-  const auto add = [&](std::string reason) {
-    const auto holds = [&](const std::string& other) {
-      return other.find(reason) != std::string::npos;
-    };
-    if (std::ranges::none_of(verdict.reasons, holds)) verdict.reasons.push_back(std::move(reason));
-  };
-  const auto distrust = [&](std::string reason) {
-    verdict.trustworthy = false;
-    add(std::move(reason));
-  };
-  const auto judge_fit = [&] {
-    if (!fit.trustworthy())
-      distrust(fit.message.empty() ? "the fit ended with status " + fit.status_word()
-                                   : fit.message);
-  };
-  // Faults of the fitted data are in the message of the fit; those of other data come before it.
-  if (fit.status == FitStatus::faulty_data) judge_fit();
-  for (std::string& fault : health_notes(health, Severity::fault)) distrust(std::move(fault));
-  judge_fit();
-  for (std::string& loss : losses_of(runs)) distrust(std::move(loss));
-  // Doubts come before the residual, because they are the cause if it is too large.
-  for (std::string& doubt : doubts_of(model)) add(std::move(doubt));
-  for (std::string& doubt : health_notes(health, Severity::doubt)) add(std::move(doubt));
-  if (validation && !validation->explained) distrust("on held-back data " + validation->reason);
+  verdict.problems = problems_of(model);
+  const auto add = [&](Problem problem) { verdict.problems.push_back(std::move(problem)); };
+  for (Problem& problem : problems_of(health)) add(std::move(problem));
+  for (std::string& loss : losses_of(runs))
+    add({kLosses, true, std::move(loss),
+         "remove the cause, see 'late' and 'missing' of the log, and measure again"});
+  const bool consequence = !model.fit.trustworthy();
+  if (validation && !validation->explained && !consequence)
+    add({kHeldBack, true, "on held-back data " + validation->reason,
+         "check that the stage has not changed, and estimate the response again"});
+  rank(verdict.problems);
+  add_commands(verdict.problems, files, model);
+  verdict.trustworthy = std::ranges::none_of(verdict.problems, &Problem::grave);
   verdict.validated = validation && validation->variance != ResidualVariance::none;
   return verdict;
 }
 
-std::string verdict_line(const ModelVerdict& verdict) {
-  if (!verdict.trustworthy)
-    return fmt::format("verdict: not to be trusted: {}", fmt::join(verdict.reasons, "; "));
-  return fmt::format(
-      "verdict: trustworthy{}{}",
+std::vector<std::string> verdict_lines(const ModelVerdict& verdict) {
+  if (!verdict.trustworthy) return head_lines("verdict: not to be trusted: ", verdict.problems);
+  const std::string trusted = fmt::format(
+      "verdict: trustworthy{}",
       verdict.validated ? "; noise and known distortion explain the error on held-back data"
-                        : "; not validated: no held-back data, or too few lines without variances",
-      verdict.reasons.empty() ? "" : fmt::format(". Check: {}", fmt::join(verdict.reasons, "; ")));
+                        : "; not validated: no held-back data, or too few lines without variances");
+  return head_lines(trusted + (verdict.problems.empty() ? "" : ". Check: "), verdict.problems);
 }
 
 nlohmann::ordered_json verdict_json(const ModelVerdict& verdict) {
-  return {{"trustworthy", verdict.trustworthy},
-          {"validated", verdict.validated},
-          {"reasons", verdict.reasons}};
+  nlohmann::ordered_json json = {{"trustworthy", verdict.trustworthy},
+                                 {"validated", verdict.validated}};
+  json.update(head_json(verdict.problems));
+  return json;
 }
 
 std::vector<std::string> validation_lines(const Validation& v) {

@@ -12,8 +12,14 @@ using testing::HasSubstr;
 AdditiveModel fitted_to_drifting_data() {
   AdditiveModel model;
   model.fit.status = FitStatus::gradient_small;
-  model.provenance_json = R"({"doubts": ["a mode drifts"]})";
+  model.provenance_json = R"({"problems": [{"cause": "drift", "what": "a mode drifts"}]})";
   return model;
+}
+
+std::vector<std::string> reasons_of(const ModelVerdict& verdict) {
+  std::vector<std::string> out;
+  for (const Problem& problem : verdict.problems) out.push_back(problem.text());
+  return out;
 }
 
 Validation unexplained() {
@@ -27,7 +33,7 @@ Validation unexplained() {
 TEST(ModelVerdict, NamesTheCauseBeforeTheResidual) {
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, unexplained());
   EXPECT_FALSE(verdict.trustworthy);
-  EXPECT_THAT(verdict.reasons,
+  EXPECT_THAT(reasons_of(verdict),
               ElementsAre("a mode drifts", HasSubstr("on held-back data the residual")));
 }
 
@@ -37,14 +43,46 @@ TEST(ModelVerdict, TrustsAModelWithDoubtsThatHolds) {
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, validation);
   EXPECT_TRUE(verdict.trustworthy);
   EXPECT_TRUE(verdict.validated);
-  EXPECT_THAT(verdict.reasons, ElementsAre("a mode drifts"));
+  EXPECT_THAT(reasons_of(verdict), ElementsAre("a mode drifts"));
 }
 
-TEST(ModelVerdict, SaysACauseOnceThatTheFitHasNamed) {
+TEST(ModelVerdict, SaysACauseOnceThatTheDataHaveToo) {
+  Finding drift;
+  drift.severity = Severity::doubt;
+  drift.cause = Cause::drift;
+  drift.what = "a mode drifts";
+  EXPECT_EQ(judge_model(fitted_to_drifting_data(), {drift}, {}).problems.size(), 1U);
+}
+
+// The remedy was tried on the data, so that it removes the other reason too.
+TEST(ModelVerdict, NamesWhatARefitRemovesBeforeTheFitThatDidNotConverge) {
+  AdditiveModel model;
+  model.fit.status = FitStatus::cost_stalled;
+  model.fit.message = "no step lowers the cost";
+  model.fit.distrust({FitStatus::unexplained, "the residual is large", "", "--delay estimate"});
+  EXPECT_EQ(model.fit.status, FitStatus::cost_stalled);
+  EXPECT_EQ(model.fit.message, "the residual is large; no step lowers the cost");
+  model.provenance_json =
+      R"({"options": {"flags": {"--delay": "0", "--rigid-body": "none", "--modes": "1,2"}}})";
+  ResultFiles files;
+  files.frf = "a b.h5";
+  files.model = "m.json";
+  const ModelVerdict verdict = judge_model(model, {}, {}, {}, files);
+  EXPECT_THAT(reasons_of(verdict), ElementsAre("the residual is large", "no step lowers the cost"));
+  EXPECT_EQ(verdict.problems[0].cause, "delay");
+  EXPECT_EQ(verdict.problems[0].command,
+            "stageid fit 'a b.h5' -o m.json --rigid-body none --modes 1,2 --delay estimate");
+}
+
+TEST(ModelVerdict, AFaultOfTheDataFillsTheHead) {
   AdditiveModel model = fitted_to_drifting_data();
-  model.fit.status = FitStatus::unexplained;
-  model.fit.message = "a mode drifts; the residual is 9 times what noise explains";
-  EXPECT_THAT(judge_model(model, {}, {}).reasons, ElementsAre(model.fit.message));
+  Finding dead;
+  dead.severity = Severity::fault;
+  dead.channel = "z1";
+  dead.what = "dead";
+  const ModelVerdict verdict = judge_model(model, {dead}, {});
+  EXPECT_THAT(reasons_of(verdict), ElementsAre(HasSubstr("z1: dead"), "a mode drifts"));
+  EXPECT_THAT(verdict_lines(verdict), ElementsAre("verdict: not to be trusted: z1: dead"));
 }
 
 TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
@@ -53,8 +91,8 @@ TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
   dead.channel = "z1";
   dead.what = "dead";
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {dead}, unexplained());
-  ASSERT_EQ(verdict.reasons.size(), 3U);
-  EXPECT_THAT(verdict.reasons.front(), HasSubstr("z1: dead"));
+  ASSERT_EQ(verdict.problems.size(), 3U);
+  EXPECT_THAT(verdict.problems.front().what, HasSubstr("z1: dead"));
 }
 
 TEST(ModelVerdict, DistrustsARecordingThatLostSamples) {
@@ -64,8 +102,9 @@ TEST(ModelVerdict, DistrustsARecordingThatLostSamples) {
   second.health.marked = 8;
   const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {}, {}, {first, second});
   EXPECT_FALSE(verdict.trustworthy);
-  EXPECT_THAT(verdict.reasons, ElementsAre("3 cycles are missing",
-                                           "8 samples are marked as invalid", "a mode drifts"));
+  EXPECT_THAT(reasons_of(verdict),
+              ElementsAre(HasSubstr("3 cycles are missing"),
+                          HasSubstr("8 samples are marked as invalid"), "a mode drifts"));
 }
 
 TEST(ModelVerdict, TrustsARecordingThatWasInterruptedAndResumed) {

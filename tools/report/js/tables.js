@@ -1,12 +1,23 @@
 // Texts and tables: the head, the modes, the validation, the decisions, the provenance.
 
+// What is wrong, what to do, and the command to copy.
+function problemItem(problem) {
+  const remedy = problem.remedy && ' ' + problem.remedy[0].toUpperCase() + problem.remedy.slice(1) + (problem.command ? ':' : '.');
+  return element('li', null, element('strong', null, problem.what + '.'), remedy,
+    ...(problem.command ? [element('code', { class: 'command' }, problem.command)] : []));
+}
+
 function buildHead() {
   const head = document.getElementById('head');
   const { verdict, model, validation, frf } = content;
   head.append(element('p', { class: 'brand' }, 'stageid ' + content.version + ' \u00b7 report'),
     element('h1', null, content.title || 'Report'),
     element('p', { class: 'verdict ' + verdict.level, id: 'verdict' }, element('span', { class: 'sign', 'aria-hidden': 'true' }), verdict.text));
-  if (verdict.reasons.length) head.append(element('ul', { class: 'reasons' }, ...verdict.reasons.map((reason) => element('li', null, reason))));
+  if (verdict.head.length) head.append(element('ol', { class: 'steps' }, ...verdict.head.map(problemItem)));
+  const others = verdict.reasons.slice(verdict.head.length);
+  if (others.length)
+    head.append(element('details', { class: 'reasons', open: verdict.head.length ? null : '' }, element('summary', null, verdict.head.length ? others.length + ' more' : 'details'),
+      element('ul', null, ...others.map((reason) => element('li', null, reason)))));
   const figures = [];
   if (model) {
     figures.push(['modes', String(model.modes)], ['relative rms error', percent(model.relative_rms_error, 3)]);

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "estimation/model/additive_model.hpp"
+#include "frf/periods/health_finding.hpp"
+#include "frf/response/frf_estimate.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+
+/// The files of a result, which the commands of its problems name; empty: unknown.
+struct ResultFiles {
+  std::filesystem::path experiment;  ///< of `identify`
+  std::filesystem::path directory;   ///< of `identify`
+  std::filesystem::path log;
+  std::filesystem::path frf;
+  std::filesystem::path model;
+};
+
+// Causes of problems that are not those of a finding or the status of a fit.
+inline constexpr const char* kLosses = "losses";       ///< lost or marked samples
+inline constexpr const char* kHeldBack = "held_back";  ///< the model does not explain other data
+
+/// One thing that is wrong with a result.
+struct Problem {
+  std::string cause;      ///< for programs: a word of Cause or FitStatus, or one of docs/formats.md
+  bool grave = false;     ///< the result is not to be trusted
+  std::string what;       ///< with numbers
+  std::string remedy{};   ///< what to do
+  std::string flags{};    ///< of `stageid fit`, for a refit
+  std::string command{};  ///< that does it or begins it, complete; empty: none is known
+
+  /// "what. Remedy", for lines without the command
+  std::string text() const;
+};
+
+/// Problems in a head; the others are in the lists behind it.
+inline constexpr std::size_t kMostInHead = 3;
+
+/// Sorts by the one ranking of all outputs: causes before their consequences. Removes what is there twice.
+void rank(std::vector<Problem>& problems);
+
+/// Problems of a response before any fit: faults and doubts of its health, a response that is noise, nonlinearity, a
+/// single realization.
+std::vector<Problem> problems_of(const FrfEstimate& frf);
+/// The same of its health alone.
+std::vector<Problem> problems_of(const std::vector<Finding>& health);
+/// The same as stored in a model, and why its fit is not to be trusted.
+std::vector<Problem> problems_of(const AdditiveModel& model);
+
+/// Adds the commands for problems of a measured response or of a fit to it.
+/// @param files those that the provenance names are added if they are beside the others
+/// @param model null: not fitted
+void add_commands(std::vector<Problem>& problems, ResultFiles files,
+                  const std::string& frf_provenance_json, const AdditiveModel* model);
+/// The same for the model's own response.
+void add_commands(std::vector<Problem>& problems, ResultFiles files, const AdditiveModel& model);
+
+/// The first problems for people: the text of each, and its command on a line of its own.
+/// @param prefix of the first line
+std::vector<std::string> head_lines(std::string prefix, const std::vector<Problem>& problems);
+/// The same as a warning about a file that is not to be trusted.
+void warn_of(const std::vector<Problem>& problems, const std::filesystem::path& file,
+             const Console& console);
+/// The same for programs, "head": cause, what, remedy, command; and "reasons": the texts of all problems.
+nlohmann::ordered_json head_json(const std::vector<Problem>& problems);
+/// As stored in a model.
+nlohmann::ordered_json stored(const std::vector<Problem>& problems);
+
+}  // namespace stageid
