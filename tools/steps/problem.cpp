@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <functional>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -94,11 +95,19 @@ std::string in_shell(const std::string& word) {
 }
 std::string in_shell(const Path& path) { return in_shell(path.string()); }
 
+/// " a b": each word of a text, because files of others contain it.
+std::string words_in_shell(const std::string& text) {
+  std::string out;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) out.append(1, ' ').append(in_shell(word));
+  return out;
+}
+
 /// A file that a provenance names, in the folder of one of the others, or in the current one; empty: not there.
 Path beside(const ResultFiles& files, const std::string& name) {
   if (name.empty()) return {};
   std::error_code none;
-  for (const Path& other : {files.frf, files.model, files.log, Path(name)})
+  for (const Path& other : {files.frf, files.model, files.log, Path(".")})
     if (const Path path = (other.parent_path() / name).lexically_normal();
         !other.empty() && std::filesystem::exists(path, none))
       return path;
@@ -111,12 +120,14 @@ std::string refit_flags(const Json& asked, const std::string& changed) {
   for (const auto& [flag, value] : asked.items()) {
     if ((" " + changed + " ").find(" " + flag + " ") != std::string::npos) continue;
     for (const Json& one : value.is_array() ? value : Json::array({value}))
-      if (one.is_string())
+      if (one.is_string()) {
+        const auto words = one.get<std::string>();
         text += fmt::format(
-            " {} {}", flag,
-            flag == "--band" ? one.get<std::string>() : in_shell(one.get<std::string>()));
+            " {}{}", in_shell(flag),
+            flag == "--band" ? words_in_shell(words) : fmt::format(" {}", in_shell(words)));
+      }
   }
-  return text + (changed.empty() ? "" : " " + changed);
+  return text + words_in_shell(changed);
 }
 
 /// Builds the commands of one result.

@@ -74,6 +74,20 @@ TEST(ModelVerdict, NamesWhatARefitRemovesBeforeTheFitThatDidNotConverge) {
             "stageid fit 'a b.h5' -o m.json --rigid-body none --modes 1,2 --delay estimate");
 }
 
+// A command is copied into a shell, and a model may be of somebody else.
+TEST(ModelVerdict, QuotesWhatAModelOfOthersPutsIntoACommand) {
+  AdditiveModel model;
+  model.fit.status = FitStatus::gradient_small;
+  model.fit.distrust({FitStatus::unexplained, "the residual is large", "", "--delay $(reboot)"});
+  model.provenance_json = R"({"options": {"flags": {"--modes": "1;reboot", "--band": "1 2|sh"}}})";
+  ResultFiles files;
+  files.frf = "it's.h5";
+  files.model = "m.json";
+  EXPECT_EQ(
+      judge_model(model, {}, {}, {}, files).problems[0].command,
+      R"(stageid fit 'it'\''s.h5' -o m.json --modes '1;reboot' --band 1 '2|sh' --delay '$(reboot)')");
+}
+
 TEST(ModelVerdict, AFaultOfTheDataFillsTheHead) {
   AdditiveModel model = fitted_to_drifting_data();
   Finding dead;
