@@ -159,7 +159,7 @@ class Commands {
     else if (cause == Cause::unsettled)
       p.command = estimate("--method lpm");
     else
-      p.command = measure();
+      again(p);
   }
 
  private:
@@ -201,6 +201,15 @@ class Commands {
         realizations.empty() ? "" : fmt::format(" --realizations {}", fmt::join(realizations, ","));
     return fmt::format("stageid frf {} -o {}{} {}", in_shell(files_.log), in_shell(files_.frf),
                        some, flags);
+  }
+
+  /// What follows a repair, unless the remedy says so already.
+  void again(Problem& p) const {
+    p.command = measure();
+    if (p.command.starts_with("stageid log"))
+      p.remedy += "; then check the log";
+    else if (!p.command.empty() && p.remedy.find("measure") == std::string::npos)
+      p.remedy += "; then measure again";
   }
 
   /// A new measurement; without its experiment file, the check of the log.
@@ -288,8 +297,9 @@ std::vector<Problem> problems_of(const FrfEstimate& frf) {
   if (std::string what = nonlinearity_sentence(frf); !what.empty())
     problems.push_back(
         {kNonlinear, false, std::move(what),
-         "lower 'level' in the experiment file; otherwise the model is the best linear "
-         "one at this level, and its standard deviations include the distortion"});
+         "the model is the best linear one at this level, and its standard deviations "
+         "include the distortion. For less of it, lower 'level' in the experiment "
+         "file"});
   if (frf.realizations == 1)
     problems.push_back(
         {kOneRealization, false,
