@@ -1,0 +1,95 @@
+#include "estimation/tracking/line_noise.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace stageid {
+
+Eigen::MatrixXcd LineNoise::inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
+                                           double periods) const {
+  const auto N = std::ssize(scatter_);
+  Eigen::MatrixXcd around = Eigen::MatrixXcd::Zero(n_y_, n_y_);
+  double freedom = 0.0;
+  for (Eigen::Index l = std::max<Eigen::Index>(0, k - n_y_); l <= std::min(N - 1, k + n_y_); ++l) {
+    if (l == k) continue;
+    around += scatter_[static_cast<std::size_t>(l)];
+    freedom += static_cast<double>(deviations_.front().cols() - 1);
+  }
+  const auto prior = static_cast<double>(n_y_);
+  if (freedom > 0.0) around *= prior / freedom;
+  Eigen::MatrixXcd C = (scatter + around) / (periods - 1.0 + prior);
+  C.diagonal().array() += 1e-12 * C.diagonal().real().maxCoeff() + 1e-300;  // noise-free outputs
+  return Eigen::LLT<Eigen::MatrixXcd>(0.5 * C).matrixL().solve(
+      Eigen::MatrixXcd::Identity(n_y_, n_y_));
+}
+
+LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
+  const auto periods = std::ssize(residuals);
+  if (periods < 4) throw std::invalid_argument("LineNoise: fewer than 4 periods");
+  n_y_ = residuals.front().rows();
+  const Eigen::Index N = residuals.front().cols();
+  variance_.resize(n_y_, N);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    Eigen::MatrixXcd deviation(n_y_, periods);
+    for (Eigen::Index t = 0; t < periods; ++t)
+      deviation.col(t) = residuals[static_cast<std::size_t>(t)].col(k);
+    const Eigen::VectorXcd mean = deviation.rowwise().mean();
+    deviation.colwise() -= mean;
+    // The mean inverse of a chi-square of nu complex degrees of freedom is 1 / (nu - 1).
+    variance_.col(k) = deviation.rowwise().squaredNorm() / static_cast<double>(periods - 2);
+    scatter_.emplace_back(deviation * deviation.adjoint());
+    deviations_.push_back(std::move(deviation));
+  }
+  for (Eigen::Index k = 0; k < N; ++k)
+    inverse_factor_.push_back(
+        inverse_factor(scatter_[static_cast<std::size_t>(k)], k, static_cast<double>(periods)));
+}
+
+Eigen::MatrixXd LineNoise::whitened(const Eigen::Ref<const Eigen::MatrixXcd>& columns) const {
+  const auto N = std::ssize(inverse_factor_);
+  Eigen::MatrixXd out(2 * n_y_ * N, columns.cols());
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const Eigen::MatrixXcd white =
+        inverse_factor_[static_cast<std::size_t>(k)] * columns.middleRows(k * n_y_, n_y_);
+    out.middleRows(2 * k * n_y_, n_y_) = white.real();
+    out.middleRows((2 * k + 1) * n_y_, n_y_) = white.imag();
+  }
+  return out;
+}
+
+SumCovariance LineNoise::covariance(const Eigen::MatrixXd& J) const {
+  const Eigen::Index periods = deviations_.front().cols();
+  const auto n = static_cast<double>(periods);
+  SumCovariance K{Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())};
+  Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(J.cols());
+  Eigen::MatrixXd white(2 * n_y_, periods);
+  for (std::size_t k = 0; k < deviations_.size(); ++k) {
+    const auto line = static_cast<Eigen::Index>(k);
+    for (Eigen::Index t = 0; t < periods; ++t) {
+      // From the mean of the others, d n / (n - 1); its variance is n / (n - 1) of a period's.
+      const Eigen::VectorXcd d = deviations_[k].col(t) * std::sqrt(n / (n - 1.0));
+      const Eigen::MatrixXcd others = inverse_factor(scatter_[k] - d * d.adjoint(), line, n - 1.0);
+      // J is whitened by all periods: L^H W d, W of the others, gives J^T of the residual under their weights.
+      const Eigen::VectorXcd w =
+          inverse_factor_[k].adjoint().inverse() * (others.adjoint() * (others * d));
+      white.col(t) << w.real(), w.imag();
+    }
+    const Eigen::MatrixXd sums = J.middleRows(2 * line * n_y_, 2 * n_y_).transpose() * white;
+    K.value.noalias() += sums * sums.transpose() / n;
+    squares += (sums.rowwise().squaredNorm().array() / n).square();
+  }
+  // A variance kappa_k of n periods has n degrees of freedom; of their sum, see Satterthwaite (1946). `squares`
+  // includes the scatter of kappa_k^2, a factor 1 + 2/n.
+  K.freedom = (n + 2.0) * K.value.diagonal().array().square() / squares.max(1e-300);
+  return K;
+}
+
+Eigen::VectorXd LineNoise::relative_power(const Eigen::MatrixXcd& difference) const {
+  return (0.5 * difference.cwiseAbs2().array() / variance_.array().max(1e-300)).rowwise().mean();
+}
+
+}  // namespace stageid

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace stageid {
+
+/// Covariance of weighted sums over the lines, as estimated from few periods.
+struct SumCovariance {
+  Eigen::MatrixXd value;    ///< q x q
+  Eigen::VectorXd freedom;  ///< degrees of freedom of each variance
+};
+
+/// The noise of the outputs on every line, learned from the scatter of a stage's residuals over periods without change.
+///
+/// The scatter of few periods is regularized by that of the neighbouring lines, with as many degrees of freedom as
+/// outputs. The covariance of weighted sums over lines is computed by leaving out one period after the other: weights
+/// from the same period would lower it.
+class LineNoise {
+ public:
+  /// @param residuals of at least 4 periods, n_y x N each
+  explicit LineNoise(const std::vector<Eigen::MatrixXcd>& residuals);
+
+  /// Real rows with variance one on average, 2 n_y N, of residuals or derivatives whose columns are vec(n_y x N).
+  Eigen::MatrixXd whitened(const Eigen::Ref<const Eigen::MatrixXcd>& columns) const;
+  /// Covariance of J^T e over the periods. @param J whitened derivatives, e a whitened residual
+  SumCovariance covariance(const Eigen::MatrixXd& J) const;
+  /// Mean over the lines of |difference|^2 / (2 variance) of two periods, by output: 1 on average for later periods
+  /// without change. The variance is that of the line itself: narrow resonances of the noise count as one line each.
+  Eigen::VectorXd relative_power(const Eigen::MatrixXcd& difference) const;
+
+ private:
+  Eigen::Index n_y_;
+  /// (scatter + prior) / (periods - 1 + n_y), half of it, as a factor of its inverse.
+  Eigen::MatrixXcd inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
+                                  double periods) const;
+
+  std::vector<Eigen::MatrixXcd> inverse_factor_;  // L^-1 of each line, L L^H = C / 2
+  std::vector<Eigen::MatrixXcd> deviations_;      // of the periods, by line: n_y x periods
+  std::vector<Eigen::MatrixXcd> scatter_;         // sum of their squares, by line
+  Eigen::MatrixXd variance_;                      // n_y x N
+};
+
+}  // namespace stageid

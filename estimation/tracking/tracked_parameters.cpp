@@ -1,0 +1,80 @@
+#include "estimation/tracking/tracked_parameters.hpp"
+
+#include <fmt/format.h>
+
+namespace stageid {
+
+std::vector<TrackedParameter> tracked_parameters(const AdditiveModel& model,
+                                                 const std::array<double, 2>& band_hz) {
+  std::vector<TrackedParameter> tracked;
+  for (const TrackedKind kind : {TrackedKind::frequency, TrackedKind::damping})
+    for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+      const Submodel& mode = model.submodels[i];
+      if (!mode.is_mode() ||
+          mode.verdict.value_or(ModeVerdict::determined) != ModeVerdict::determined)
+        continue;
+      const double frequency_hz = mode.natural_frequency_hz();
+      if (frequency_hz >= band_hz[0] && frequency_hz <= band_hz[1])
+        tracked.push_back({kind, static_cast<Eigen::Index>(i)});
+    }
+  for (Eigen::Index i = 0; i < model.n_outputs(); ++i)
+    tracked.push_back({TrackedKind::sensor_gain, i});
+  for (Eigen::Index j = 0; j < model.n_inputs(); ++j)
+    tracked.push_back({TrackedKind::actuator_gain, j});
+  tracked.push_back({TrackedKind::delay, 0});
+  return tracked;
+}
+
+std::string describe(const TrackedParameter& parameter, const AdditiveModel& model) {
+  const auto mode = [&] {
+    return fmt::format(
+        "of the mode at {:.6g} Hz",
+        model.submodels[static_cast<std::size_t>(parameter.index)].natural_frequency_hz());
+  };
+  switch (parameter.kind) {
+    case TrackedKind::frequency:
+      return "frequency " + mode();
+    case TrackedKind::damping:
+      return "damping ratio " + mode();
+    case TrackedKind::sensor_gain:
+      return fmt::format("gain of sensor '{}'", model.outputs.name(parameter.index));
+    case TrackedKind::actuator_gain:
+      return fmt::format("gain of actuator '{}'", model.inputs.name(parameter.index));
+    case TrackedKind::delay:
+      break;
+  }
+  return "delay";
+}
+
+Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,
+                                double sample_rate_hz) {
+  Eigen::VectorXd changes(std::ssize(parameters));
+  for (Eigen::Index p = 0; p < changes.size(); ++p)
+    switch (parameters[static_cast<std::size_t>(p)].kind) {
+      case TrackedKind::frequency:
+        changes[p] = 0.05;
+        break;
+      case TrackedKind::damping:
+        changes[p] = 0.5;
+        break;
+      case TrackedKind::sensor_gain:
+      case TrackedKind::actuator_gain:
+        changes[p] = 0.3;
+        break;
+      case TrackedKind::delay:
+        changes[p] = 1.0 / sample_rate_hz;
+        break;
+    }
+  return changes;
+}
+
+Submodel moved(const Submodel& mode, double frequency, double damping) {
+  Submodel out = mode;
+  const double period = 1.0 / (1.0 + frequency);
+  out.denominator[1] *= (1.0 + damping) * period;
+  out.denominator[2] *= period * period;
+  for (Eigen::MatrixXd& numerator : out.numerator) numerator *= period * period;
+  return out;
+}
+
+}  // namespace stageid

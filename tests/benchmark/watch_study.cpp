@@ -1,0 +1,305 @@
+// Tracks a simulated stage around its model while the stage works, and counts what is found.
+//
+//   watch_study STAGE.yaml MODEL.json [runs = 20] [periods = 100] [kind = none] [size = 1e-5] [rms of an axis, N = 0.2]
+//               [first seed = 1] [false alarms per period = 1e-3] [ramp in periods = 0]
+//
+// kind: none, or a fault of the stage file (mode_frequency, sensor_gain, ...), planted at a random channel after the
+// learning and 8 periods. All actuators of the model are excited at once, on 500 lines.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "estimation/tracking/model_tracker.hpp"
+#include "excitation/multisine/dft.hpp"
+#include "excitation/multisine/multisine.hpp"
+#include "hal/simulator/plant_spec.hpp"
+#include "hal/simulator/simulated_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "tests/support/process/random_numbers.hpp"
+#include "tools/config/stage_config.hpp"
+
+namespace {
+
+using stageid::AdditiveModel;
+using stageid::PeriodSpectra;
+
+struct Request {
+  int runs = 20;
+  int periods = 100;
+  std::string kind = "none";
+  double size = 1e-5;
+  double rms = 0.2;
+  std::uint64_t seed = 1;
+  double alarms = 1e-3;
+  double ramp = 0.0;
+};
+
+/// A closed loop in progress that gives the spectra of period after period.
+class Loop {
+ public:
+  Loop(const stageid::StageConfig& config, const stageid::SimulationSpec& simulation,
+       const AdditiveModel& model, const std::vector<int>& lines, int period_samples, double rms,
+       std::uint64_t seed)
+      : stage_(config.spec.info, *config.plant, simulation),
+        controller_(config.spec.controller),
+        dft_(period_samples),
+        lines_(lines),
+        u_(config.spec.info.actuators.size()),
+        y_(config.spec.info.sensors.size()) {
+    for (const std::string& name : model.inputs.names)
+      inputs_.push_back(stageid::channel_index(config.spec.info.actuators, name));
+    for (const std::string& name : model.outputs.names)
+      outputs_.push_back(stageid::channel_index(config.spec.info.sensors, name));
+    const stageid::FrequencyGrid grid(config.spec.info.sample_rate_hz, period_samples, lines);
+    excitation_.setZero(period_samples, static_cast<Eigen::Index>(u_.size()));
+    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+      stageid::MultisineSpec spec;
+      spec.level = rms;
+      spec.seed = 1000 * seed + j;
+      excitation_.col(inputs_[j]) = stageid::random_phase_multisine(grid, spec).samples;
+    }
+    measured_.y = y_;
+    controller_.reset();
+    stage_.start(seed, measured_);
+  }
+
+  PeriodSpectra next() {
+    const Eigen::Index N = excitation_.rows();
+    Eigen::MatrixXd u(N, std::ssize(u_));
+    Eigen::MatrixXd y(N, std::ssize(y_));
+    for (Eigen::Index n = 0; n < N; ++n) {
+      controller_.update(y_.data(), u_.data());
+      for (std::size_t j = 0; j < u_.size(); ++j)
+        u_[j] += excitation_(n, static_cast<Eigen::Index>(j));
+      u.row(n) = Eigen::Map<const Eigen::RowVectorXd>(u_.data(), std::ssize(u_));
+      y.row(n) = Eigen::Map<const Eigen::RowVectorXd>(y_.data(), std::ssize(y_));
+      (void)stage_.exchange({measured_.cycle, u_}, measured_, {});
+    }
+    return {spectra(y, outputs_), spectra(u, inputs_)};
+  }
+
+ private:
+  Eigen::MatrixXcd spectra(const Eigen::MatrixXd& samples, const std::vector<int>& channels) {
+    Eigen::MatrixXcd out(std::ssize(channels), std::ssize(lines_));
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      std::copy(samples.col(channels[c]).begin(), samples.col(channels[c]).end(),
+                dft_.input().begin());
+      const auto X = dft_.forward();
+      for (std::size_t k = 0; k < lines_.size(); ++k)
+        out(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(k)) =
+            X[static_cast<std::size_t>(lines_[k])] / static_cast<double>(dft_.length());
+    }
+    return out;
+  }
+
+  stageid::SimulatedStage stage_;
+  stageid::MotionController controller_;
+  stageid::RealDft dft_;
+  std::vector<int> lines_;
+  std::vector<double> u_;
+  std::vector<double> y_;
+  std::vector<int> inputs_;
+  std::vector<int> outputs_;
+  Eigen::MatrixXd excitation_;
+  stageid::Inputs measured_;
+};
+
+/// A change of the stage, and its name by the tracker.
+struct Planted {
+  std::string name;
+  int period = 0;
+};
+
+Planted plant_change(const Request& request, int learning, const stageid::StageConfig& config,
+                     const AdditiveModel& model, std::uint64_t seed,
+                     stageid::SimulationSpec& simulation) {
+  using Fault = stageid::SimulationSpec::Fault;
+  using stageid::TrackedKind;
+  Planted planted;
+  planted.period = learning + 8;
+  Fault fault;
+  bool all = false;
+  std::string kind = request.kind;
+  if (kind.starts_with("all_")) {
+    all = true;
+    kind = kind.substr(4);
+  }
+  fault.kind = *stageid::from_word<Fault::Kind>(kind);
+  const auto period = static_cast<std::uint64_t>(config.spec.info.sample_rate_hz);
+  fault.from_cycle = static_cast<std::uint64_t>(planted.period + 1) * period;
+  fault.ramp_s = request.ramp;
+  stageid::test::RandomNumbers random(seed);
+  // A factor for gains and noise, a relative change for modes.
+  const bool factor = kind == "sensor_gain" || kind == "actuator_gain" || kind == "sensor_noise";
+  const double sign = random.integer(0, 1) == 1 ? 1.0 : -1.0;
+  fault.value = factor                  ? 1.0 + sign * request.size
+                : kind == "extra_delay" ? request.size
+                                        : sign * request.size;
+  if (kind == "sensor_noise") fault.value = 1.0 + request.size;
+  const auto parameters = stageid::tracked_parameters(model, {20.0, 2000.0});
+  const auto pick = [&](TrackedKind wanted) {
+    std::vector<stageid::TrackedParameter> of_kind;
+    for (const auto& p : parameters)
+      if (p.kind == wanted) of_kind.push_back(p);
+    return of_kind[static_cast<std::size_t>(
+        random.integer(0, static_cast<int>(of_kind.size()) - 1))];
+  };
+  fault.channel = -1;
+  if (kind == "mode_frequency" || kind == "mode_damping") {
+    planted.name = "frequencies of all modes";
+    if (!all) {
+      const auto p = pick(kind == "mode_frequency" ? TrackedKind::frequency : TrackedKind::damping);
+      planted.name = describe(p, model);
+      const auto modes = stageid::plant_modes(config.spec.info, *config.plant);
+      const double hz = model.submodels[static_cast<std::size_t>(p.index)].natural_frequency_hz();
+      double nearest = 1e9;
+      for (std::size_t m = 0; m < modes.size(); ++m)
+        if (std::abs(modes[m].natural_frequency_hz - hz) < nearest) {
+          nearest = std::abs(modes[m].natural_frequency_hz - hz);
+          fault.channel = static_cast<int>(m);
+        }
+    }
+  } else if (kind == "sensor_gain" || kind == "sensor_noise") {
+    planted.name = "gains of all sensors or of all actuators";
+    if (!all) {
+      const auto p = pick(TrackedKind::sensor_gain);
+      const std::string& name = model.outputs.name(p.index);
+      planted.name =
+          (kind == "sensor_gain" ? "gain of sensor '" : "noise of sensor '") + name + "'";
+      fault.channel = stageid::channel_index(config.spec.info.sensors, name);
+    }
+  } else if (kind == "actuator_gain") {
+    const auto p = pick(TrackedKind::actuator_gain);
+    const std::string& name = model.inputs.name(p.index);
+    planted.name = "gain of actuator '" + name + "'";
+    fault.channel = stageid::channel_index(config.spec.info.actuators, name);
+  } else {
+    planted.name = "delay";
+    fault.channel = 0;
+  }
+  simulation.faults.push_back(fault);
+  return planted;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) return 2;
+  Request request;
+  const auto number = [&](int i, double otherwise) {
+    return i < argc ? std::atof(argv[i]) : otherwise;
+  };
+  request.runs = static_cast<int>(number(3, request.runs));
+  request.periods = static_cast<int>(number(4, request.periods));
+  if (argc > 5) request.kind = argv[5];
+  request.size = number(6, request.size);
+  request.rms = number(7, request.rms);
+  request.seed = static_cast<std::uint64_t>(number(8, 1.0));
+  request.alarms = number(9, request.alarms);
+  request.ramp = number(10, 0.0);
+
+  const stageid::StageConfig config = stageid::load_stage_config(argv[1]);
+  const AdditiveModel model = stageid::read_model(argv[2]);
+  const int period_samples = static_cast<int>(config.spec.info.sample_rate_hz);
+  std::vector<int> lines;
+  for (int l = 21; l < 2000 && l < period_samples / 2; l += 4) lines.push_back(l);
+  Eigen::VectorXd frequency_hz(std::ssize(lines));
+  for (std::size_t k = 0; k < lines.size(); ++k)
+    frequency_hz[static_cast<Eigen::Index>(k)] = lines[k];
+
+  int alarms = 0, watched = 0, detected = 0, named = 0;
+  std::vector<int> delays;
+  Eigen::ArrayXd sum, square, inside;
+  double counted = 0.0;
+  double tracking_s = 0.0, simulated_s = 0.0, slowest_s = 0.0;
+  for (int run = 0; run < request.runs; ++run) {
+    const std::uint64_t seed = request.seed + static_cast<std::uint64_t>(run);
+    stageid::TrackerOptions options;
+    options.false_alarms_per_period = request.alarms;
+    stageid::SimulationSpec simulation = config.simulation;
+    simulation.seed = seed;
+    Planted planted;
+    if (request.kind != "none")
+      planted = plant_change(request, options.learning_periods, config, model, seed, simulation);
+    Loop loop(config, simulation, model, lines, period_samples, request.rms, seed);
+    stageid::ModelTracker tracker(model, frequency_hz, options);
+    bool seen = false;
+    loop.next();
+    const auto began = std::chrono::steady_clock::now();
+    for (int p = 0; p < request.periods; ++p) {
+      const PeriodSpectra period = loop.next();
+      const auto start = std::chrono::steady_clock::now();
+      const stageid::TrackedPeriod state = tracker.add(period);
+      const double spent_s =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      tracking_s += spent_s;
+      slowest_s = std::max(slowest_s, spent_s);
+      if (!state.learning) ++watched;
+      if (getenv("DBG") && state.noise_power.size() > 0)
+        fmt::print("{:.3f}\n", fmt::join(state.noise_power, " "));
+      if (state.change) {
+        ++alarms;
+        if (!planted.name.empty() && p >= planted.period && !seen) {
+          seen = true;
+          ++detected;
+          delays.push_back(p - planted.period + 1);
+          const bool right = describe(state.change->what, tracker, model) == planted.name;
+          named += right ? 1 : 0;
+          fmt::print("{} {} after {} periods; planted: {}\n  ", right ? "right" : "WRONG", seed,
+                     p - planted.period + 1, planted.name);
+        }
+        fmt::print(
+            "seed {} period {}: {} {:.3g} +- {:.2g} p {:.3f} since {} statistic {:.1f} (limit "
+            "{:.1f})\n",
+            seed, p, describe(state.change->what, tracker, model), state.change->size,
+            state.change->deviation, state.change->probability, state.change->periods,
+            state.change->statistic, state.threshold);
+      }
+    }
+    simulated_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (run == 0) {
+      fmt::print("chi-square of the reference {:.3f}, relative error {:.2e}\n",
+                 fmt::join(tracker.reference().chi_square, " "),
+                 fmt::join(tracker.reference().relative_error, " "));
+      const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
+      for (Eigen::Index i = 0; i < deviation.size(); ++i)
+        fmt::print("  {}: {:.3e} +- {:.3e}\n",
+                   describe(tracker.parameters()[static_cast<std::size_t>(i)], model),
+                   tracker.estimate()[i], deviation[i]);
+      sum.setZero(deviation.size());
+      square.setZero(deviation.size());
+      inside.setZero(deviation.size());
+    }
+    const Eigen::ArrayXd ratio =
+        tracker.estimate().array() / tracker.covariance().diagonal().array().sqrt();
+    sum += ratio;
+    square += ratio.square();
+    inside += (ratio.abs() < 1.96).cast<double>();
+    counted += 1.0;
+  }
+  fmt::print(
+      "{} alarms in {} watched periods; tracking {:.2f} ms a period, at most {:.0f}, simulation "
+      "{:.2f} ms\n",
+      alarms, watched, 1e3 * tracking_s / (counted * request.periods), 1e3 * slowest_s,
+      1e3 * (simulated_s - tracking_s) / (counted * request.periods));
+  if (request.kind != "none") {
+    std::sort(delays.begin(), delays.end());
+    fmt::print("{} of {} detected, {} named right; delay median {}, 95 % {} periods\n", detected,
+               request.runs, named, delays.empty() ? 0 : delays[delays.size() / 2],
+               delays.empty() ? 0 : delays[delays.size() * 95 / 100]);
+    return 0;
+  }
+  const Eigen::ArrayXd mean = sum / counted;
+  const Eigen::ArrayXd scatter =
+      ((square / counted - mean.square()) * counted / (counted - 1.0)).sqrt();
+  fmt::print(
+      "mean / deviation {:.2f}\nscatter / deviation {:.2f}\ncoverage {:.3f}\nall: {:.3f} {:.3f}\n",
+      fmt::join(mean, " "), fmt::join(scatter, " "), fmt::join(inside / counted, " "),
+      std::sqrt(scatter.square().mean()), inside.mean() / counted);
+}
