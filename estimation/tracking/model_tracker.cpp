@@ -307,7 +307,8 @@ struct ModelTracker::State::Explanation {
   double size = 0.0;
 };
 
-/// A change of modes or of the delay as large as it is: the response is not linear in it.
+/// A change as large as it is, from the mean of the last periods: the response is not linear in modes and delay, and a
+/// large change of the stage also changes the inputs.
 ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChange& change,
                                                               const PeriodSpectra& mean,
                                                               double linear_size) const {
@@ -323,13 +324,13 @@ ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChan
   const auto left = [&](double size) -> Eigen::VectorXd {
     return observed - whitened_change(TrackedResponse::outputs(predicted(size) - before, mean.U));
   };
-  // From the best of some sizes; with the largest, a resonance has left its place.
+  // From the best of some sizes; with the largest, a resonance has left its place. In gains, the response is linear.
   Explanation best{0.0, linear_size};
   double least = left(linear_size).squaredNorm();
   const double largest = largest_changes(response.parameters(), response.model().sample_rate_hz)
                              .cwiseProduct(change.direction)
                              .maxCoeff();
-  for (double size = largest; size > 1e-3 * largest; size *= 0.5)
+  for (double size = is_gain(change) ? 0.0 : largest; size > 1e-3 * largest; size *= 0.5)
     for (const double candidate : {size, -size}) {
       const double square = left(candidate).squaredNorm();
       if (square >= least) continue;
@@ -352,6 +353,8 @@ ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChan
 
 StageChange ModelTracker::State::name(int since) const {
   const Eigen::VectorXd scores_since = detector->mean_scores(since);
+  // The first difference is to the period of the change.
+  const Eigen::VectorXd noise_scores = detector->mean_scores(std::max(1, since - 1));
   const double independent = since / (1.0 + static_cast<double>(since) / options.learning_periods);
   const std::size_t kept = std::min(periods.size(), static_cast<std::size_t>(since));
   const PeriodSpectra mean = mean_of(periods, kept);
@@ -360,7 +363,9 @@ StageChange ModelTracker::State::name(int since) const {
     StageChange change;
     change.what = possible[h];
     change.periods = since;
-    const double score = scores_since[static_cast<Eigen::Index>(h)];
+    const auto at = static_cast<Eigen::Index>(h);
+    const double score =
+        change.what.kind == ChangeKind::noise ? noise_scores[at] : scores_since[at];
     change.statistic = score * score * independent;
     if (change.what.kind == ChangeKind::noise) {
       const double deviation = noise_deviation[change.what.index];
@@ -372,7 +377,7 @@ StageChange ModelTracker::State::name(int since) const {
       const double scale = std::sqrt(d.dot(K * d)) / information;
       change.size = score * scale;
       change.deviation = scale / std::sqrt(independent);
-      if (!is_gain(change.what) && static_cast<int>(kept) == since) {
+      if (static_cast<int>(kept) == since) {
         const Explanation exact = explain(change.what, mean, change.size);
         change.size = exact.size;
         change.statistic = exact.explained * independent / (scale * scale * information);

@@ -6,16 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "estimation/modal/model_spectra.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "estimation/tracking/tracked_parameters.hpp"
 
 namespace stageid {
-
-/// Spectra of one period on the lines: DFT / number of samples, unit of the channel.
-struct PeriodSpectra {
-  Eigen::MatrixXcd Y;  ///< outputs, n_y x N
-  Eigen::MatrixXcd U;  ///< inputs, n_u x N
-};
 
 struct TrackerOptions {
   /// Periods without change from which noise and reference are learned, at least 4.

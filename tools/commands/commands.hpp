@@ -15,6 +15,7 @@ void frf_command(CLI::App& app, Console& console);
 void modes_command(CLI::App& app, Console& console);
 void fit_command(CLI::App& app, Console& console);
 void validate_command(CLI::App& app, Console& console);
+void watch_command(CLI::App& app, Console& console);
 void export_command(CLI::App& app, Console& console);
 void import_command(CLI::App& app, Console& console);
 void report_command(CLI::App& app, Console& console);

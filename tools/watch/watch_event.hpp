@@ -1,0 +1,23 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "estimation/tracking/model_tracker.hpp"
+#include "tools/watch/watch_source.hpp"
+
+namespace stageid {
+
+/// One sentence: what changed, since when, how much, how probable; and one with the remedy.
+std::string change_text(const StageChange& change, const ModelTracker& tracker,
+                        const AdditiveModel& model, double period_s);
+/// The same for programs, as in docs/formats.md.
+nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker& tracker,
+                                   const AdditiveModel& model, const WatchedPeriod& period,
+                                   double period_s);
+
+/// The tracked properties of a stage: name, change from the model, standard deviation.
+nlohmann::ordered_json tracked_json(const ModelTracker& tracker, const AdditiveModel& model);
+std::vector<std::string> tracked_lines(const ModelTracker& tracker, const AdditiveModel& model);
+
+}  // namespace stageid

@@ -1,0 +1,94 @@
+#include "tools/watch/watch_source.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "excitation/multisine/dft.hpp"
+#include "frf/runs/excitation_spectrum.hpp"
+
+namespace stageid {
+namespace {
+
+/// The excited lines in the band; all lines of the band if the log has no excitation.
+std::vector<int> watched_lines(const LogReader& log, const std::array<double, 2>& band_hz) {
+  std::vector<int> lines = lines_in_band(log.info(), band_hz[0], band_hz[1]);
+  if (log.info().excitation.size() == 0) return lines;
+  RealDft dft(log.info().period_samples);
+  const std::vector<int> excited = excitation_spectrum(log.excitation(0), dft).lines;
+  std::vector<int> both;
+  std::ranges::set_intersection(lines, excited, std::back_inserter(both));
+  return both;
+}
+
+}  // namespace
+
+WatchSource::WatchSource(const AdditiveModel& model, std::filesystem::path log,
+                         const std::array<double, 2>& band_hz, bool follow)
+    : file_(std::move(log)), follow_(follow) {
+  open();
+  if (log_->runs().empty())
+    throw std::invalid_argument(
+        fmt::format("{}: has no run yet; start the measurement first", file_.string()));
+  const std::vector<int> lines = watched_lines(*log_, band_hz);
+  if (lines.size() < 2)
+    throw std::invalid_argument(
+        fmt::format("{}: excites fewer than 2 lines between {} and {} Hz, the band of the model; "
+                    "use another --band, or excite lines in the band",
+                    file_.string(), band_hz[0], band_hz[1]));
+  spectra_.emplace(model, *log_, lines);
+  frequency_hz_ = Eigen::VectorXi::Map(lines.data(), std::ssize(lines)).cast<double>() *
+                  (log_->info().sample_rate_hz / log_->info().period_samples);
+  excitation_ = log_->excitation(0);
+  period_ = static_cast<std::uint64_t>(log_->info().transient_periods);
+}
+
+void WatchSource::open() {
+  if (!follow_) {
+    log_ = open_log(file_);
+    return;
+  }
+  // The last block may be incomplete at this moment.
+  auto log = std::make_unique<SlogReader>(file_, false);
+  ended_ = log->end().has_value();
+  log_ = std::move(log);
+}
+
+bool WatchSource::refresh() {
+  if (ended_) return false;
+  open();
+  return true;
+}
+
+std::optional<WatchedPeriod> WatchSource::next() {
+  const auto N = static_cast<std::uint64_t>(log_->info().period_samples);
+  while (true) {
+    const bool whole = (period_ + 1) * N <= log_->runs()[run_].samples;
+    if (!whole && run_ + 1 >= log_->runs().size()) return std::nullopt;
+    if (!whole) {
+      rows_before_ += log_->runs()[run_].samples;
+      ++run_;
+      period_ = static_cast<std::uint64_t>(log_->info().transient_periods);
+      Eigen::MatrixXd excitation = log_->excitation(run_);
+      other_excitation_ = other_excitation_ || excitation != excitation_;
+      excitation_ = std::move(excitation);
+      continue;
+    }
+    const std::uint64_t period = period_++;
+    std::optional<PeriodSpectra> spectra = spectra_->read(*log_, run_, period);
+    if (!spectra) {
+      ++skipped_;
+      continue;
+    }
+    return WatchedPeriod{
+        std::move(*spectra), run_, period,
+        static_cast<double>(rows_before_ + (period + 1) * N) / log_->info().sample_rate_hz,
+        std::exchange(other_excitation_, false)};
+  }
+}
+
+}  // namespace stageid
