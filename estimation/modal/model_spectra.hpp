@@ -6,16 +6,11 @@
 #include <vector>
 
 #include "acquisition/record/log_reader.hpp"
+#include "estimation/modal/period_spectra.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "excitation/multisine/dft.hpp"
 
 namespace stageid {
-
-/// Spectra of one period on the lines: DFT / number of samples, unit of the channel.
-struct PeriodSpectra {
-  Eigen::MatrixXcd Y;  ///< outputs, n_y x N
-  Eigen::MatrixXcd U;  ///< inputs, n_u x N
-};
 
 /// The lines of the DFT of one period in a band, DC and Nyquist excluded; possibly none.
 std::vector<int> lines_in_band(const LogInfo& info, double low_hz, double high_hz);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/modal/model_spectra.hpp"
+#include "estimation/modal/period_spectra.hpp"
 #include "estimation/model/additive_model.hpp"
 #include "estimation/tracking/tracked_parameters.hpp"
 

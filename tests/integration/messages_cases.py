@@ -104,6 +104,8 @@ case("Unsupported ending of a log", f"run {EXPERIMENT} -o new.csv")
 case("Unsupported ending of a conversion", "log convert run.slog -o run.xlsx")
 case("Unsupported picture", "plot cmif frf.h5 -o picture.jpg")
 case("Report that is not a page", "report frf.h5 -o report.pdf")
+case("Rate of alarms without a unit", "watch model.json run.slog --false-alarms 3")
+case("Log that is too short to watch", "watch model.json run.slog")
 
 case = chapter("Files of the wrong kind")
 case("Log instead of a frequency response", "fit run.slog -o new.json")

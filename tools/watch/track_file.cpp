@@ -1,7 +1,5 @@
 #include "tools/watch/track_file.hpp"
 
-#include <hdf5.h>
-
 #include <limits>
 #include <string>
 #include <vector>

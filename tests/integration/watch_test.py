@@ -1,0 +1,153 @@
+#!/usr/bin/python3
+"""`stageid watch` over logs of the simulated small stage: nothing is told without a change, every planted change is
+told with its name and size, also while the log grows, and neither gaps nor damaged or foreign logs are changes.
+
+    watch_test.py PROGRAM CONFIGS WORK_DIR
+"""
+
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+import unittest
+
+import h5py
+import numpy as np
+
+from processes import ProcessTest
+
+PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+FROM_CYCLE = 160000  # 80 s, of which 2 are transient periods
+MODE_HZ = 181.147    # mode 7 of the stage
+
+
+class WatchTest(ProcessTest):
+    program, folder = PROGRAM, WORK
+
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(WORK, ignore_errors=True)
+        shutil.copytree(CONFIGS, WORK / "configs")
+        done = cls.call("identify", "configs/experiment/small_stage.yaml", "-o", "model")
+        assert done.returncode == 0, done.stderr
+        cls.record("same")
+
+    @classmethod
+    def record(cls, name, fault=None):
+        """NAME.slog: 2 + 120 periods of 1 s, with a fault of the stage."""
+        stage = (CONFIGS / "stage/small_stage.yaml").read_text()
+        (WORK / "configs/stage/small_stage.yaml").write_text(stage + (f"\nfaults:\n  - {{{fault}}}\n" if fault else ""))
+        (WORK / f"{name}.slog").unlink(missing_ok=True)
+        done = cls.call("run", "configs/experiment/small_stage_watch.yaml", "-o", f"{name}.slog")
+        assert (WORK / f"{name}.slog").exists(), done.stderr
+        return done
+
+    def watch(self, log, code, *flags):
+        done = self.call("watch", "model/model.json", log, *flags, "--json")
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return json.loads(done.stdout)
+
+    def only_change(self, fault):
+        self.record("changed", f"{fault}, from_cycle: {FROM_CYCLE}")
+        told = self.watch("changed.slog", 3)
+        self.assertEqual(len(told["changes"]), 1, told["changes"])
+        change = told["changes"][0]
+        self.assertAlmostEqual(change["since_s"], FROM_CYCLE / 2000, delta=1.001)
+        self.assertGreater(change["probability"], 0.95)
+        return change, told
+
+    def assert_size(self, change, size):
+        self.assertLess(abs(change["size"] - size), 4 * change["deviation"] + 0.005 * abs(size), change)
+
+    def test_no_change(self):
+        told = self.watch("same.slog", 0, "-o", "same.h5", "--events", "same.jsonl")
+        self.assertEqual((told["changes"], told["periods"], told["learning_periods"]), ([], 120, 32))
+        self.assertEqual((WORK / "same.jsonl").read_text(), "")
+        with h5py.File(WORK / "same.h5") as tracks:
+            self.assertEqual(tracks["change"].shape, (120, len(told["tracked"])))
+            np.testing.assert_array_equal(tracks["change"][-1], [t["change"] for t in told["tracked"]])
+            self.assertTrue(np.all(tracks["statistic"][32:] < tracks["threshold"][32:]))
+            self.assertEqual(list(tracks["learning"][30:34]), [1, 1, 0, 0])
+            np.testing.assert_allclose(tracks["time_s"][:], np.arange(3, 123))
+
+    def test_frequency(self):
+        change, told = self.only_change("kind: mode_frequency, mode: 7, value: 1e-4")
+        self.assertEqual(change["kind"], "frequency")
+        self.assertAlmostEqual(change["mode_hz"], MODE_HZ, places=2)
+        self.assert_size(change, 1e-4)
+        tracked = next(t for t in told["tracked"] if t["kind"] == "frequency" and "181.147" in t["name"])
+        self.assertLess(abs(tracked["change"] - 1e-4), 5 * tracked["deviation"] + 1e-6)
+
+    def test_damping(self):
+        change, _ = self.only_change("kind: mode_damping, mode: 7, value: 0.02")
+        self.assertEqual(change["kind"], "damping")
+        self.assert_size(change, 0.02)
+
+    def test_all_frequencies(self):
+        change, _ = self.only_change("kind: mode_frequency, value: -1e-3")
+        self.assertEqual(change["kind"], "all_frequencies")
+        self.assert_size(change, -1e-3)
+
+    def test_gains(self):
+        change, _ = self.only_change("kind: sensor_gain, channel: s2, value: 1.01")
+        self.assertEqual((change["kind"], change["channel"]), ("sensor_gain", "s2"))
+        self.assert_size(change, 0.01)
+        change, _ = self.only_change("kind: actuator_gain, channel: a2, value: 0")
+        self.assertEqual((change["kind"], change["channel"]), ("actuator_gain", "a2"))
+        self.assertIn("dead", change["text"])
+
+    def test_delay(self):
+        change, _ = self.only_change("kind: extra_delay, value: 1")
+        self.assertEqual(change["kind"], "delay")
+        self.assert_size(change, 5e-4)
+
+    def test_noise(self):
+        change, _ = self.only_change("kind: sensor_noise, channel: s1, value: 3")
+        self.assertEqual((change["kind"], change["channel"]), ("noise", "s1"))
+        self.assertAlmostEqual(change["size"], 2.0, delta=0.5)  # the force noise does not grow
+
+    def test_a_gap_is_no_change(self):
+        self.record("gap", f"kind: missed_cycle, from_cycle: {FROM_CYCLE}, cycles: 5")
+        told = self.watch("gap.slog", 0)
+        self.assertEqual((told["changes"], told["skipped_periods"]), ([], 1))
+
+    def test_a_growing_log(self):
+        self.record("whole", f"kind: mode_frequency, mode: 7, value: 1e-4, from_cycle: {FROM_CYCLE}")
+        content = (WORK / "whole.slog").read_bytes()
+        growing = WORK / "growing.slog"
+        growing.write_bytes(content[: len(content) // 3])
+        watching = subprocess.Popen([PROGRAM, "watch", "model/model.json", "growing.slog", "--follow", "--json", "--events",
+                                     "growing.jsonl"], cwd=WORK, stdout=subprocess.PIPE, text=True)
+        with growing.open("ab") as log:
+            for part in range(len(content) // 3, len(content), 100003):
+                log.write(content[part : part + 100003])
+                log.flush()
+                time.sleep(0.02)
+        told, _ = watching.communicate(timeout=60)
+        self.assertEqual(watching.returncode, 3)
+        self.assertEqual(json.loads(told)["changes"], self.watch("whole.slog", 3)["changes"])
+        event = json.loads((WORK / "growing.jsonl").read_text())
+        self.assertEqual((event["event"], event["kind"]), ("change", "frequency"))
+
+    def test_a_cut_log(self):
+        content = (WORK / "same.slog").read_bytes()
+        (WORK / "cut.slog").write_bytes(content[: len(content) // 2])
+        done = self.call("watch", "model/model.json", "cut.slog")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("log recover", done.stderr)
+
+    def test_too_few_periods(self):
+        told = self.watch("same.slog", 3, "--learn", "500")
+        self.assertEqual((told["changes"], told["learning_periods"]), ([], 120))
+
+    def test_requests_that_cannot_be_met(self):
+        for flags in (["--false-alarms", "3"], ["--false-alarms", "1/minute"], ["--band", "900", "950"], ["--learn", "2"]):
+            done = self.call("watch", "model/model.json", "same.slog", *flags)
+            self.assertEqual(done.returncode, 2, flags)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
