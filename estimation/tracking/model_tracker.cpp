@@ -9,6 +9,7 @@
 #include <complex>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -286,6 +287,25 @@ struct ModelTracker::State {
   struct Explanation;
   Explanation explain(const PossibleChange& change, const PeriodSpectra& mean,
                       double linear_size) const;
+  double median_inflation() const {
+    std::vector<double> ratios;
+    for (const PossibleChange& change : possible)
+      if (const Eigen::VectorXd& d = change.direction; d.size() > 0)
+        ratios.push_back(d.dot(K * d) / d.dot(A * d));
+    std::ranges::sort(ratios);
+    return ratios.empty() ? 1.0 : ratios[ratios.size() / 2];
+  }
+  /// Least damping ratio of the modes whose frequency moves; infinite if none does.
+  double narrowest(const PossibleChange& change) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (Eigen::Index p = 0; p < response.size(); ++p) {
+      const TrackedParameter& of = response.parameters()[static_cast<std::size_t>(p)];
+      if (of.kind != TrackedKind::frequency || change.direction[p] == 0.0) continue;
+      const Submodel& mode = response.model().submodels[static_cast<std::size_t>(of.index)];
+      least = std::min(least, mode.damping_ratio());
+    }
+    return least;
+  }
   bool is_gain(const PossibleChange& change) const {
     const TrackedKind kind = response.parameters()[static_cast<std::size_t>(change.index)].kind;
     return change.kind == ChangeKind::all_gains ||
@@ -330,13 +350,18 @@ ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChan
   const double largest = largest_changes(response.parameters(), response.model().sample_rate_hz)
                              .cwiseProduct(change.direction)
                              .maxCoeff();
+  const auto try_size = [&](double size) {
+    const double square = left(size).squaredNorm();
+    if (square >= least) return;
+    least = square;
+    best.size = size;
+  };
   for (double size = is_gain(change) ? 0.0 : largest; size > 1e-3 * largest; size *= 0.5)
-    for (const double candidate : {size, -size}) {
-      const double square = left(candidate).squaredNorm();
-      if (square >= least) continue;
-      least = square;
-      best.size = candidate;
-    }
+    for (const double candidate : {size, -size}) try_size(candidate);
+  // Resonances are narrow.
+  const double step = std::max(narrowest(change), 0.01 * largest);
+  for (double size = step; size <= largest; size += step)
+    for (const double candidate : {size, -size}) try_size(candidate);
   for (int iteration = 0; iteration < 10; ++iteration) {
     const double difference = 1e-4 * std::abs(best.size) + 1e-12 * largest;
     const Eigen::VectorXd now = left(best.size);
@@ -358,6 +383,8 @@ StageChange ModelTracker::State::name(int since) const {
   const double independent = since / (1.0 + static_cast<double>(since) / options.learning_periods);
   const std::size_t kept = std::min(periods.size(), static_cast<std::size_t>(since));
   const PeriodSpectra mean = mean_of(periods, kept);
+  // Of a chi-square, by weights from few periods; the same for all, so that it does not choose between them.
+  const double inflation = median_inflation();
   std::vector<StageChange> changes;
   for (std::size_t h = 0; h < possible.size(); ++h) {
     StageChange change;
@@ -377,11 +404,13 @@ StageChange ModelTracker::State::name(int since) const {
       const double scale = std::sqrt(d.dot(K * d)) / information;
       change.size = score * scale;
       change.deviation = scale / std::sqrt(independent);
+      double explained = change.size * change.size * information;
       if (static_cast<int>(kept) == since) {
         const Explanation exact = explain(change.what, mean, change.size);
         change.size = exact.size;
-        change.statistic = exact.explained * independent / (scale * scale * information);
+        explained = exact.explained;
       }
+      change.statistic = explained * independent / inflation;
     }
     changes.push_back(change);
   }
