@@ -7,7 +7,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kMostDifference = 0.05;  // of the frequency; modes farther apart are not paired
 constexpr double kLeastMac = 0.1;  // of the residues; modes with less similar shapes are not paired
 
 struct Candidate {
@@ -37,7 +36,7 @@ std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
           second[b].natural_frequency_hz / first[a].natural_frequency_hz - 1.0;
       const ModePair pair{a, b, difference, output_mac(row, column), input_mac(row, column)};
       const double mac = pair.output_mac * pair.input_mac;
-      const double nearness = 1.0 - std::abs(difference) / kMostDifference;
+      const double nearness = 1.0 - std::abs(difference) / kMostModeDifference;
       if (nearness >= 0.0 && mac >= kLeastMac) out.push_back({pair, mac * nearness});
     }
   return out;

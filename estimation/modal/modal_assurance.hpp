@@ -20,6 +20,9 @@ Eigen::MatrixXd modal_assurance(const Eigen::MatrixXcd& a, const Eigen::MatrixXc
 Eigen::MatrixXcd output_shapes(const std::vector<ModeShape>& modes);
 Eigen::MatrixXcd input_shapes(const std::vector<ModeShape>& modes);
 
+/// Relative difference of the frequencies above which modes are not paired.
+inline constexpr double kMostModeDifference = 0.05;
+
 /// Two modes that are considered the same.
 struct ModePair {
   std::size_t first = 0;              ///< index into the first set

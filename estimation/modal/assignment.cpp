@@ -1,0 +1,87 @@
+#include "estimation/modal/assignment.hpp"
+
+#include <limits>
+
+namespace stageid {
+namespace {
+
+/// Extends the pairs by one row, along the cheapest path of exchanges. All arrays have a leading entry 0: in
+/// `row_of`, the new row.
+class Augmentation {
+ public:
+  explicit Augmentation(const Eigen::MatrixXd& cost)
+      : cost_(cost),
+        row_price_(Eigen::VectorXd::Zero(cost.rows() + 1)),
+        column_price_(Eigen::VectorXd::Zero(cost.cols() + 1)),
+        row_of(static_cast<std::size_t>(cost.cols() + 1), 0) {}
+
+  void add(Eigen::Index row) {
+    const Eigen::Index columns = cost_.cols();
+    const double infinity = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd slack = Eigen::VectorXd::Constant(columns + 1, infinity);
+    std::vector<Eigen::Index> before(row_of.size(), 0);
+    std::vector<bool> visited(row_of.size(), false);
+    row_of[0] = row;
+    Eigen::Index at = 0;
+    while (row_of[index(at)] != 0) {
+      visited[index(at)] = true;
+      const Eigen::Index from = row_of[index(at)];
+      Eigen::Index next = 0;
+      double least = infinity;
+      for (Eigen::Index c = 1; c <= columns; ++c) {
+        if (visited[index(c)]) continue;
+        const double reduced = cost_(from - 1, c - 1) - row_price_[from] - column_price_[c];
+        if (reduced < slack[c]) {
+          slack[c] = reduced;
+          before[index(c)] = at;
+        }
+        if (slack[c] < least) {
+          least = slack[c];
+          next = c;
+        }
+      }
+      for (Eigen::Index c = 0; c <= columns; ++c) {
+        if (visited[index(c)]) {
+          row_price_[row_of[index(c)]] += least;
+          column_price_[c] -= least;
+        } else {
+          slack[c] -= least;
+        }
+      }
+      at = next;
+    }
+    for (; at != 0; at = before[index(at)]) row_of[index(at)] = row_of[index(before[index(at)])];
+  }
+
+ private:
+  static std::size_t index(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+  const Eigen::MatrixXd& cost_;
+  Eigen::VectorXd row_price_;
+  Eigen::VectorXd column_price_;
+
+ public:
+  std::vector<Eigen::Index> row_of;  ///< per column, 1-based; 0: none
+};
+
+}  // namespace
+
+std::vector<std::optional<Eigen::Index>> least_cost_pairs(const Eigen::MatrixXd& cost,
+                                                          double limit) {
+  std::vector<std::optional<Eigen::Index>> column_of(static_cast<std::size_t>(cost.rows()));
+  if (cost.size() == 0) return column_of;
+  // Pairs at the limit mean "unpaired", so every row can be paired; rows are the shorter side.
+  const bool turned = cost.rows() > cost.cols();
+  const Eigen::MatrixXd limited =
+      (turned ? Eigen::MatrixXd(cost.transpose()) : cost).cwiseMin(limit);
+  Augmentation pairs(limited);
+  for (Eigen::Index row = 1; row <= limited.rows(); ++row) pairs.add(row);
+  for (Eigen::Index c = 0; c < limited.cols(); ++c) {
+    const Eigen::Index r = pairs.row_of[static_cast<std::size_t>(c + 1)] - 1;
+    if (r < 0 || limited(r, c) >= limit) continue;
+    column_of[static_cast<std::size_t>(turned ? c : r)] = turned ? r : c;
+  }
+  return column_of;
+}
+
+}  // namespace stageid
