@@ -26,7 +26,7 @@ double variance_of(const SeenMode& mode) {
 }  // namespace
 
 double ModeTracks::predicted_variance(const Track& track, double time) const {
-  return track.variance + options_.drift * options_.drift * (time - track.time);
+  return track.variance + options_.drift * options_.drift * std::max(time - track.time, 0.0);
 }
 
 Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& modes) const {

@@ -50,6 +50,7 @@ DOORS = {
     "matio": {"tools"},
     "zlib": {"tools"},
     "zip.h": {"tools"},
+    "sqlite3.h": {"tools"},
     "utf8.h": {"tools"},
     "yaml-cpp/": {"tools"},
     "CLI/": {"tools"},

@@ -18,6 +18,7 @@ void validate_command(CLI::App& app, Console& console);
 void watch_command(CLI::App& app, Console& console);
 void export_command(CLI::App& app, Console& console);
 void import_command(CLI::App& app, Console& console);
+void fleet_command(CLI::App& app, Console& console);
 void report_command(CLI::App& app, Console& console);
 void plot_command(CLI::App& app, Console& console);
 void config_command(CLI::App& app, Console& console);

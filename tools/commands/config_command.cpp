@@ -21,6 +21,8 @@
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/loop_check.hpp"
+#include "tools/fleet/fleet_config.hpp"
+#include "tools/fleet/fleet_jobs.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/format_errors.hpp"
 
@@ -57,7 +59,8 @@ struct FileKind {
 };
 constexpr FileKind kFileKinds[] = {{"experiment", "An experiment", describe_experiment_keys},
                                    {"stage", "A stage", describe_stage_keys},
-                                   {"controller", "A controller", describe_controller_keys}};
+                                   {"controller", "A controller", describe_controller_keys},
+                                   {"fleet", "A fleet", describe_fleet_keys}};
 
 /// stageid config schema | check FILE... | dbc STAGE -o FILE | header STAGE -o FILE
 struct ConfigFlags {
@@ -87,6 +90,11 @@ void check_file(const std::filesystem::path& file, Console& console) {
                                counted(stage.spec.info.actuators.size(), "actuator"),
                                counted(stage.spec.info.sensors.size(), "sensor"),
                                stage.spec.info.sample_rate_hz));
+    return;
+  }
+  if (format_of(file) == "stageid-fleet") {
+    const FleetConfig fleet = load_fleet_config(file);
+    console.result(fmt::format("{}: {}", file.string(), counted(fleet_logs(fleet).size(), "log")));
     return;
   }
   const ExperimentConfig experiment = load_experiment_config(file);
@@ -144,10 +152,12 @@ void config_command(CLI::App& app, Console& console) {
   config.require_subcommand(1);
   auto [schema, schema_flags] = add_command(
       config, console, "schema", "List every key with type, unit, range and default", print_schema);
-  schema.add_option("kind", schema_flags.kind, "experiment | stage | controller; default: all")
-      ->check(CLI::IsMember({"experiment", "stage", "controller"}));
-  auto [check, check_flags] =
-      add_command(config, console, "check", "Check experiment and stage files", check_config);
+  schema
+      .add_option("kind", schema_flags.kind,
+                  "experiment | stage | controller | fleet; default: all")
+      ->check(CLI::IsMember({"experiment", "stage", "controller", "fleet"}));
+  auto [check, check_flags] = add_command(config, console, "check",
+                                          "Check experiment, stage and fleet files", check_config);
   check.add_option("files", check_flags.files, "YAML files")->required();
   const auto add_can_file = [&](const char* name, const char* help, const char* output,
                                 void (*write)(const ConfigFlags&, Console&)) {

@@ -117,32 +117,12 @@ void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
         "the same seed gives the same experiment on every machine");
 }
 
-void describe_frf(ConfigVisitor& v, FrfOptions& f) {
-  v.texts("inputs", f.inputs, {1}, kOptional,
-          "actuators of the response; omitted: the excited ones");
-  v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
-  choose(v, "covariance", f.covariance, kOptional,
-         "diagonal: variances; full: also the covariances between channels");
-  choose(
-      v, "method", f.method, kOptional,
-      "periodic: means over periods; lpm: local polynomial method, which models the transient in "
-      "whole records");
-  choose(v, "periods", f.periods, kOptional,
-         "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
-         "discard periods with glitches); "
-         "unmarked: use all periods without marked samples");
-  count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
-        "odd number of neighbouring lines over which the noise covariance is averaged");
-  v.require(
-      f.covariance_lines % 2 == 1, "smooth_covariance",
-      "smooth_covariance: must be odd: the line and the same number of neighbours on both sides");
-}
-
 void describe(ConfigVisitor& v, ExperimentFile& f) {
   v.choice("format", f.format, {"stageid-experiment"}, kRequired, "file type");
   v.text("stage", f.stage, kRequired, "stage file, relative to this one");
   group(v, "experiment", describe_experiment, f, kRequired, "the measurement");
-  group(v, "frf", describe_frf, f.config.frf, kOptional, "estimation of the frequency response");
+  group(v, "frf", describe_frf_keys, f.config.frf, kOptional,
+        "estimation of the frequency response");
   group(v, "fit", describe_fit_keys, f.config.fit, kOptional, "fit of the model");
   v.group(
       "validation",
@@ -317,6 +297,27 @@ std::filesystem::path stage_file_of(const std::filesystem::path& path, const Yam
 }
 
 }  // namespace
+
+void describe_frf_keys(ConfigVisitor& v, FrfOptions& f) {
+  v.texts("inputs", f.inputs, {1}, kOptional,
+          "actuators of the response; omitted: the excited ones");
+  v.texts("outputs", f.outputs, {1}, kOptional, "sensors of the response; omitted: all");
+  choose(v, "covariance", f.covariance, kOptional,
+         "diagonal: variances; full: also the covariances between channels");
+  choose(
+      v, "method", f.method, kOptional,
+      "periodic: means over periods; lpm: local polynomial method, which models the transient in "
+      "whole records");
+  choose(v, "periods", f.periods, kOptional,
+         "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
+         "discard periods with glitches); "
+         "unmarked: use all periods without marked samples");
+  count(v, "smooth_covariance", f.covariance_lines, 1, 9999, kOptional,
+        "odd number of neighbouring lines over which the noise covariance is averaged");
+  v.require(
+      f.covariance_lines % 2 == 1, "smooth_covariance",
+      "smooth_covariance: must be odd: the line and the same number of neighbours on both sides");
+}
 
 void describe_experiment_keys(ConfigVisitor& visitor) {
   ExperimentFile file;

@@ -37,6 +37,9 @@ struct ExperimentConfig {
 /// @throws FileError, FormatErrors of this file and the stage file.
 ExperimentConfig load_experiment_config(const std::filesystem::path& file);
 
+/// Keys of the section `frf`.
+void describe_frf_keys(ConfigVisitor& visitor, FrfOptions& options);
+
 /// The keys of an experiment file. Used by `stageid config schema`.
 void describe_experiment_keys(ConfigVisitor& visitor);
 

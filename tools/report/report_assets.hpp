@@ -8,6 +8,7 @@ namespace stageid::report {
 extern const std::string_view page_html;  ///< template with {{title}}, {{css}}, {{library_js}}, ...
 extern const std::string_view dashboard_css;
 extern const std::string_view dashboard_js;
+extern const std::string_view fleet_js;
 extern const std::string_view page_css;
 extern const std::string_view page_js;
 extern const std::string_view library_css;

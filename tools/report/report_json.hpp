@@ -3,15 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "tools/report/html_page.hpp"
 #include "tools/report/report_page.hpp"
 
 namespace stageid::report {
-
-/// A block of encoded numbers and the name of the element that holds it.
-struct Block {
-  std::string id;      ///< "response", ...: [a-z_]+
-  std::string base64;  ///< see report_encoding.hpp
-};
 
 /// Data for the script of the page.
 struct PageContent {

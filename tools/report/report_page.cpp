@@ -44,20 +44,12 @@ void check_data(const ReportData& data) {
     throw std::invalid_argument("validation_frf: its lines differ from those of frf");
 }
 
-std::string block_elements(const std::vector<report::Block>& blocks) {
-  std::string out;
-  for (const report::Block& block : blocks)
-    out += fmt::format("<script type=\"text/plain\" id=\"data-{}\">{}</script>\n", block.id,
-                       block.base64);
-  return out;
-}
-
 }  // namespace
 
 std::string report_page(const ReportData& data) {
   check_data(data);
   const report::PageContent content = report::page_content(data);
-  return html_page(HtmlPage::report, data.title, content.json, block_elements(content.blocks));
+  return html_page(HtmlPage::report, data.title, content.json, content.blocks);
 }
 
 void write_report(const std::filesystem::path& file, const ReportData& data) {

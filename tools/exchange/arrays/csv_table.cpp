@@ -129,6 +129,28 @@ ArrayList read_csv(const std::filesystem::path& file) {
   return list;
 }
 
+TextTable read_text_table(const std::filesystem::path& file) {
+  TextLines lines(file);
+  TextTable table;
+  char separator = ',';
+  while (!lines.at_end()) {
+    const std::string_view line = lines.next();
+    if (trimmed(line).empty() || line.starts_with('#') || line.starts_with('%')) continue;
+    if (table.names.empty()) {
+      separator = separator_of(line);
+      table.names = names_of(lines, split(lines, line, separator));
+      continue;
+    }
+    std::vector<std::string> fields = split(lines, line, separator);
+    if (fields.size() != table.names.size())
+      lines.fail(
+          fmt::format("got {} fields; the header has {}", fields.size(), table.names.size()));
+    for (std::string& field : fields) field = utf8_of_text(trimmed(field));
+    table.rows.push_back(std::move(fields));
+  }
+  return table;
+}
+
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",;\t\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";

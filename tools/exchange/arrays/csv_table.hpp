@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "tools/exchange/arrays/named_array.hpp"
 
@@ -13,6 +14,16 @@ namespace stageid {
 /// names are then 1, 2, ... Columns may have different lengths.
 /// @throws FileError, FormatError "FILE:LINE: ..."
 ArrayList read_csv(const std::filesystem::path& file);
+
+/// A table of texts: the first line has the names of the columns.
+struct TextTable {
+  std::vector<std::string> names;
+  std::vector<std::vector<std::string>>
+      rows;  ///< each with as many fields as names, without blanks around them
+};
+
+/// Separators, quotes and comments as in read_csv(). @throws FileError, FormatError "FILE:LINE: ..."
+TextTable read_text_table(const std::filesystem::path& file);
 
 /// A field of a comma-separated table, quoted if necessary.
 std::string csv_field(const std::string& text);

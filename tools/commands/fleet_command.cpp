@@ -1,0 +1,230 @@
+#include "tools/commands/commands.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "acquisition/files/counted.hpp"
+#include "acquisition/files/output_file.hpp"
+#include "tools/commands/command_line.hpp"
+#include "tools/exchange/arrays/csv_table.hpp"
+#include "tools/fleet/fleet_page.hpp"
+#include "tools/fleet/fleet_pairing.hpp"
+#include "tools/fleet/fleet_run.hpp"
+#include "tools/fleet/fleet_time.hpp"
+#include "tools/fleet/identify_log.hpp"
+#include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/output_paths.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// stageid fleet FLEET.yaml
+struct FleetFlags {
+  std::filesystem::path config;
+  int workers = 0;
+};
+
+void run_jobs(const FleetFlags& flags, Console& console) {
+  const FleetConfig config = load_fleet_config(flags.config);
+  require_directory(config.results);
+  say_at_interrupt("finished jobs are stored; run the command again to continue");
+  const FleetSummary summary = run_fleet(config, flags.workers, console);
+  FleetStore store(config.store, Database::Access::write);
+  pair_fleet(store);
+  console.result(
+      fmt::format("{}: {}: {} done before, {} done now, {} of them not trustworthy; {} failed",
+                  config.store.string(), counted(summary.jobs, "job"), summary.done_before,
+                  summary.done, summary.not_trustworthy, summary.failed));
+  console.result({{"store", config.store.string()},
+                  {"jobs", summary.jobs},
+                  {"done_before", summary.done_before},
+                  {"done", summary.done},
+                  {"not_trustworthy", summary.not_trustworthy},
+                  {"failed", summary.failed},
+                  {"elsewhere", summary.elsewhere}});
+  if (summary.elsewhere > 0)
+    console.warning(
+        fmt::format("{}: {} run by another process; run the command again when it has ended",
+                    config.store.string(), counted(summary.elsewhere, "job is", "jobs are")));
+  if (summary.failed > 0)
+    console.warning(fmt::format("{}: {} failed; remove the cause and run the command again",
+                                config.store.string(), counted(summary.failed, "job")));
+  console.exit_code = summary.failed > 0 || summary.elsewhere > 0 ? kWorldFailed
+                      : summary.not_trustworthy > 0               ? kNotTrustworthy
+                                                                  : kDone;
+}
+
+/// stageid fleet job FLEET.yaml LOG
+struct FleetJobFlags {
+  std::filesystem::path config;
+  FleetLog log;
+  std::vector<std::string> tags;
+};
+
+void run_job(const FleetJobFlags& flags, Console& console) {
+  const FleetConfig config = load_fleet_config(flags.config);
+  FleetLog log = flags.log;
+  if (!log.time_utc.empty() && !days_of(log.time_utc))
+    throw std::invalid_argument(
+        fmt::format("--time: got '{}'; expected 2026-05-04T12:34:56Z", log.time_utc));
+  for (const std::string& tag : flags.tags) {
+    const std::size_t at = tag.find('=');
+    if (at == std::string::npos)
+      throw std::invalid_argument(fmt::format("--tag: got '{}'; expected NAME=VALUE", tag));
+    log.tags.emplace_back(tag.substr(0, at), tag.substr(at + 1));
+  }
+  require_readable(log.file);
+  FleetStore store(config.store, Database::Access::create);
+  const std::string fingerprint = log_fingerprint(store, log.file);
+  const std::string job = job_id(fingerprint, config);
+  bool added = false;
+  if (!store.is_done(job)) {
+    const Identification identification = identify_log(config, log, fingerprint, console);
+    added = store.add(identification);
+    if (identification.verdict == IdentificationVerdict::not_trustworthy)
+      console.exit_code = kNotTrustworthy;
+  }
+  console.result(fmt::format("{}: {}", job_folder(config.results, job).string(),
+                             added ? "done" : "was done before"));
+  console.result({{"job", job}, {"added", added}});
+}
+
+/// stageid fleet report STORE -o page.html
+struct FleetReportFlags {
+  std::filesystem::path store;
+  FleetPageRequest request;
+};
+
+void report_fleet(const FleetReportFlags& flags, Console& console) {
+  FleetStore store(flags.store, Database::Access::write);
+  require_ending(flags.request.output, "a page", {".html", ".htm"});
+  require_writable(flags.request.output, {flags.store});
+  for (const std::string& time : {flags.request.since, flags.request.until})
+    if (!time.empty() && !days_of(time))
+      throw std::invalid_argument(
+          fmt::format("--since, --until: got '{}'; expected 2026-05-04", time));
+  pair_fleet(store);  // jobs of other processes
+  write_text_file(flags.request.output, fleet_page(store, flags.request));
+  console.result(fmt::format("wrote {}", flags.request.output.string()));
+  console.result({{"output", flags.request.output.string()}});
+}
+
+/// stageid fleet query STORE [SQL]
+struct FleetQueryFlags {
+  std::filesystem::path store;
+  std::string sql = "stages";
+  std::filesystem::path csv;
+};
+
+bool is_name(const std::string& text) {
+  return text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string::npos;
+}
+
+Json value_of(const Statement& row, int column) {
+  if (row.is_null(column)) return {};
+  if (row.is_integer(column)) return row.integer(column);
+  if (row.is_real(column)) return row.number(column);
+  return row.text(column);
+}
+
+void query_fleet(const FleetQueryFlags& flags, Console& console) {
+  const FleetStore store(flags.store, Database::Access::read);
+  if (!flags.csv.empty()) {
+    require_ending(flags.csv, "a table", {".csv"});
+    require_writable(flags.csv, {flags.store});
+  }
+  Statement rows =
+      store.database().prepare(is_name(flags.sql) ? "SELECT * FROM " + flags.sql : flags.sql);
+  if (!rows.changes_nothing() || rows.columns() == 0)
+    throw std::invalid_argument(
+        fmt::format("{}: expected a table or a SELECT statement", flags.store.string()));
+  std::vector<std::vector<std::string>> table(1);
+  for (int c = 0; c < rows.columns(); ++c) table[0].push_back(rows.name(c));
+  Json list = Json::array();
+  while (rows.step()) {
+    table.emplace_back();
+    Json object = Json::object();
+    for (int c = 0; c < rows.columns(); ++c) {
+      const Json value = value_of(rows, c);
+      const bool rounded = value.is_number_float() && flags.csv.empty();
+      table.back().push_back(rounded ? fmt::format("{:.7g}", rows.number(c)) : rows.text(c));
+      if (console.json) object[table[0][static_cast<std::size_t>(c)]] = value;
+    }
+    if (console.json) list.push_back(std::move(object));
+  }
+  console.result({{"rows", list}});
+  if (flags.csv.empty()) {
+    for (const std::string& line : table_lines(table)) console.result(line);
+    return;
+  }
+  std::string text;
+  for (const std::vector<std::string>& row : table)
+    for (std::size_t c = 0; c < row.size(); ++c)
+      text += csv_field(row[c]) + (c + 1 < row.size() ? "," : "\n");
+  write_text_file(flags.csv, text);
+  console.result(fmt::format("wrote {}: {}", flags.csv.string(), counted(table.size() - 1, "row")));
+}
+
+}  // namespace
+
+void fleet_command(CLI::App& app, Console& console) {
+  CLI::App& fleet =
+      add_command(app, "fleet", "Identify many logs, and follow their modes over time and stages");
+  const auto flags = std::make_shared<FleetFlags>();
+  fleet.final_callback([&fleet, &console, flags] {
+    const bool subcommand = !fleet.get_subcommands().empty();
+    if (subcommand && !flags->config.empty())
+      throw std::invalid_argument(fmt::format(
+          "unexpected argument '{}'; see 'stageid fleet --help'", flags->config.string()));
+    if (subcommand) return;
+    if (flags->config.empty())
+      throw std::invalid_argument(
+          "fleet: a fleet file or a subcommand is missing; see 'stageid fleet --help'");
+    run_jobs(*flags, console);
+  });
+  fleet.add_option("config", flags->config, "fleet file (.yaml)");
+  fleet.add_option("--workers", flags->workers, "jobs at a time; 0: one per core")
+      ->check(kNotNegative)
+      ->capture_default_str();
+
+  auto [job, job_flags] =
+      add_command(fleet, console, "job",
+                  "Run one job, as 'stageid fleet' does for every log; for schedulers", run_job);
+  job.add_option("config", job_flags.config, "fleet file (.yaml)")->required();
+  job.add_option("log", job_flags.log.file, "its log")->required();
+  job.add_option("--stage", job_flags.log.stage, "name of the stage; default: see 'stage_name'");
+  job.add_option("--time", job_flags.log.time_utc,
+                 "time of the measurement, ISO 8601 in UTC; default: that in the log");
+  job.add_option("--tag", job_flags.tags, "NAME=VALUE; repeatable")->allow_extra_args(false);
+
+  auto [report, report_flags] = add_command(
+      fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
+  report.add_option("store", report_flags.store, "store of a fleet (.db)")->required();
+  report.add_option("-o,--output", report_flags.request.output, "page to write (.html)")
+      ->required();
+  report.add_option("--stage", report_flags.request.stages, "stages to show; default: all");
+  report.add_option("--since", report_flags.request.since,
+                    "first time to show, such as 2026-05-04");
+  report.add_option("--until", report_flags.request.until, "end of the time to show, not included");
+
+  auto [query, query_flags] = add_command(
+      fleet, console, "query", "Print a table of a store, or write it as CSV", query_fleet);
+  query.add_option("store", query_flags.store, "store of a fleet (.db)")->required();
+  query
+      .add_option("sql", query_flags.sql,
+                  "stages | modes | stage_modes | identifications | outliers | another table | an "
+                  "SQL statement, which cannot change the store")
+      ->capture_default_str();
+  query.add_option("--csv", query_flags.csv, "file to write instead of printing");
+}
+
+}  // namespace stageid

@@ -1,0 +1,188 @@
+#include "tools/fleet/fleet_page.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "acquisition/files/key_suggestion.hpp"
+#include "acquisition/files/version.hpp"
+#include "tools/fleet/fleet_series.hpp"
+#include "tools/fleet/fleet_time.hpp"
+#include "tools/report/html_page.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr unsigned char kNoFolder = 255;
+
+class FleetPage {
+ public:
+  FleetPage(const FleetStore& store, const FleetPageRequest& request)
+      : database_(store.database()), request_(request) {}
+
+  std::string html() {
+    Json stages = Json::array();
+    for (const auto& [name, id] : chosen_stages()) stages.push_back(stage(id, name));
+    if (count_ == 0)
+      throw std::invalid_argument(
+          fmt::format("{}: contains no identification of this time; change --since and --until",
+                      database_.file().string()));
+    Json content = {{"version", version()},
+                    {"title", database_.file().stem().string()},
+                    {"stages", stages},
+                    {"outliers", outliers_},
+                    {"folders", folder_links()}};
+    const std::vector<report::Block> blocks = series_.blocks(content["arrays"]);
+    return html_page(HtmlPage::fleet, fmt::format("{}: fleet", database_.file().stem().string()),
+                     script_safe(content.dump(-1, ' ', false, Json::error_handler_t::replace)),
+                     blocks);
+  }
+
+ private:
+  std::vector<std::pair<std::string, std::int64_t>> chosen_stages() const {
+    std::vector<std::pair<std::string, std::int64_t>> out;
+    std::vector<std::string> names;
+    Statement rows = database_.prepare("SELECT id, name FROM stage ORDER BY name");
+    while (rows.step()) {
+      names.push_back(rows.text(1));
+      if (request_.stages.empty() || std::ranges::count(request_.stages, names.back()) > 0)
+        out.emplace_back(names.back(), rows.integer(0));
+    }
+    for (const std::string& wanted : request_.stages)
+      if (std::ranges::count(names, wanted) == 0)
+        throw std::invalid_argument(fmt::format(
+            "--stage: unknown stage '{}'{}; 'stageid fleet query {} stages' lists them", wanted,
+            nearest_word(wanted, names).empty()
+                ? ""
+                : fmt::format(", did you mean '{}'?", nearest_word(wanted, names)),
+            database_.file().string()));
+    return out;
+  }
+
+  /// "i" is the table identification; its parameters are those of bind_period().
+  static constexpr const char* kOfPeriod =
+      "WHERE i.stage_id = ? AND i.time_utc >= ? AND i.time_utc < ? ORDER BY i.time_utc, i.job";
+
+  Statement of_period(const std::string& select, std::int64_t stage) const {
+    Statement rows = database_.prepare(select + kOfPeriod);
+    rows.bind(stage, request_.since, request_.until.empty() ? std::string("~") : request_.until);
+    return rows;
+  }
+
+  unsigned char folder(const std::string& results) {
+    if (results.empty()) return kNoFolder;
+    const auto known = std::ranges::find(folders_, results);
+    if (known != folders_.end()) return static_cast<unsigned char>(known - folders_.begin());
+    if (folders_.size() == kNoFolder) return kNoFolder;
+    folders_.push_back(results);
+    return static_cast<unsigned char>(folders_.size() - 1);
+  }
+
+  /// From the folder of the page.
+  Json folder_links() const {
+    Json links = Json::array();
+    const auto of = [](const std::filesystem::path& file) {
+      return std::filesystem::absolute(file).lexically_normal().parent_path();
+    };
+    for (const std::string& results : folders_)
+      links.push_back((of(database_.file()) / results)
+                          .lexically_normal()
+                          .lexically_proximate(of(request_.output))
+                          .generic_string());
+    return links;
+  }
+
+  Json stage(std::int64_t id, const std::string& name) {
+    Statement rows = of_period(
+        "SELECT i.id, i.time_utc, i.verdict, i.outlier, i.reasons, i.job, i.results "
+        "FROM identification i ",
+        id);
+    std::map<std::int64_t, std::size_t> place;  // per identification
+    std::size_t counts[3] = {0, 0, 0};          // per verdict
+    const std::size_t first = count_;
+    while (rows.step()) {
+      const auto verdict =
+          from_word<IdentificationVerdict>(rows.text(2)).value_or(IdentificationVerdict::failed);
+      place[rows.integer(0)] = count_ - first;
+      ++counts[static_cast<std::size_t>(verdict)];
+      series_.add_identification(days_of(rows.text(1)).value_or(0.0),
+                                 static_cast<unsigned char>(verdict), folder(rows.text(6)),
+                                 rows.text(5));
+      const bool doubtful = verdict != IdentificationVerdict::trustworthy;
+      if (doubtful || !rows.is_null(3))
+        outliers_.push_back({count_, doubtful ? rows.text(4) : "", rows.text(3)});
+      if (++count_ > kMostOnPage)
+        throw std::invalid_argument(fmt::format(
+            "{}: more than {} identifications are too many for one page; choose some with --stage, "
+            "--since and --until",
+            database_.file().string(), kMostOnPage));
+    }
+    return {{"name", name},          {"first", first},      {"count", count_ - first},
+            {"doubtful", counts[1]}, {"failed", counts[2]}, {"tracks", tracks(id, place)}};
+  }
+
+  Json tracks(std::int64_t stage, const std::map<std::int64_t, std::size_t>& place) {
+    struct Track {
+      Json about;
+      std::vector<std::uint8_t> present;
+      std::vector<double> frequency_hz;
+      std::vector<double> std_hz;
+    };
+    std::map<std::int64_t, Track> by_track;
+    std::vector<std::int64_t> in_order;  // of the modes
+    Statement known = database_.prepare(
+        "SELECT track, mode, frequency_hz, frequency_std_hz, damping_ratio, deviation FROM track "
+        "WHERE stage_id = ? AND mode IS NOT NULL ORDER BY mode, track");
+    known.bind(stage);
+    while (known.step()) {
+      in_order.push_back(known.integer(0));
+      by_track[in_order.back()] = {{{"mode", known.integer(1)},
+                                    {"frequency_hz", known.number(2)},
+                                    {"spread_hz", known.number(3)},
+                                    {"damping_ratio", known.number(4)},
+                                    {"deviation", known.number(5)}},
+                                   std::vector<std::uint8_t>(place.size(), 0),
+                                   {},
+                                   {}};
+    }
+    Statement rows = of_period(
+        "SELECT i.id, m.track, m.frequency_hz, m.frequency_std_hz FROM identification i "
+        "JOIN mode m ON m.identification_id = i.id ",
+        stage);
+    while (rows.step()) {
+      const auto track = by_track.find(rows.integer(1));
+      if (rows.is_null(1) || track == by_track.end()) continue;
+      track->second.present[place.at(rows.integer(0))] = 1;
+      track->second.frequency_hz.push_back(rows.number(2));
+      track->second.std_hz.push_back(rows.number(3));
+    }
+    Json out = Json::array();
+    for (const std::int64_t number : in_order) {
+      Track& track = by_track[number];
+      if (track.frequency_hz.empty()) continue;
+      track.about.update(series_.add_track(track.present, track.frequency_hz, track.std_hz));
+      out.push_back(std::move(track.about));
+    }
+    return out;
+  }
+
+  const Database& database_;
+  const FleetPageRequest& request_;
+  FleetSeries series_;
+  std::size_t count_ = 0;
+  std::vector<std::string> folders_;
+  Json outliers_ = Json::array();
+};
+
+}  // namespace
+
+std::string fleet_page(const FleetStore& store, const FleetPageRequest& request) {
+  return FleetPage(store, request).html();
+}
+
+}  // namespace stageid

@@ -1,0 +1,259 @@
+#include "tools/fleet/fleet_pairing.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+
+#include "estimation/modal/mode_tracks.hpp"
+#include "frf/statistics/order_statistic.hpp"
+#include "tools/fleet/fleet_time.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr double kFar = 6.0;  // standard deviations of an outlier
+constexpr double kUsualShare =
+    0.8;  // of the identifications: a mode that is seen so often should be seen
+constexpr double kLeastShare =
+    0.2;  // of the identifications: a mode that is seen less often has no number
+constexpr double kStageSpread = 0.01;  // of a frequency between stages, relative
+constexpr std::size_t kLeastStages = 5;
+
+struct Row {
+  std::int64_t identification = 0;
+  std::int64_t number = 0;
+  std::size_t day = 0;  ///< index of the identification
+  double damping_ratio = 0.0;
+  std::size_t track = 0;
+  double deviation = 0.0;
+  SeenMode mode;
+};
+
+/// The identifications of a stage by time, and their modes.
+struct StageYear {
+  std::vector<std::int64_t> identifications;
+  std::vector<double> days;
+  std::vector<Row> rows;
+};
+
+std::size_t names_in(const std::string& list) {
+  return static_cast<std::size_t>(std::ranges::count(list, ',')) + 1;
+}
+
+StageYear read_stage(const Database& database, std::int64_t stage) {
+  StageYear year;
+  Statement rows = database.prepare(
+      "SELECT i.id, i.time_utc, m.number, m.frequency_hz, m.frequency_std_hz, m.damping_ratio, "
+      "m.shape_std, m.shape, c.outputs "
+      "FROM identification i JOIN channels c ON c.id = i.channels_id "
+      "LEFT JOIN mode m ON m.identification_id = i.id "
+      "WHERE i.stage_id = ? ORDER BY i.time_utc, i.job, m.number");
+  rows.bind(stage);
+  while (rows.step()) {
+    if (year.identifications.empty() || year.identifications.back() != rows.integer(0)) {
+      year.identifications.push_back(rows.integer(0));
+      year.days.push_back(days_of(rows.text(1)).value_or(0.0));
+    }
+    if (rows.is_null(2)) continue;
+    Row row;
+    row.identification = rows.integer(0);
+    row.number = rows.integer(2);
+    row.day = year.days.size() - 1;
+    row.damping_ratio = rows.number(5);
+    row.mode = {rows.number(3), rows.number(4),
+                residue_shape(rows.bytes(7), names_in(rows.text(8))), rows.number(6)};
+    year.rows.push_back(std::move(row));
+  }
+  return year;
+}
+
+/// @returns the tracks
+ModeTracks follow(StageYear& year) {
+  ModeTracks tracks;
+  std::size_t first = 0;
+  for (std::size_t day = 0; day < year.days.size(); ++day) {
+    std::size_t end = first;
+    std::vector<SeenMode> modes;
+    for (; end < year.rows.size() && year.rows[end].day == day; ++end)
+      modes.push_back(year.rows[end].mode);
+    const std::vector<std::size_t> found = tracks.add(year.days[day], modes);
+    for (std::size_t i = 0; i < found.size(); ++i) year.rows[first + i].track = found[i];
+    first = end;
+  }
+  return tracks;
+}
+
+/// The rows of each track, in order of time.
+std::vector<std::vector<Row*>> by_track(StageYear& year, std::size_t tracks) {
+  std::vector<std::vector<Row*>> rows(tracks);
+  for (Row& row : year.rows) rows[row.track].push_back(&row);
+  return rows;
+}
+
+/// Per identification, what is unusual about its modes.
+std::vector<std::vector<std::string>> unusual(const StageYear& year,
+                                              const std::vector<std::vector<Row*>>& tracks) {
+  std::vector<std::vector<std::string>> reasons(year.days.size());
+  for (const std::vector<Row*>& rows : tracks) {
+    std::vector<double> values;
+    std::vector<double> deviation;
+    for (const Row* row : rows) {
+      values.push_back(std::log(row->mode.frequency_hz));
+      deviation.push_back(row->mode.frequency_std_hz / row->mode.frequency_hz);
+    }
+    const std::vector<double> far = deviations_from_past(values, deviation);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      rows[i]->deviation = far[i];
+      if (std::abs(far[i]) > kFar)
+        reasons[rows[i]->day].push_back(
+            fmt::format("{:.5g} Hz: {:+.1f} standard deviations from the past",
+                        rows[i]->mode.frequency_hz, far[i]));
+    }
+    const std::size_t begin = rows.front()->day;
+    const auto days = static_cast<double>(year.days.size() - begin);
+    if (static_cast<double>(rows.size()) < kUsualShare * days) continue;
+    auto next = rows.begin();
+    for (std::size_t day = begin; day < year.days.size(); ++day) {
+      if (next != rows.end() && (*next)->day == day)
+        ++next;
+      else
+        reasons[day].push_back(
+            fmt::format("{:.5g} Hz: the mode is missing", (*std::prev(next))->mode.frequency_hz));
+    }
+  }
+  return reasons;
+}
+
+double median_of(const std::vector<Row*>& rows, double (*value)(const Row&)) {
+  std::vector<double> values;
+  for (const Row* row : rows) values.push_back(value(*row));
+  return median(values);
+}
+
+std::vector<std::complex<float>> floats_of(const Eigen::VectorXcd& shape) {
+  const Eigen::VectorXcf floats = shape.cast<std::complex<float>>();
+  return {floats.begin(), floats.end()};
+}
+
+void store_stage(const Database& database, std::int64_t stage, const StageYear& year,
+                 const ModeTracks& tracks, const std::vector<std::vector<Row*>>& rows,
+                 const std::vector<std::vector<std::string>>& reasons) {
+  Statement mode = database.prepare(
+      "UPDATE mode SET track = ?, deviation = ? WHERE identification_id = ? AND number = ?");
+  for (const Row& row : year.rows)
+    mode.run(row.track, row.deviation, row.identification, row.number);
+  Statement outlier = database.prepare("UPDATE identification SET outlier = ? WHERE id = ?");
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    outlier.run(reasons[i].empty() ? std::optional<std::string>()
+                                   : fmt::format("{}", fmt::join(reasons[i], "; ")),
+                year.identifications[i]);
+  database.prepare("DELETE FROM track WHERE stage_id = ?").run(stage);
+  Statement track = database.prepare(
+      "INSERT INTO track (stage_id, track, seen, frequency_hz, frequency_std_hz, damping_ratio, "
+      "shape) VALUES (?, ?, ?, ?, ?, ?, ?)");
+  for (std::size_t t = 0; t < rows.size(); ++t) {
+    const double hz = median_of(rows[t], [](const Row& row) { return row.mode.frequency_hz; });
+    double square = 0.0;
+    for (const Row* row : rows[t]) square += std::pow(row->mode.frequency_hz - hz, 2);
+    track.run(stage, t, rows[t].size(), hz, std::sqrt(square / static_cast<double>(rows[t].size())),
+              median_of(rows[t], [](const Row& row) { return row.damping_ratio; }),
+              floats_of(tracks.mode(t).shape));
+  }
+  database.prepare("UPDATE stage SET changed = 2 WHERE id = ?").run(stage);
+}
+
+struct StageTrack {
+  std::int64_t stage = 0;
+  std::int64_t track = 0;
+  std::size_t mode = 0;
+  SeenMode seen;
+};
+
+std::vector<StageTrack> read_tracks(const Database& database) {
+  std::vector<StageTrack> out;
+  Statement rows = database.prepare(
+      "SELECT t.stage_id, t.track, t.frequency_hz, t.shape FROM track t "
+      "JOIN stage s ON s.id = t.stage_id "
+      "WHERE t.seen >= ? * (SELECT COUNT(*) FROM identification i WHERE i.stage_id = t.stage_id "
+      "AND "
+      "i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
+  rows.bind(kLeastShare);
+  while (rows.step()) {
+    const std::span<const std::byte> bytes = rows.bytes(3);
+    Eigen::VectorXcf shape(static_cast<Eigen::Index>(bytes.size() / sizeof(std::complex<float>)));
+    std::copy(bytes.begin(), bytes.end(), reinterpret_cast<std::byte*>(shape.data()));
+    const double hz = rows.number(2);
+    out.push_back({rows.integer(0),
+                   rows.integer(1),
+                   0,
+                   {hz, kStageSpread * hz, shape.cast<std::complex<double>>(), 0.0}});
+  }
+  return out;
+}
+
+/// Stages are paired one after another, as days are, but without drift.
+void pair_stages(const Database& database) {
+  std::vector<StageTrack> all = read_tracks(database);
+  ModeTracks modes({.drift = 0.0, .shape_change = 0.2, .shape_memory = 1e9});
+  for (std::size_t first = 0; first < all.size();) {
+    std::size_t end = first;
+    std::vector<SeenMode> seen;
+    for (; end < all.size() && all[end].stage == all[first].stage; ++end)
+      seen.push_back(all[end].seen);
+    const std::vector<std::size_t> found = modes.add(0.0, seen);
+    for (std::size_t i = 0; i < found.size(); ++i) all[first + i].mode = found[i];
+    first = end;
+  }
+  std::vector<std::vector<double>> values(modes.size());
+  for (const StageTrack& track : all)
+    values[track.mode].push_back(std::log(track.seen.frequency_hz));
+  // Numbers by frequency.
+  std::vector<std::size_t> order(modes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t m) { return modes.mode(m).frequency_hz; });
+  std::vector<std::size_t> number(modes.size());
+  for (std::size_t i = 0; i < order.size(); ++i) number[order[i]] = i + 1;
+
+  Statement store =
+      database.prepare("UPDATE track SET mode = ?, deviation = ? WHERE stage_id = ? AND track = ?");
+  for (const StageTrack& track : all) {
+    std::vector<double> others = values[track.mode];
+    std::optional<double> deviation;
+    if (others.size() >= kLeastStages) {
+      const double centre = median(others);
+      for (double& value : others) value = std::abs(value - centre);
+      const double spread = 1.4826 * median(others);
+      if (spread > 0.0) deviation = (std::log(track.seen.frequency_hz) - centre) / spread;
+    }
+    store.run(number[track.mode], deviation, track.stage, track.track);
+  }
+}
+
+}  // namespace
+
+void pair_fleet(FleetStore& store) {
+  const Database& database = store.database();
+  std::vector<std::int64_t> changed;
+  Statement stages = database.prepare("SELECT id FROM stage WHERE changed = 1 ORDER BY id");
+  while (stages.step()) changed.push_back(stages.integer(0));
+  for (const std::int64_t stage : changed) {
+    Transaction transaction(database);
+    StageYear year = read_stage(database, stage);
+    const ModeTracks tracks = follow(year);
+    const std::vector<std::vector<Row*>> rows = by_track(year, tracks.size());
+    store_stage(database, stage, year, tracks, rows, unusual(year, rows));
+    transaction.commit();
+  }
+  // 2: followed over time, but not yet compared with the other stages, even if an earlier call was interrupted.
+  if (!database.prepare("SELECT 1 FROM stage WHERE changed = 2").step()) return;
+  Transaction transaction(database);
+  pair_stages(database);
+  database.execute("UPDATE stage SET changed = 0 WHERE changed = 2");
+  transaction.commit();
+}
+
+}  // namespace stageid

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+
+#include "tools/fleet/fleet_config.hpp"
+#include "tools/terminal/console.hpp"
+
+namespace stageid {
+
+/// Numbers of jobs.
+struct FleetSummary {
+  std::size_t jobs = 0;
+  std::size_t done_before = 0;
+  std::size_t done = 0;             ///< by this call
+  std::size_t not_trustworthy = 0;  ///< of these
+  std::size_t failed = 0;
+  std::size_t elsewhere = 0;  ///< are run by another process
+};
+
+/// Runs every job of a fleet that is not in its store, each in a process of its own, so that a damaged log ends one job
+/// only. A failed job is stored with its error and runs again next time. Several processes may run the same fleet:
+/// each job is claimed by a lock that the system releases when its process ends.
+/// @param workers processes at a time; 0: one per core
+/// @throws FileError, FormatError, std::invalid_argument: nothing more can be stored, or nothing can be read
+FleetSummary run_fleet(const FleetConfig& config, int workers, const Console& console);
+
+}  // namespace stageid

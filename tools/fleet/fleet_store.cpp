@@ -1,0 +1,180 @@
+#include "tools/fleet/fleet_store.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <complex>
+#include <cstring>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/input_files.hpp"
+#include "acquisition/files/version.hpp"
+#include "tools/fleet/fleet_schema.hpp"
+#include "tools/terminal/text_lines.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kStoreFormat = "stageid-fleet-store";
+
+using ComplexFloat = std::complex<float>;
+
+std::vector<ComplexFloat> shape_floats(const StoredMode& mode) {
+  std::vector<ComplexFloat> shape;
+  for (const Eigen::VectorXcd* part : {&mode.output_shape, &mode.input_shape})
+    for (const std::complex<double>& entry : *part) shape.emplace_back(entry);
+  return shape;
+}
+
+void create_tables(const Database& database) {
+  Transaction transaction(database);
+  // Another process may have created them in the meantime.
+  if (!database.prepare("SELECT 1 FROM sqlite_master").step()) {
+    database.execute(kFleetSchema);
+    database.prepare("INSERT INTO store VALUES (?, ?)")
+        .run(std::string(kStoreFormat), kFleetSchemaVersion);
+  }
+  transaction.commit();
+}
+
+void require_store(const Database& database) {
+  Statement table = database.prepare("SELECT name FROM sqlite_master WHERE name = 'store'");
+  if (!table.step())
+    throw FormatError(database.file(), "",
+                      "is not a store of 'stageid fleet'; choose another file");
+  Statement store = database.prepare("SELECT format, schema_version FROM store");
+  if (!store.step() || store.text(0) != kStoreFormat)
+    throw FormatError(database.file(), "",
+                      "is not a store of 'stageid fleet'; choose another file");
+  if (store.integer(1) != kFleetSchemaVersion)
+    throw FormatError(database.file(), "",
+                      fmt::format("has schema version {}; this program supports version {}",
+                                  store.integer(1), kFleetSchemaVersion));
+}
+
+}  // namespace
+
+FleetStore::FleetStore(const std::filesystem::path& file, Database::Access access)
+    : database_(file, access) {
+  note_own_file(file);
+  if (access == Database::Access::create) create_tables(database_);
+  require_store(database_);
+  done_ = database_.prepare("SELECT 1 FROM identification WHERE job = ? AND verdict <> 'failed'");
+  add_identification_ = database_.prepare(
+      "INSERT INTO identification (job, stage_id, time_utc, verdict, reasons, relative_rms_error, "
+      "health, log, log_fingerprint, version, configuration_id, channels_id, results) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  add_mode_ = database_.prepare(
+      "INSERT INTO mode (identification_id, number, frequency_hz, frequency_std_hz, "
+      "damping_ratio, damping_ratio_std, modal_mass, shape_std, shape) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  add_tag_ = database_.prepare("INSERT INTO tag VALUES (?, ?, ?, ?)");
+  const std::string failed = "verdict = 'failed' AND (job = ? OR log = ?)";
+  remove_failed_ = database_.prepare("DELETE FROM identification WHERE " + failed);
+  remove_tags_ = database_.prepare(
+      "DELETE FROM tag WHERE identification_id IN (SELECT id FROM identification WHERE " + failed +
+      ")");
+  changed_ = database_.prepare("UPDATE stage SET changed = 1 WHERE id = ? AND changed = 0");
+}
+
+std::set<std::string> FleetStore::done_jobs() const {
+  std::set<std::string> jobs;
+  Statement rows = database_.prepare("SELECT job FROM identification WHERE verdict <> 'failed'");
+  while (rows.step()) jobs.insert(rows.text(0));
+  return jobs;
+}
+
+bool FleetStore::is_done(const std::string& job) { return done_->found(job); }
+
+std::int64_t FleetStore::id_of(const Lookup& lookup, const std::vector<std::string>& key) {
+  const auto key_and_id = std::pair(std::string(lookup.table), key);
+  if (const auto known = ids_.find(key_and_id); known != ids_.end()) return known->second;
+  const auto bound = [&](const char* sql) {
+    Statement statement = database_.prepare(sql);
+    key.size() == 1 ? statement.bind(key[0]) : statement.bind(key[0], key[1]);
+    return statement;
+  };
+  Statement found = bound(lookup.select);
+  std::int64_t id = 0;
+  if (found.step()) {
+    id = found.integer(0);
+  } else {
+    bound(lookup.insert).step();
+    id = database_.last_id();
+  }
+  return ids_[key_and_id] = id;
+}
+
+bool FleetStore::add(const Identification& result) {
+  static constexpr Lookup kStage = {"stage", "SELECT id FROM stage WHERE name = ?",
+                                    "INSERT INTO stage (name, changed) VALUES (?, 1)"};
+  static constexpr Lookup kConfiguration = {"configuration",
+                                            "SELECT id FROM configuration WHERE text = ?",
+                                            "INSERT INTO configuration (text) VALUES (?)"};
+  static constexpr Lookup kChannels = {"channels",
+                                       "SELECT id FROM channels WHERE outputs = ? AND inputs = ?",
+                                       "INSERT INTO channels (outputs, inputs) VALUES (?, ?)"};
+  const auto optional_text = [](const std::string& text) {
+    return text.empty() ? std::optional<std::string>() : std::optional(text);
+  };
+  try {
+    Transaction transaction(database_);
+    if (is_done(result.job)) return false;
+    remove_tags_->run(result.job, result.log.string());
+    remove_failed_->run(result.job, result.log.string());
+    const std::int64_t stage = id_of(kStage, {result.stage});
+    std::optional<std::int64_t> channels;
+    if (!result.outputs.empty())
+      channels = id_of(kChannels, {fmt::format("{}", fmt::join(result.outputs, ",")),
+                                   fmt::format("{}", fmt::join(result.inputs, ","))});
+    add_identification_->run(
+        result.job, stage, result.time_utc, std::string(to_string(result.verdict)),
+        optional_text(result.reasons), result.relative_rms_error, optional_text(result.health_json),
+        result.log.string(), result.log_fingerprint, std::string(version()),
+        id_of(kConfiguration, {result.configuration}), channels, optional_text(result.results));
+    const std::int64_t id = database_.last_id();
+    std::size_t number = 0;
+    for (const StoredMode& mode : result.modes)
+      add_mode_->run(id, ++number, mode.frequency_hz, mode.frequency_std_hz, mode.damping_ratio,
+                     mode.damping_ratio_std, mode.modal_mass, mode.shape_std, shape_floats(mode));
+    for (const auto& [name, text] : result.tags) add_tag_->run(id, name, text, parse_number(text));
+    changed_->run(stage);
+    transaction.commit();
+  } catch (...) {
+    ids_.clear();  // rows of this transaction do not exist
+    throw;
+  }
+  return true;
+}
+
+std::optional<std::string> FleetStore::log_fingerprint(const std::filesystem::path& log,
+                                                       std::int64_t size, std::int64_t changed_ns) {
+  Statement known = database_.prepare(
+      "SELECT fingerprint FROM log_file WHERE path = ? AND size = ? AND changed_ns = ?");
+  if (!known.bind(log.string(), size, changed_ns).step()) return std::nullopt;
+  return known.text(0);
+}
+
+void FleetStore::note_log(const std::filesystem::path& log, std::int64_t size,
+                          std::int64_t changed_ns, const std::string& fingerprint) {
+  database_
+      .prepare(
+          "INSERT INTO log_file VALUES (?, ?, ?, ?) ON CONFLICT (path) DO UPDATE SET "
+          "size = excluded.size, changed_ns = excluded.changed_ns, "
+          "fingerprint = excluded.fingerprint")
+      .run(log.string(), size, changed_ns, fingerprint);
+}
+
+Eigen::VectorXcd residue_shape(std::span<const std::byte> blob, std::size_t outputs) {
+  std::vector<ComplexFloat> floats(blob.size() / sizeof(ComplexFloat));
+  if (floats.size() <= outputs) return {};
+  std::memcpy(floats.data(), blob.data(), floats.size() * sizeof(ComplexFloat));
+  const Eigen::Map<const Eigen::VectorXcf> shape(floats.data(), std::ssize(floats));
+  const auto rows = static_cast<Eigen::Index>(outputs);
+  const Eigen::MatrixXcd residue =
+      (shape.head(rows) * shape.tail(shape.size() - rows).transpose()).cast<std::complex<double>>();
+  return residue.reshaped();
+}
+
+}  // namespace stageid

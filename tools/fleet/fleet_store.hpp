@@ -1,0 +1,99 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "excitation/words/words.hpp"
+#include "tools/fleet/database.hpp"
+
+namespace stageid {
+
+/// One mode in the store. Both shapes have norm one.
+struct StoredMode {
+  double frequency_hz = 0.0;
+  std::optional<double> frequency_std_hz;
+  double damping_ratio = 0.0;
+  std::optional<double> damping_ratio_std;
+  double modal_mass = 0.0;
+  Eigen::VectorXcd output_shape;
+  Eigen::VectorXcd input_shape;
+  std::optional<double> shape_std;  ///< root of the sum of the variances of both shapes
+};
+
+enum class IdentificationVerdict : std::uint8_t { trustworthy, not_trustworthy, failed };
+template <>
+inline constexpr std::array kWords<IdentificationVerdict> = {"trustworthy", "not trustworthy",
+                                                             "failed"};
+
+/// The result of one job. A failed one has neither channels nor modes.
+struct Identification {
+  std::string job;  ///< see job_id()
+  std::string stage;
+  std::string time_utc;  ///< ISO 8601
+  std::filesystem::path log;
+  std::string log_fingerprint;
+  std::string configuration;  ///< canonical text of the group `identification`
+  IdentificationVerdict verdict = IdentificationVerdict::failed;
+  std::string reasons;
+  std::string health_json;  ///< findings
+  std::optional<double> relative_rms_error;
+  std::string results;  ///< folder with the job's files, relative to that of the store
+  std::vector<std::pair<std::string, std::string>> tags;
+  std::vector<std::string> outputs;
+  std::vector<std::string> inputs;
+  std::vector<StoredMode> modes;
+};
+
+/// The database of a fleet, docs/formats.md. Each function that writes is one transaction.
+class FleetStore {
+ public:
+  /// @param access create: also the file and its tables @throws FileError, FormatError
+  FleetStore(const std::filesystem::path& file, Database::Access access);
+
+  const Database& database() const noexcept { return database_; }
+  /// Jobs whose identification is stored and did not fail.
+  std::set<std::string> done_jobs() const;
+  bool is_done(const std::string& job);
+  /// Does nothing if the job is done; replaces a failed one of the same job or log. @returns whether it was added
+  bool add(const Identification& identification);
+
+  /// The fingerprint of a log of this size and time of change, if it was computed before.
+  std::optional<std::string> log_fingerprint(const std::filesystem::path& log, std::int64_t size,
+                                             std::int64_t changed_ns);
+  void note_log(const std::filesystem::path& log, std::int64_t size, std::int64_t changed_ns,
+                const std::string& fingerprint);
+
+ private:
+  /// A table whose rows are numbered and identified by one or two texts.
+  struct Lookup {
+    const char* table;
+    const char* select;
+    const char* insert;
+  };
+  std::int64_t id_of(const Lookup& lookup, const std::vector<std::string>& key);
+
+  Database database_;
+  std::map<std::pair<std::string, std::vector<std::string>>, std::int64_t> ids_;
+  std::optional<Statement> done_;
+  std::optional<Statement> add_identification_;
+  std::optional<Statement> add_mode_;
+  std::optional<Statement> add_tag_;
+  std::optional<Statement> remove_failed_;
+  std::optional<Statement> remove_tags_;
+  std::optional<Statement> changed_;
+};
+
+/// vec(output_shape input_shape^T) from the column mode.shape: float32 pairs (re, im), outputs then inputs.
+Eigen::VectorXcd residue_shape(std::span<const std::byte> blob, std::size_t outputs);
+
+}  // namespace stageid
