@@ -31,7 +31,6 @@ double ModeTracks::predicted_variance(const Track& track, double time) const {
 
 Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& modes) const {
   Eigen::MatrixXd cost(std::ssize(modes), std::ssize(tracks_));
-  const double usual = std::max(options_.drift * options_.drift, kLeastStd * kLeastStd);
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& track = tracks_[t];
     const double predicted = predicted_variance(track, time);
@@ -39,8 +38,10 @@ Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& mode
       const SeenMode& mode = modes[m];
       const double difference = std::log(mode.frequency_hz) - track.log_frequency;
       const double variance = predicted + variance_of(mode);
+      const double usual = options_.drift * options_.drift + variance_of(mode);
       double& entry = cost(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(t));
-      entry = heavy_tailed(difference * difference / variance) + std::log1p(variance / usual);
+      entry = heavy_tailed(difference * difference / variance) +
+              std::max(std::log(variance / usual), 0.0);
       if (std::abs(difference) > kMostModeDifference) entry = kCostLimit;
       if (mode.shape.size() == 0 || mode.shape.size() != track.shape.size()) continue;
       const double mac = modal_assurance(track.shape, mode.shape)(0, 0);

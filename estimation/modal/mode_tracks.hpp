@@ -26,7 +26,7 @@ struct TrackOptions {
 /// filtered by a scalar Kalman filter, and its shape a slowly changing mean. An identification is paired with all
 /// tracks at once, by least_cost_pairs(). With the predicted deviation of the frequency in standard deviations, z, and
 /// m = 1 - MAC over its variance, a pair costs
-///   h(z^2) + h(m) + ln(predicted variance / drift^2),   h(x) = 5 ln(1 + x / 4),
+///   h(z^2) + h(m) + ln(variance of the prediction / its variance after one unit of time),   h(x) = 5 ln(1 + x / 4),
 /// Student's t with 4 degrees of freedom: one wrong value, such as a frequency after a repair, does not end a track.
 /// Tracks never end; during a gap their variance grows. Modes more than 5 % apart are not paired.
 class ModeTracks {

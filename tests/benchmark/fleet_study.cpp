@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <numbers>
 #include <random>
@@ -30,6 +31,9 @@ double seconds_of(const Work& work) {
   work();
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
+
+/// Of this process, for figures from a machine that others use too.
+double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 Eigen::VectorXcd random_shape(std::mt19937_64& engine, Eigen::Index size) {
   std::normal_distribution<double> normal;
@@ -64,7 +68,7 @@ class Design {
   /// Stages differ by 0.5 %; modes drift by 1 % per year with the season, stage and mode.
   Identification identification(int stage, int day) {
     std::mt19937_64 of_stage(static_cast<std::uint64_t>(stage));
-    std::normal_distribution<double> normal;
+    std::normal_distribution<double> normal_of_stage;
     Identification out;
     out.job = fingerprint_of(fmt::format("{} {}", stage, day));
     out.stage = fmt::format("stage {:04}", stage);
@@ -78,17 +82,17 @@ class Design {
       out.reasons = "the residual is clearly larger than noise and known distortion";
     out.relative_rms_error = 0.01;
     out.results = "fleet_results";
-    out.tags = {{"temperature", fmt::format("{:.1f}", 20.0 + normal(engine_))}};
+    out.tags = {{"temperature", fmt::format("{:.1f}", 20.0 + normal_(engine_))}};
     out.outputs = {"s1", "s2", "s3", "s4"};
     out.inputs = {"a1", "a2", "a3", "a4"};
     for (StoredMode mode : modes_) {
-      const double offset = 0.005 * normal(of_stage);
-      const double drift = 0.01 * normal(of_stage) * day / 365.0;
+      const double offset = 0.005 * normal_of_stage(of_stage);
+      const double drift = 0.01 * normal_of_stage(of_stage) * day / 365.0;
       const double season = 1e-3 * std::sin(2.0 * std::numbers::pi * day / 365.0);
       const double std_hz = 1e-4 * mode.frequency_hz;
       mode.frequency_hz *= std::exp(offset + drift + season);
-      mode.frequency_hz += std_hz * normal(engine_);
-      mode.frequency_std_hz = std_hz * std::exp(0.1 * normal(engine_));
+      mode.frequency_hz += std_hz * normal_(engine_);
+      mode.frequency_std_hz = std_hz * std::exp(0.1 * normal_(engine_));
       if (uniform_(engine_) < 1e-4) mode.frequency_hz *= 1.005;
       if (uniform_(engine_) > 1e-3) out.modes.push_back(mode);
     }
@@ -97,17 +101,20 @@ class Design {
 
  private:
   std::mt19937_64 engine_;
+  std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> uniform_;
   std::vector<StoredMode> modes_;
 };
 
 void time_query(const Database& database, const char* what, const std::string& sql) {
   std::size_t rows = 0;
+  const double processor = processor_seconds();
   const double seconds = seconds_of([&] {
     Statement statement = database.prepare(sql);
     while (statement.step()) ++rows;
   });
-  fmt::print("query {}: {} rows in {:.3f} s\n", what, rows, seconds);
+  fmt::print("query {}: {} rows in {:.3f} s, {:.3f} s of processor time\n", what, rows, seconds,
+             processor_seconds() - processor);
 }
 
 int study(int argc, char** argv) {
@@ -124,6 +131,7 @@ int study(int argc, char** argv) {
     Design design(std::atoi(argv[4]));
     const double all = static_cast<double>(stages) * days;
     double making = 0.0;
+    double processor = processor_seconds();
     const double seconds = seconds_of([&] {
       // As they arrive: day by day.
       for (int day = 0; day < days; ++day)
@@ -133,10 +141,14 @@ int study(int argc, char** argv) {
           store.add(identification);
         }
     });
-    fmt::print("ingest: {:.0f} identifications in {:.1f} s, {:.0f} per second\n", all,
-               seconds - making, all / (seconds - making));
+    fmt::print(
+        "ingest: {:.0f} identifications in {:.1f} s, {:.0f} per second; {:.1f} s of processor time "
+        "with their synthesis\n",
+        all, seconds - making, all / (seconds - making), processor_seconds() - processor);
+    processor = processor_seconds();
     const double pairing = seconds_of([&] { pair_fleet(store); });
-    fmt::print("pairing: {:.1f} s, {:.0f} identifications per second\n", pairing, all / pairing);
+    fmt::print("pairing: {:.1f} s, {:.0f} identifications per second, {:.1f} s of processor time\n",
+               pairing, all / pairing, processor_seconds() - processor);
   }
   const Database& database = store.database();
   database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
@@ -157,9 +169,11 @@ int study(int argc, char** argv) {
     for (int stage = 0; stage < std::atoi(argv[6]); ++stage)
       request.stages.push_back(fmt::format("stage {:04}", stage));
     std::string page;
+    const double processor = processor_seconds();
     const double seconds = seconds_of([&] { page = fleet_page(store, request); });
     write_text_file(request.output, page);
-    fmt::print("page: {} stages, {:.2f} s, {:.2f} MB\n", request.stages.size(), seconds,
+    fmt::print("page: {} stages, {:.2f} s, {:.2f} s of processor time, {:.2f} MB\n",
+               request.stages.size(), seconds, processor_seconds() - processor,
                static_cast<double>(page.size()) / 1e6);
   }
   return 0;

@@ -96,8 +96,8 @@ std::span<const std::byte> Statement::bytes(int column) const {
 void Database::Close::operator()(sqlite3* database) const noexcept { ::sqlite3_close(database); }
 
 Database::Database(std::filesystem::path file, Access access) : file_(std::move(file)) {
-  const int flags =
-      SQLITE_OPEN_READWRITE | (access == Access::create ? SQLITE_OPEN_CREATE : 0);
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX |
+                    (access == Access::create ? SQLITE_OPEN_CREATE : 0);
   sqlite3* handle = nullptr;
   const int code = ::sqlite3_open_v2(file_.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
@@ -106,6 +106,7 @@ Database::Database(std::filesystem::path file, Access access) : file_(std::move(
   ::sqlite3_busy_timeout(handle, kPatience_ms);
   // A process may end at any time without losing a committed transaction; after a power failure the last ones may be
   // missing, and their jobs run again.
+  execute("PRAGMA cache_size = -65536");
   if (access != Access::read)
     execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON");
   else

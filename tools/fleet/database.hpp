@@ -81,7 +81,7 @@ class Statement {
 };
 
 /// A SQLite file in WAL mode: one writer at a time, and readers that do not wait for it. A writer waits up to a minute
-/// for another one.
+/// for another one. Objects of this file are used by one thread.
 class Database {
  public:
   enum class Access : unsigned char { read, write, create };

@@ -93,7 +93,7 @@ std::string job_id(const std::string& log_fingerprint, const FleetConfig& config
 }
 
 std::filesystem::path job_folder(const std::filesystem::path& results, const std::string& job) {
-  return results / job.substr(0, 2) / job.substr(0, 16);
+  return results / job.substr(0, 2) / job.substr(0, kFolderDigits);
 }
 
 }  // namespace stageid

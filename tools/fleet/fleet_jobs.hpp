@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -29,7 +30,9 @@ std::string log_fingerprint(FleetStore& store, const std::filesystem::path& log)
 /// Identifies a job: the content of its log, what determines the result, and the version of the program.
 std::string job_id(const std::string& log_fingerprint, const FleetConfig& config);
 
-/// The folder of the files of a job, below that of the results.
+inline constexpr std::size_t kFolderDigits = 12;
+
+/// The folder of the files of a job, named by the first digits of its identifier, below that of the results.
 std::filesystem::path job_folder(const std::filesystem::path& results, const std::string& job);
 
 }  // namespace stageid

@@ -20,6 +20,9 @@ using Json = nlohmann::json;
 
 constexpr unsigned char kNoFolder = 255;
 
+/// For display; the page would be larger with all digits.
+double rounded(double value) { return std::stod(fmt::format("{:.7g}", value)); }
+
 class FleetPage {
  public:
   FleetPage(const FleetStore& store, const FleetPageRequest& request)
@@ -35,6 +38,9 @@ class FleetPage {
     Json content = {{"version", version()},
                     {"title", database_.file().stem().string()},
                     {"stages", stages},
+                    {"track_keys",
+                     {"mode", "frequency_hz", "spread_hz", "damping_ratio", "deviation", "seen",
+                      "least", "step"}},
                     {"outliers", outliers_},
                     {"folders", folder_links()}};
     const std::vector<report::Block> blocks = series_.blocks(content["arrays"]);
@@ -141,14 +147,10 @@ class FleetPage {
     known.bind(stage);
     while (known.step()) {
       in_order.push_back(known.integer(0));
-      by_track[in_order.back()] = {{{"mode", known.integer(1)},
-                                    {"frequency_hz", known.number(2)},
-                                    {"spread_hz", known.number(3)},
-                                    {"damping_ratio", known.number(4)},
-                                    {"deviation", known.number(5)}},
-                                   std::vector<std::uint8_t>(place.size(), 0),
-                                   {},
-                                   {}};
+      Track& track = by_track[in_order.back()];
+      track.about = {known.integer(1), rounded(known.number(2)), rounded(known.number(3)),
+                     rounded(known.number(4)), rounded(known.number(5))};
+      track.present.resize(place.size(), 0);
     }
     Statement rows = of_period(
         "SELECT i.id, m.track, m.frequency_hz, m.frequency_std_hz FROM identification i "
@@ -165,7 +167,8 @@ class FleetPage {
     for (const std::int64_t number : in_order) {
       Track& track = by_track[number];
       if (track.frequency_hz.empty()) continue;
-      track.about.update(series_.add_track(track.present, track.frequency_hz, track.std_hz));
+      for (const Json& value : series_.add_track(track.present, track.frequency_hz, track.std_hz))
+        track.about.push_back(value);
       out.push_back(std::move(track.about));
     }
     return out;

@@ -5,21 +5,28 @@
 #include <cstdlib>
 
 #include "frf/statistics/order_statistic.hpp"
+#include "tools/fleet/fleet_jobs.hpp"
 #include "tools/report/report_encoding.hpp"
 
 namespace stageid {
 namespace {
 
+constexpr int kNoisy = 4;  // level of compression
 constexpr double kMostSteps = 30000.0;
 
 std::uint16_t sign_last(int value) {
   return static_cast<std::uint16_t>(value < 0 ? -2 * value - 1 : 2 * value);
 }
 
-/// Eight bytes from 16 hexadecimal digits; others count as zero.
+/// Eighths of an octave from 2^-16.
+std::uint8_t std_code(double ratio) {
+  return static_cast<std::uint8_t>(std::clamp(std::lround(8.0 * std::log2(ratio)) + 128, 1L, 255L));
+}
+
+/// Six bytes from 12 hexadecimal digits; others count as zero.
 void append_hex(std::vector<std::uint8_t>& bytes, std::string hex) {
-  hex.resize(16, '0');
-  for (std::size_t i = 0; i < 16; i += 2)
+  hex.resize(kFolderDigits, '0');
+  for (std::size_t i = 0; i < hex.size(); i += 2)
     bytes.push_back(static_cast<std::uint8_t>(std::strtol(hex.substr(i, 2).c_str(), nullptr, 16)));
 }
 
@@ -38,7 +45,7 @@ nlohmann::json FleetSeries::add_track(const std::vector<std::uint8_t>& present,
                                       const std::vector<double>& frequency_std_hz) {
   const auto [least, most] = std::ranges::minmax(frequency_hz);
   std::vector<double> std_hz = frequency_std_hz;
-  const double step = std::max({median(std_hz) / 4.0, (most - least) / kMostSteps, 1e-12 * most});
+  const double step = std::max({median(std_hz) / 3.0, (most - least) / kMostSteps, 1e-12 * most});
   int before = 0;
   for (const double hz : frequency_hz) {
     const int place = static_cast<int>(std::lround((hz - least) / step));
@@ -46,8 +53,9 @@ nlohmann::json FleetSeries::add_track(const std::vector<std::uint8_t>& present,
     before = place;
   }
   present_.insert(present_.end(), present.begin(), present.end());
-  std_hz_.insert(std_hz_.end(), frequency_std_hz.begin(), frequency_std_hz.end());
-  return {{"least", least}, {"step", step}, {"seen", frequency_hz.size()}};
+  for (const double value : frequency_std_hz)
+    std_.push_back(value > 0.0 ? std_code(value / step) : std::uint8_t{0});
+  return {frequency_hz.size(), least, step};
 }
 
 std::vector<report::Block> FleetSeries::blocks(nlohmann::json& arrays) const {
@@ -63,11 +71,8 @@ std::vector<report::Block> FleetSeries::blocks(nlohmann::json& arrays) const {
   add("folder", "u8", report::packed(folder_));
   add("job", "u8", report::packed(job_));
   add("present", "u8", report::packed(present_));
-  add("change", "i16", report::packed(report::byte_planes(change_)));
-  const report::LogBytes deviation = report::encode_log_bytes(
-      Eigen::Map<const Eigen::MatrixXd>(std_hz_.data(), 1, std::ssize(std_hz_)));
-  arrays["std"] = {{"low", deviation.low}, {"step", deviation.step}};
-  add("std", "log8", deviation.text);
+  add("change", "i16", report::packed(report::byte_planes(change_), kNoisy));
+  add("std", "u8", report::packed(std_, kNoisy));
   return out;
 }
 

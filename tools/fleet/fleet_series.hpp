@@ -16,10 +16,11 @@ class FleetSeries {
   void add_identification(double day, unsigned char verdict, unsigned char folder,
                           const std::string& job);
 
-  /// The frequencies of one mode of a stage. They are rounded to a quarter of the median standard deviation, or to
-  /// 1/30000 of their range if that is larger, and stored as differences of neighbours.
+  /// The frequencies of one mode of a stage. They are rounded to a third of the median standard deviation, or to
+  /// 1/30000 of their range if that is larger, and stored as differences of neighbours. Standard deviations are rounded
+  /// by at most 5 %.
   /// @param present per identification of the stage
-  /// @return description for the page: reference, step, number of values
+  /// @return number of values, least value and step, for the page
   nlohmann::json add_track(const std::vector<std::uint8_t>& present,
                            const std::vector<double>& frequency_hz,
                            const std::vector<double>& frequency_std_hz);
@@ -34,7 +35,7 @@ class FleetSeries {
   std::vector<std::uint8_t> job_;
   std::vector<std::uint8_t> present_;
   std::vector<std::uint16_t> change_;
-  std::vector<double> std_hz_;
+  std::vector<std::uint8_t> std_;
 };
 
 }  // namespace stageid

@@ -112,12 +112,11 @@ std::string base64(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-std::string packed(std::span<const std::uint8_t> bytes) {
+std::string packed(std::span<const std::uint8_t> bytes, int level) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::vector<std::uint8_t> out(size);
   // With the bound as size, only memory allocation can fail.
-  if (compress2(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size()),
-                Z_BEST_COMPRESSION) != Z_OK)
+  if (compress2(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size()), level) != Z_OK)
     throw std::bad_alloc();
   return base64({out.data(), size});
 }

@@ -16,7 +16,8 @@ namespace stageid::report {
 std::string base64(std::span<const std::uint8_t> bytes);
 
 /// Deflated, in base64. Equal bytes give equal text.
-std::string packed(std::span<const std::uint8_t> bytes);
+/// @param level 1 to 9; 9 takes a multiple of the time of 6, for nothing if the bytes are mostly noise
+std::string packed(std::span<const std::uint8_t> bytes, int level = 9);
 
 /// The lowest bytes of all numbers, then the next, ...: similar bytes are adjacent, and deflate codes each place
 /// separately.

@@ -3,10 +3,11 @@
 decoders.u8 = (bytes) => bytes;
 decoders.i16 = (bytes) => Int16Array.from(new Uint16Array(interleaved(bytes, 2)), signFirst);
 
-// Where the values of each track begin: in `present` one per identification of the stage, in the others one per value.
+// Names the values of each track, and finds where its series begin: in `present` one per identification of the stage, in the others one per value.
 function placeTracks() {
   let present = 0, value = 0;
   for (const stage of content.stages) {
+    stage.tracks = stage.tracks.map((values) => Object.fromEntries(content.track_keys.map((key, i) => [key, values[i]])));
     for (const track of stage.tracks) {
       Object.assign(track, { present, value });
       present += stage.count;
@@ -17,12 +18,14 @@ function placeTracks() {
 
 // [frequency, standard deviation] per identification of the stage; null: not seen.
 function valuesOf(stage, track) {
-  const present = array('present'), change = array('change'), deviation = array('std');
+  const present = array('present'), change = array('change'), code = array('std');
   let at = track.value, sum = 0;
   return Array.from({ length: stage.count }, (_, i) => {
     if (!present[track.present + i]) return null;
     sum += change[at];
-    return [track.least + sum * track.step, deviation[at++]];
+    const deviation = code[at] ? track.step * Math.pow(2, (code[at] - 128) / 8) : 0;
+    ++at;
+    return [track.least + sum * track.step, deviation];
   });
 }
 
@@ -40,7 +43,7 @@ const hexOf = (byte) => byte.toString(16).padStart(2, '0');
 function reportOf(identification) {
   const folder = content.folders[array('folder')[identification]];
   if (folder === undefined) return null;
-  const job = Array.from(array('job').subarray(8 * identification, 8 * identification + 8), hexOf).join('');
+  const job = Array.from(array('job').subarray(6 * identification, 6 * identification + 6), hexOf).join('');
   return encodeURI(folder) + '/' + job.slice(0, 2) + '/' + job + '/report.html';
 }
 
