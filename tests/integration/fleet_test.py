@@ -1,0 +1,169 @@
+#!/usr/bin/python3
+"""A fleet of short logs: a corrupt one, kill -9, two processes at once, a full disk.
+
+    fleet_test.py PROGRAM CONFIGS WORK_DIR [KILLS]
+
+After every fault, the same command completes the work: each job is in the store exactly once.
+"""
+import contextlib
+import os
+import pathlib
+import random
+import re
+import resource
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+import unittest
+
+FLEET = """format: stageid-fleet
+logs: ["logs/*.slog"]
+tags: {site: north}
+identification:
+  fit: {rigid_body: suspension, suspension_hz: [0.4, 0.5], direct_term: full}
+  validation_realization: 3
+"""
+LOGS = 5
+
+
+class FleetTest(unittest.TestCase):
+    program = configs = work = None
+    kills = 3
+
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(cls.work, ignore_errors=True)
+        (cls.work / "logs").mkdir(parents=True)
+        experiment = (cls.configs / "experiment" / "small_stage.yaml").read_text()
+        experiment = experiment.replace("../stage", str(cls.configs / "stage"))
+        for seed in range(LOGS):
+            (cls.work / "experiment.yaml").write_text(re.sub(r"seed: \d+", f"seed: {seed}", experiment))
+            cls.call("run", "experiment.yaml", "-o", f"logs/{seed}.slog")
+
+    def setUp(self):
+        for path in self.work.glob("fleet*"):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        (self.work / "fleet.yaml").write_text(FLEET)
+        (self.work / "logs" / "corrupt.slog").unlink(missing_ok=True)
+
+    @classmethod
+    def call(cls, *words, wanted=0, **options):
+        done = subprocess.run([cls.program, *map(str, words)], cwd=cls.work, capture_output=True, text=True,
+                              timeout=300, **options)
+        if done.returncode != wanted:
+            raise AssertionError(f"{words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+        return done
+
+    def rows(self, sql):
+        with contextlib.closing(sqlite3.connect(self.work / "fleet.db")) as store:
+            return store.execute(sql).fetchall()
+
+    def expect_every_job_once(self, jobs=LOGS):
+        self.assertEqual(self.rows("SELECT COUNT(*), COUNT(DISTINCT job), COUNT(DISTINCT log) FROM identification "
+                                   "WHERE verdict = 'trustworthy'"), [(jobs, jobs, jobs)])
+        self.assertEqual(self.rows("SELECT COUNT(*) FROM mode GROUP BY identification_id HAVING COUNT(*) < 5"), [])
+        self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
+        for job, results in self.rows("SELECT job, results FROM identification WHERE verdict <> 'failed'"):
+            folder = self.work / results / job[:2] / job[:12]
+            self.assertEqual(sorted(path.name for path in folder.iterdir()),
+                             ["frf.h5", "frf_validation.h5", "model.json", "report.html"])
+
+    def test_a_corrupt_log_costs_one_job(self):
+        whole = (self.work / "logs" / "0.slog").read_bytes()
+        (self.work / "logs" / "corrupt.slog").write_bytes(whole[:len(whole) // 3])
+        for repetition in range(2):
+            error = self.call("fleet", "fleet.yaml", wanted=1).stderr.splitlines()
+            self.assertIn("stageid: logs/corrupt.slog: damaged at byte", error[0])
+            self.assertEqual(error[1:], ["stageid: fleet.db: 1 job failed; remove the cause and run the command again"])
+            self.expect_every_job_once()
+            self.assertEqual(self.rows("SELECT COUNT(*) FROM identification WHERE verdict = 'failed'"), [(1,)])
+        # Repaired: a copy of another log is the same job.
+        (self.work / "logs" / "corrupt.slog").write_bytes(whole)
+        self.assertIn("5 jobs: 5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
+
+    def test_runs_again_after_a_change_of_options_only(self):
+        self.call("fleet", "fleet.yaml")
+        (self.work / "fleet.yaml").write_text(FLEET + "# a comment\nstage_name: folder\n")
+        self.assertIn("5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
+        (self.work / "fleet.yaml").write_text(FLEET.replace("direct_term: full", "direct_term: full, max_iterations: 90"))
+        self.assertIn("0 done before, 5 done now", self.call("fleet", "fleet.yaml").stdout)
+
+    def test_completes_the_work_after_kill(self):
+        start = time.monotonic()
+        self.call("fleet", "fleet.yaml")
+        duration = time.monotonic() - start
+        chance = random.Random(1)
+        for kill in range(self.kills):
+            self.setUp()
+            process = subprocess.Popen([self.program, "fleet", "fleet.yaml"], cwd=self.work,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(chance.uniform(0.05, 0.95) * duration)
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            self.call("fleet", "fleet.yaml")
+            self.expect_every_job_once()
+
+    def test_two_processes_share_the_work(self):
+        both = [subprocess.Popen([self.program, "fleet", "fleet.yaml", "--json"], cwd=self.work,
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+        errors = [process.communicate()[1] for process in both]
+        for process, error in zip(both, errors):
+            if process.returncode != 0:  # it ended first
+                self.assertRegex(error, r"^stageid: fleet\.db: \d+ jobs? (is|are) run by another process; ")
+        self.call("fleet", "fleet.yaml")
+        self.expect_every_job_once()
+
+    def call_limited(self, most_bytes):
+        """Files end there, as with a quota."""
+        return self.call("fleet", "fleet.yaml", wanted=1,
+                         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))).stderr
+
+    def test_a_full_disk_costs_no_finished_job(self):
+        self.assertEqual(self.call_limited(60000), "stageid: fleet.db: cannot be read or written; check permissions and "
+                                                   "free space of its disk\n")
+        error = self.call_limited(300000).splitlines()
+        self.assertRegex(error[0], r"^stageid: logs/\d.slog: fleet_results/.*: File too large; ")
+        self.assertEqual(len(error), LOGS + 1, error)
+        self.call("fleet", "fleet.yaml")
+        self.expect_every_job_once()
+
+    def test_a_crash_costs_one_job(self):
+        process = subprocess.Popen([self.program, "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        while not children.read_text():
+            time.sleep(0.001)
+        os.kill(int(children.read_text().split()[0]), signal.SIGSEGV)
+        error = process.communicate()[1]
+        self.assertEqual(process.returncode, 1, error)
+        self.assertIn("logs/0.slog: the process of this job was ended by signal 11 (Segmentation fault)", error)
+        self.assertEqual(len(error.splitlines()), 2, error)
+        self.assertEqual(self.rows("SELECT COUNT(*) FROM identification WHERE verdict = 'failed'"), [(1,)])
+        self.call("fleet", "fleet.yaml")
+        self.expect_every_job_once()
+
+    def test_a_table_names_stages_times_and_tags(self):
+        (self.work / "fleet.csv").write_text("log,stage,time_utc,temperature\n" + "".join(
+            f"logs/{i}.slog,stage {i % 2},2026-01-0{i + 1},{20 + i}\n" for i in range(LOGS)) + "logs/missing.slog,x,,\n")
+        (self.work / "fleet.yaml").write_text(FLEET.replace('logs: ["logs/*.slog"]', "table: fleet.csv"))
+        error = self.call("fleet", "fleet.yaml", wanted=1).stderr
+        self.assertIn("stageid: logs/missing.slog: cannot be read: No such file", error)
+        self.expect_every_job_once()
+        self.assertEqual(self.rows("SELECT s.name, i.time_utc, t.number FROM identification i JOIN stage s ON "
+                                   "s.id = i.stage_id JOIN tag t ON t.identification_id = i.id WHERE t.name = "
+                                   "'temperature' ORDER BY 2")[1], ("stage 1", "2026-01-02", 21.0))
+        table = self.call("fleet", "query", "fleet.db", "SELECT stage, COUNT(*) AS n FROM modes WHERE "
+                          "frequency_hz > 400 GROUP BY stage ORDER BY stage", "--csv", "fleet_modes.csv")
+        self.assertEqual(table.stdout, "wrote fleet_modes.csv: 2 rows\n")
+        self.assertEqual((self.work / "fleet_modes.csv").read_text(), "stage,n\nstage 0,9\nstage 1,6\n")
+
+
+if __name__ == "__main__":
+    FleetTest.program, FleetTest.configs = sys.argv[1], pathlib.Path(sys.argv[2]).resolve()
+    FleetTest.work = pathlib.Path(sys.argv[3]).resolve()
+    if len(sys.argv) > 4:
+        FleetTest.kills = int(sys.argv[4])
+    unittest.main(argv=sys.argv[:1])

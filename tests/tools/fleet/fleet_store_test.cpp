@@ -1,0 +1,142 @@
+#include "tools/fleet/fleet_store.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <thread>
+
+#include "acquisition/files/file_error.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/tools/fleet/fleet_fixture.hpp"
+
+namespace stageid {
+namespace {
+
+using test::count_in;
+using test::identification;
+
+class FleetStoreTest : public testing::Test {
+ protected:
+  std::filesystem::path file() const { return folder_ / "fleet.db"; }
+  FleetStore open() const { return {file(), Database::Access::create}; }
+  test::TemporaryDirectory folder_;
+};
+
+TEST_F(FleetStoreTest, StoresAJobOnce) {
+  FleetStore store = open();
+  EXPECT_TRUE(store.add(identification("a", "s", "2026-01-01", {100.0, 200.0})));
+  EXPECT_FALSE(store.add(identification("a", "s", "2026-01-01", {100.0, 200.0})));
+  EXPECT_EQ(count_in(store, "identification"), 1);
+  EXPECT_EQ(count_in(store, "mode"), 2);
+  EXPECT_EQ(store.done_jobs(), std::set<std::string>{"a"});
+}
+
+TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
+  FleetStore store = open();
+  Identification failed = identification("a", "folder", "2026-01-01", {});
+  failed.verdict = IdentificationVerdict::failed;
+  failed.log = "/data/x.slog";
+  EXPECT_TRUE(store.add(failed));
+  EXPECT_FALSE(store.is_done("a"));
+  EXPECT_TRUE(store.add(failed)) << "it failed again";
+  EXPECT_EQ(count_in(store, "identification"), 1);
+  // The log was repaired: another fingerprint, so another job.
+  Identification repaired = identification("b", "s", "2026-01-01", {100.0});
+  repaired.log = failed.log;
+  EXPECT_TRUE(store.add(repaired));
+  EXPECT_EQ(count_in(store, "identification"), 1);
+  EXPECT_EQ(count_in(store, "tag"), 1);
+}
+
+TEST_F(FleetStoreTest, KeepsWhatWasStored) {
+  Identification given = identification("a", "s", "2026-01-01T06:00:00Z", {123.456});
+  given.modes[0].frequency_std_hz = std::nullopt;
+  given.tags = {{"temperature", "21.5"}, {"site", "north"}};
+  open().add(given);
+  const FleetStore store(file(), Database::Access::read);
+  Statement mode = store.database().prepare(
+      "SELECT frequency_hz, frequency_std_hz, shape, damping_ratio_std FROM mode");
+  ASSERT_TRUE(mode.step());
+  EXPECT_EQ(mode.number(0), 123.456);
+  EXPECT_TRUE(mode.is_null(1));
+  const Eigen::VectorXcd shape = residue_shape(mode.bytes(2), 2);
+  const Eigen::MatrixXcd residue =
+      given.modes[0].output_shape * given.modes[0].input_shape.transpose();
+  EXPECT_LT((shape - residue.reshaped()).norm(), 1e-6);
+  Statement tags = store.database().prepare("SELECT name, number, text FROM tag ORDER BY name");
+  ASSERT_TRUE(tags.step());
+  EXPECT_EQ(tags.text(2), "north");
+  EXPECT_TRUE(tags.is_null(1));
+  ASSERT_TRUE(tags.step());
+  EXPECT_EQ(tags.number(1), 21.5);
+}
+
+TEST_F(FleetStoreTest, HasEveryJobOnceWithTwoWriters) {
+  open();
+  const auto write = [&] {
+    FleetStore store = open();
+    for (int i = 0; i < 200; ++i)
+      store.add(identification(std::to_string(i), std::to_string(i % 7), "2026-01-01", {100.0}));
+  };
+  std::thread other(write);
+  write();
+  other.join();
+  FleetStore store = open();
+  EXPECT_EQ(count_in(store, "identification"), 200);
+  EXPECT_EQ(count_in(store, "mode"), 200);
+  EXPECT_EQ(count_in(store, "stage"), 7);
+  EXPECT_EQ(count_in(store, "channels"), 1);
+}
+
+TEST_F(FleetStoreTest, StoresAllOfAJobOrNothingOnAFullDisk) {
+  FleetStore store = open();
+  store.database().execute("PRAGMA max_page_count = 40");  // SQLITE_FULL, as from a full disk
+  const std::vector<double> modes(50, 100.0);
+  int stored = 0;
+  try {
+    for (;; ++stored)
+      store.add(
+          identification(std::to_string(stored), fmt::format("s{}", stored), "2026-01-01", modes));
+  } catch (const FileError& error) {
+    EXPECT_NE(std::string(error.what()).find("fleet.db: No space left on device"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_GT(stored, 0);
+  EXPECT_EQ(count_in(store, "identification"), stored);
+  EXPECT_EQ(count_in(store, "stage"), stored);
+  EXPECT_EQ(count_in(store, "mode"), 50 * stored);
+  // With space again, the same object goes on.
+  store.database().execute("PRAGMA max_page_count = 4000");
+  EXPECT_TRUE(store.add(
+      identification(std::to_string(stored), fmt::format("s{}", stored), "2026-01-01", modes)));
+  EXPECT_EQ(count_in(store, "stage"), stored + 1);
+}
+
+TEST_F(FleetStoreTest, RefusesOtherFiles) {
+  std::ofstream(file()) << "not a database, but a text that is long enough to have a header\n";
+  EXPECT_THROW(open(), FormatError);
+  EXPECT_THROW(FleetStore(folder_ / "missing.db", Database::Access::read), FileError);
+  const std::filesystem::path foreign = folder_ / "foreign.db";
+  Database(foreign, Database::Access::create).execute("CREATE TABLE x (y INTEGER)");
+  EXPECT_THROW(FleetStore(foreign, Database::Access::create), FormatError);
+}
+
+TEST_F(FleetStoreTest, RefusesAnotherVersionOfTheSchema) {
+  open().database().execute("UPDATE store SET schema_version = 99");
+  EXPECT_THROW(open(), FormatError);
+}
+
+TEST_F(FleetStoreTest, ForgetsTheFingerprintOfAChangedLog) {
+  FleetStore store = open();
+  store.note_log("/x", 10, 5, "f");
+  EXPECT_EQ(store.log_fingerprint("/x", 10, 5), "f");
+  EXPECT_EQ(store.log_fingerprint("/x", 10, 6), std::nullopt);
+  EXPECT_EQ(store.log_fingerprint("/x", 11, 5), std::nullopt);
+  store.note_log("/x", 10, 6, "g");
+  EXPECT_EQ(store.log_fingerprint("/x", 10, 6), "g");
+}
+
+}  // namespace
+}  // namespace stageid
