@@ -35,9 +35,10 @@ struct FleetFlags {
 
 void run_jobs(const FleetFlags& flags, Console& console) {
   const FleetConfig config = load_fleet_config(flags.config);
+  const std::vector<FleetLog> logs = fleet_logs(config);
   require_directory(config.results);
   say_at_interrupt("finished jobs are stored; run the command again to continue");
-  const FleetSummary summary = run_fleet(config, flags.workers, console);
+  const FleetSummary summary = run_fleet(config, logs, flags.workers, console);
   FleetStore store(config.store, Database::Access::write);
   pair_fleet(store);
   console.result(
@@ -180,16 +181,17 @@ void fleet_command(CLI::App& app, Console& console) {
   CLI::App& fleet =
       add_command(app, "fleet", "Identify many logs, and follow their modes over time and stages");
   const auto flags = std::make_shared<FleetFlags>();
-  fleet.final_callback([&fleet, &console, flags] {
-    const bool subcommand = !fleet.get_subcommands().empty();
-    if (subcommand && !flags->config.empty())
+  // Before the subcommand runs: its surplus arguments end up here.
+  fleet.parse_complete_callback([&fleet, flags] {
+    if (!fleet.get_subcommands().empty() && !flags->config.empty())
       throw std::invalid_argument(fmt::format(
           "unexpected argument '{}'; see 'stageid fleet --help'", flags->config.string()));
-    if (subcommand) return;
-    if (flags->config.empty())
+    if (fleet.get_subcommands().empty() && flags->config.empty())
       throw std::invalid_argument(
           "fleet: a fleet file or a subcommand is missing; see 'stageid fleet --help'");
-    run_jobs(*flags, console);
+  });
+  fleet.final_callback([&console, flags] {
+    if (!flags->config.empty()) run_jobs(*flags, console);
   });
   fleet.add_option("config", flags->config, "fleet file (.yaml)");
   fleet.add_option("--workers", flags->workers, "jobs at a time; 0: one per core")

@@ -149,7 +149,8 @@ void Database::fail(int code) const {
       const int error = ::sqlite3_system_errno(handle_.get());
       throw FileError(fmt::format(
           "{}: {}", name,
-          error != 0 ? system_reason(error) : "cannot be read or written; check permissions and free space of its disk"));
+          error != 0 ? system_reason(error)
+                     : "cannot be read or written; check permissions and free space of its disk"));
     }
     case SQLITE_NOMEM:
       throw std::bad_alloc();

@@ -70,8 +70,8 @@ class FleetRun {
         claims_(config.store),
         progress_(console, "fleet", "jobs") {}
 
-  FleetSummary run(std::size_t workers) {
-    find_jobs();
+  FleetSummary run(const std::vector<FleetLog>& logs, std::size_t workers) {
+    find_jobs(logs);
     std::size_t next = 0;
     while (next < jobs_.size() || pool_.size() > 0) {
       throw_if_interrupted();
@@ -84,8 +84,7 @@ class FleetRun {
   }
 
  private:
-  void find_jobs() {
-    const std::vector<FleetLog> logs = fleet_logs(config_);
+  void find_jobs(const std::vector<FleetLog>& logs) {
     const std::set<std::string> done = store_.done_jobs();
     std::set<std::string> known;
     for (const FleetLog& log : logs) {
@@ -157,8 +156,9 @@ class FleetRun {
 
 }  // namespace
 
-FleetSummary run_fleet(const FleetConfig& config, int workers, const Console& console) {
-  return FleetRun(config, console).run(static_cast<std::size_t>(worker_count(workers)));
+FleetSummary run_fleet(const FleetConfig& config, const std::vector<FleetLog>& logs, int workers,
+                       const Console& console) {
+  return FleetRun(config, console).run(logs, static_cast<std::size_t>(worker_count(workers)));
 }
 
 }  // namespace stageid

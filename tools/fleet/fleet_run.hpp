@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "tools/fleet/fleet_config.hpp"
+#include "tools/fleet/fleet_jobs.hpp"
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
@@ -17,11 +19,12 @@ struct FleetSummary {
   std::size_t elsewhere = 0;  ///< are run by another process
 };
 
-/// Runs every job of a fleet that is not in its store, each in a process of its own, so that a damaged log ends one job
+/// Identifies every log of a fleet that is not in its store, each in a process of its own, so that a damaged log ends one job
 /// only. A failed job is stored with its error and runs again next time. Several processes may run the same fleet:
 /// each job is claimed by a lock that the system releases when its process ends.
 /// @param workers processes at a time; 0: one per core
 /// @throws FileError, FormatError, std::invalid_argument: nothing more can be stored, or nothing can be read
-FleetSummary run_fleet(const FleetConfig& config, int workers, const Console& console);
+FleetSummary run_fleet(const FleetConfig& config, const std::vector<FleetLog>& logs, int workers,
+                       const Console& console);
 
 }  // namespace stageid

@@ -11,6 +11,7 @@
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/link_load.hpp"
+#include "tools/fleet/fleet_config.hpp"
 
 namespace stageid {
 namespace test_configs {
@@ -36,6 +37,16 @@ TEST(Configs, EveryExperimentLoads) {
     ++count;
   }
   EXPECT_GE(count, 3);
+}
+
+TEST(Configs, EveryFleetLoads) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "fleet")) {
+    SCOPED_TRACE(entry.path());
+    EXPECT_FALSE(load_fleet_config(entry.path()).logs.empty());
+    ++count;
+  }
+  EXPECT_GE(count, 1);
 }
 
 TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {
