@@ -90,6 +90,11 @@ class FleetTest(unittest.TestCase):
         self.assertIn("5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
         (self.work / "fleet.yaml").write_text(FLEET.replace("direct_term: full", "direct_term: full, max_iterations: 90"))
         self.assertIn("0 done before, 5 done now", self.call("fleet", "fleet.yaml").stdout)
+        current = "SELECT COUNT(*), MAX(configuration_id) FROM identification WHERE is_current = 1"
+        self.assertEqual(self.rows(current), [(5, 2)])
+        (self.work / "fleet.yaml").write_text(FLEET)
+        self.assertIn("5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
+        self.assertEqual(self.rows(current), [(5, 1)])
 
     def test_completes_the_work_after_kill(self):
         start = time.monotonic()

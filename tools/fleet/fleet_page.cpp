@@ -72,7 +72,8 @@ class FleetPage {
 
   /// "i" is the table identification; its parameters are those of bind_period().
   static constexpr const char* kOfPeriod =
-      "WHERE i.stage_id = ? AND i.time_utc >= ? AND i.time_utc < ? ORDER BY i.time_utc, i.job";
+      "WHERE i.stage_id = ? AND i.is_current = 1 AND i.time_utc >= ? AND i.time_utc < ? ORDER BY "
+      "i.time_utc, i.job";
 
   Statement of_period(const std::string& select, std::int64_t stage) const {
     Statement rows = database_.prepare(select + kOfPeriod);

@@ -51,7 +51,7 @@ StageYear read_stage(const Database& database, std::int64_t stage) {
       "m.shape_std, m.shape, c.outputs "
       "FROM identification i JOIN channels c ON c.id = i.channels_id "
       "LEFT JOIN mode m ON m.identification_id = i.id "
-      "WHERE i.stage_id = ? ORDER BY i.time_utc, i.job, m.number");
+      "WHERE i.stage_id = ? AND i.is_current = 1 ORDER BY i.time_utc, i.job, m.number");
   rows.bind(stage);
   while (rows.step()) {
     if (year.identifications.empty() || year.identifications.back() != rows.integer(0)) {
@@ -179,8 +179,7 @@ std::vector<StageTrack> read_tracks(const Database& database) {
       "SELECT t.stage_id, t.track, t.frequency_hz, t.shape FROM track t "
       "JOIN stage s ON s.id = t.stage_id "
       "WHERE t.seen >= ? * (SELECT COUNT(*) FROM identification i WHERE i.stage_id = t.stage_id "
-      "AND "
-      "i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
+      "AND i.is_current = 1 AND i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
   rows.bind(kLeastShare);
   while (rows.step()) {
     const std::span<const std::byte> bytes = rows.bytes(3);

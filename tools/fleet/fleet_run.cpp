@@ -6,6 +6,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -53,11 +55,12 @@ struct Job {
 };
 
 std::vector<std::string> arguments_of(const Job& job, const FleetConfig& config) {
-  std::vector<std::string> out = {
-      "--verbosity", "quiet", "fleet", "job", config.file.string(), job.log.file.string()};
+  std::vector<std::string> out = {"--verbosity", "quiet", "fleet", "job"};
   if (!job.log.stage.empty()) out.push_back("--stage=" + job.log.stage);
   if (!job.log.time_utc.empty()) out.push_back("--time=" + job.log.time_utc);
   for (const auto& [name, value] : job.log.tags) out.push_back("--tag=" + name + "=" + value);
+  for (const std::string& name : {std::string("--"), config.file.string(), job.log.file.string()})
+    out.push_back(name);
   return out;
 }
 
@@ -85,17 +88,20 @@ class FleetRun {
 
  private:
   void find_jobs(const std::vector<FleetLog>& logs) {
-    const std::set<std::string> done = store_.done_jobs();
+    const std::map<std::string, bool> done = store_.done_jobs();
     std::set<std::string> known;
     for (const FleetLog& log : logs) {
       try {
         Job job{log, log_fingerprint(store_, log.file), ""};
         job.id = job_id(job.fingerprint, config_);
         if (!known.insert(job.id).second) continue;  // a copy of another log
-        if (done.count(job.id) > 0)
-          ++summary_.done_before;
-        else
+        const auto found = done.find(job.id);
+        if (found == done.end()) {
           jobs_.push_back(std::move(job));
+          continue;
+        }
+        ++summary_.done_before;
+        if (!found->second) store_.make_current(job.id);  // options that were used before
       } catch (const FileError& error) {
         ++summary_.failed;
         console_.warning(error.what());

@@ -62,9 +62,10 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
   require_store(database_);
   done_ = database_.prepare("SELECT 1 FROM identification WHERE job = ? AND verdict <> 'failed'");
   add_identification_ = database_.prepare(
-      "INSERT INTO identification (job, stage_id, time_utc, verdict, reasons, relative_rms_error, "
+      "INSERT INTO identification (is_current, job, stage_id, time_utc, verdict, reasons, "
+      "relative_rms_error, "
       "health, log, log_fingerprint, version, configuration_id, channels_id, results) "
-      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+      "VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   add_mode_ = database_.prepare(
       "INSERT INTO mode (identification_id, number, frequency_hz, frequency_std_hz, "
       "damping_ratio, damping_ratio_std, modal_mass, shape_std, shape) "
@@ -75,14 +76,33 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
   remove_tags_ = database_.prepare(
       "DELETE FROM tag WHERE identification_id IN (SELECT id FROM identification WHERE " + failed +
       ")");
+  const std::string of_log = "log_fingerprint = ? AND is_current = 1 AND verdict <> 'failed'";
+  supersede_ = database_.prepare("UPDATE identification SET is_current = 0 WHERE " + of_log);
+  change_stages_ = database_.prepare(
+      "UPDATE stage SET changed = 1 WHERE id IN (SELECT stage_id FROM identification WHERE " +
+      of_log + ")");
   changed_ = database_.prepare("UPDATE stage SET changed = 1 WHERE id = ? AND changed = 0");
 }
 
-std::set<std::string> FleetStore::done_jobs() const {
-  std::set<std::string> jobs;
-  Statement rows = database_.prepare("SELECT job FROM identification WHERE verdict <> 'failed'");
-  while (rows.step()) jobs.insert(rows.text(0));
+std::map<std::string, bool> FleetStore::done_jobs() const {
+  std::map<std::string, bool> jobs;
+  Statement rows =
+      database_.prepare("SELECT job, is_current FROM identification WHERE verdict <> 'failed'");
+  while (rows.step()) jobs[rows.text(0)] = rows.integer(1) != 0;
   return jobs;
+}
+
+void FleetStore::supersede(const std::string& log_fingerprint) {
+  change_stages_->run(log_fingerprint);
+  supersede_->run(log_fingerprint);
+}
+
+void FleetStore::make_current(const std::string& job) {
+  Transaction transaction(database_);
+  Statement found = database_.prepare("SELECT log_fingerprint FROM identification WHERE job = ?");
+  if (found.bind(job).step()) supersede(found.text(0));
+  database_.prepare("UPDATE identification SET is_current = 1 WHERE job = ?").run(job);
+  transaction.commit();
 }
 
 bool FleetStore::is_done(const std::string& job) { return done_->found(job); }
@@ -123,6 +143,7 @@ bool FleetStore::add(const Identification& result) {
     if (is_done(result.job)) return false;
     remove_tags_->run(result.job, result.log.string());
     remove_failed_->run(result.job, result.log.string());
+    if (result.verdict != IdentificationVerdict::failed) supersede(result.log_fingerprint);
     const std::int64_t stage = id_of(kStage, {result.stage});
     std::optional<std::int64_t> channels;
     if (!result.outputs.empty())

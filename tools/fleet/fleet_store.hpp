@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -61,11 +60,14 @@ class FleetStore {
   FleetStore(const std::filesystem::path& file, Database::Access access);
 
   const Database& database() const noexcept { return database_; }
-  /// Jobs whose identification is stored and did not fail.
-  std::set<std::string> done_jobs() const;
+  /// Jobs whose identification is stored and did not fail, and whether it is the current one of its log.
+  std::map<std::string, bool> done_jobs() const;
   bool is_done(const std::string& job);
   /// Does nothing if the job is done; replaces a failed one of the same job or log. @returns whether it was added
+  /// A result becomes the current one of its log: others, of other options or versions, are kept, but not shown.
   bool add(const Identification& identification);
+  /// Makes the result of a job the current one of its log again.
+  void make_current(const std::string& job);
 
   /// The fingerprint of a log of this size and time of change, if it was computed before.
   std::optional<std::string> log_fingerprint(const std::filesystem::path& log, std::int64_t size,
@@ -80,6 +82,8 @@ class FleetStore {
     const char* select;
     const char* insert;
   };
+  /// Results of this log are no longer current, and their stages have to be paired again.
+  void supersede(const std::string& log_fingerprint);
   std::int64_t id_of(const Lookup& lookup, const std::vector<std::string>& key);
 
   Database database_;
@@ -91,6 +95,8 @@ class FleetStore {
   std::optional<Statement> remove_failed_;
   std::optional<Statement> remove_tags_;
   std::optional<Statement> changed_;
+  std::optional<Statement> supersede_;
+  std::optional<Statement> change_stages_;
 };
 
 /// vec(output_shape input_shape^T) from the column mode.shape: float32 pairs (re, im), outputs then inputs.

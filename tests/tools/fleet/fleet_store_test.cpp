@@ -29,7 +29,7 @@ TEST_F(FleetStoreTest, StoresAJobOnce) {
   EXPECT_FALSE(store.add(identification("a", "s", "2026-01-01", {100.0, 200.0})));
   EXPECT_EQ(count_in(store, "identification"), 1);
   EXPECT_EQ(count_in(store, "mode"), 2);
-  EXPECT_EQ(store.done_jobs(), std::set<std::string>{"a"});
+  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", true}}));
 }
 
 TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
@@ -47,6 +47,21 @@ TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
   EXPECT_TRUE(store.add(repaired));
   EXPECT_EQ(count_in(store, "identification"), 1);
   EXPECT_EQ(count_in(store, "tag"), 1);
+}
+
+TEST_F(FleetStoreTest, ShowsTheNewestResultOfALogAndKeepsTheOthers) {
+  FleetStore store = open();
+  Identification one = identification("a", "s", "2026-01-01", {100.0});
+  one.log_fingerprint = "log";
+  store.add(one);
+  one.job = "b";
+  one.configuration = "other options";
+  store.add(one);
+  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", false}, {"b", true}}));
+  EXPECT_EQ(count_in(store, "modes"), 1);
+  EXPECT_EQ(count_in(store, "mode"), 2);
+  store.make_current("a");
+  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", true}, {"b", false}}));
 }
 
 TEST_F(FleetStoreTest, KeepsWhatWasStored) {
