@@ -150,7 +150,8 @@ class FleetPage {
       in_order.push_back(known.integer(0));
       Track& track = by_track[in_order.back()];
       track.about = {known.integer(1), rounded(known.number(2)), rounded(known.number(3)),
-                     rounded(known.number(4)), rounded(known.number(5))};
+                     rounded(known.number(4)),
+                     known.is_null(5) ? Json() : Json(rounded(known.number(5)))};
       track.present.resize(place.size(), 0);
     }
     Statement rows = of_period(

@@ -79,10 +79,13 @@ std::vector<int> fitted_realizations(const FleetConfig& config, const LogReader&
   return fitted;
 }
 
+/// Without those outside the lines, which represent everything that the plant has there.
 std::vector<StoredMode> stored_modes(const AdditiveModel& model) {
   std::vector<StoredMode> modes;
   for (const ModeShape& shape : mode_shapes(model)) {
     const Submodel& submodel = model.submodels[shape.submodel];
+    const double hz = shape.natural_frequency_hz;
+    if (hz < model.fit.band_hz[0] || hz > model.fit.band_hz[1]) continue;
     StoredMode mode;
     mode.frequency_hz = shape.natural_frequency_hz;
     mode.frequency_std_hz = submodel.natural_frequency_std_hz;

@@ -80,6 +80,7 @@ def check_width(page, work, width):
     check_numbers(browser, work)
     check_links(browser, page, work)
     expect(browser.evaluate("document.querySelector('#modes option').textContent") == "<b>stage 0</b>", "names are text")
+    expect(browser.evaluate("document.querySelectorAll('#main b').length") == 0, "names are not HTML")
     browser.evaluate("stageidFleet.showStage(1)")
     expect(browser.evaluate("stageidFleet.over.graph.numRows()") == 2, "two days of the second stage")
     browser.evaluate("(() => { const pick = document.getElementById('mode'); pick.value = '2'; "

@@ -56,7 +56,7 @@ function drawModes() {
   const { stage } = over;
   const tracks = shownTracks();
   const relative = over.pickMode.value === '';
-  over.legend.hidden = !relative;
+  over.legend.style.display = relative ? '' : 'none';
   over.title.textContent = relative ? 'Change of the frequency [%]' : 'Frequency [Hz]';
   if (tracks.length === 0 || stage.count === 0) return;
   const scaled = (track, pair) => pair && (relative ? [100 * (pair[0] / track.frequency_hz - 1), 100 * pair[1] / track.frequency_hz] : pair);

@@ -36,7 +36,7 @@ function drawStages() {
   if (!mode) return;
   const rows = mode.tracks.map(({ index, track }) => [index + 1, [track.frequency_hz, track.spread_hz], null]);
   mode.tracks.forEach(({ track }, i) => { if (Math.abs(track.deviation) > farFromStages) rows[i][2] = rows[i][1]; });
-  const label = (v) => (Number.isInteger(v) && content.stages[v - 1] ? shortened(content.stages[v - 1].name, 12) : '');
+  const label = (v) => (Number.isInteger(v) && content.stages[v - 1] ? xmlEscape(shortened(content.stages[v - 1].name, 12)) : '');  // dygraphs takes HTML
   const series = () => ({ stage: { color: palette().curves[0], plotter: drawBars }, outlier: { color: palette().marker, plotter: drawBars } });
   among.graph = makeGraph('stages-plot', rows, series, {
     labels: ['number', 'stage', 'outlier'], errorBars: true, sigma: 1.96, xRangePad: 14, yRangePad: 14,
@@ -51,7 +51,7 @@ function drawStages() {
 
 function stageText({ index, track }) {
   return content.stages[index].name + ': ' + fixed(track.frequency_hz) + '\u00a0Hz' +
-    (track.deviation ? ', ' + deviations(track.deviation) + ' standard deviations from the median of the stages' : '');
+    (isNumber(track.deviation) ? ', ' + deviations(track.deviation) + ' standard deviations from the median of the stages' : '');
 }
 
 // A point with a vertical bar per value.
@@ -70,7 +70,8 @@ function drawBars(event) {
 
 function stageTable() {
   const outliers = new Map();
-  for (const [identification] of content.outliers) {
+  for (const [identification, , unusual] of content.outliers) {
+    if (!unusual) continue;
     const stage = stageOf(identification);
     outliers.set(stage, (outliers.get(stage) || 0) + 1);
   }
