@@ -71,6 +71,23 @@ def check_links(browser, page, work):
     expect("failed: 4.slog: damaged at byte" in text, text)
 
 
+def check_click(browser, work):
+    """Opens the report of the first day of the shown stage."""
+    browser.evaluate("(() => { window.opened = []; HTMLAnchorElement.prototype.click = function () { opened.push(this.href); }; "
+                     "document.getElementById('modes-plot').scrollIntoView({ block: 'center' }); })()")
+    x, y = json.loads(browser.evaluate(
+        "JSON.stringify((() => { const box = document.getElementById('modes-plot').getBoundingClientRect(); "
+        "return [box.x + 0.2 * box.width, box.y + 0.5 * box.height]; })())"))
+    for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+        browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="none" if kind == "mouseMoved" else "left", clickCount=1)
+    expect(browser.wait_for("opened.length === 1", 5), "a click opens nothing")
+    opened = pathlib.Path(unquote(urlparse(browser.evaluate("opened[0] || ''")).path))
+    job = opened.parent.name
+    store = sqlite3.connect(work / "fleet.db")
+    expect(store.execute("SELECT time_utc FROM identification WHERE job LIKE ?", (job + "%",)).fetchall() ==
+           [("2026-01-02T06:00:00Z",)] and opened.exists(), f"a click opens {opened}")
+
+
 def check_width(page, work, width):
     browser = Browser(find_browser())
     browser.resize(width, 1000)
@@ -83,6 +100,7 @@ def check_width(page, work, width):
     expect(browser.evaluate("document.querySelectorAll('#main b').length") == 0, "names are not HTML")
     browser.evaluate("stageidFleet.showStage(1)")
     expect(browser.evaluate("stageidFleet.over.graph.numRows()") == 2, "two days of the second stage")
+    check_click(browser, work)
     browser.evaluate("(() => { const pick = document.getElementById('mode'); pick.value = '2'; "
                      "pick.dispatchEvent(new Event('change')); })()")
     expect(browser.evaluate("stageidFleet.over.graph.numColumns()") == 2, "one mode is shown alone")
