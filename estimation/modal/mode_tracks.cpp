@@ -10,8 +10,11 @@
 namespace stageid {
 namespace {
 
-// h(x) = 20 means x = 214: a jump of 15 standard deviations at the same shape, or, at the same frequency, any shape.
-constexpr double kCostLimit = 20.0;
+// h(x) = 24 means x = 482: a jump of 22 standard deviations at the same shape.
+constexpr double kCostLimit = 24.0;
+constexpr double kShapeWeight =
+    4.0;  // 1 - MAC scatters less than a square: it sums over all channels
+constexpr std::size_t kLeastCommon = 3;  // modes from which a common change is known
 constexpr double kLeastStd = 1e-6;  // of a log-frequency; zero would make any difference infinite
 constexpr std::size_t kPast = 7;
 constexpr std::size_t kLeastPast = 3;
@@ -29,14 +32,24 @@ double ModeTracks::predicted_variance(const Track& track, double time) const {
   return track.variance + options_.drift * options_.drift * std::max(time - track.time, 0.0);
 }
 
-Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& modes) const {
+double ModeTracks::common_change(const std::vector<SeenMode>& modes, const Pairs& pairs) const {
+  std::vector<double> changes;
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    if (pairs[m])
+      changes.push_back(std::log(modes[m].frequency_hz) -
+                        tracks_[static_cast<std::size_t>(*pairs[m])].log_frequency);
+  return changes.size() < kLeastCommon ? 0.0 : median(changes);
+}
+
+Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& modes,
+                                  double common) const {
   Eigen::MatrixXd cost(std::ssize(modes), std::ssize(tracks_));
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& track = tracks_[t];
     const double predicted = predicted_variance(track, time);
     for (std::size_t m = 0; m < modes.size(); ++m) {
       const SeenMode& mode = modes[m];
-      const double difference = std::log(mode.frequency_hz) - track.log_frequency;
+      const double difference = std::log(mode.frequency_hz) - common - track.log_frequency;
       const double variance = predicted + variance_of(mode);
       const double usual = options_.drift * options_.drift + variance_of(mode);
       double& entry = cost(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(t));
@@ -46,7 +59,8 @@ Eigen::MatrixXd ModeTracks::costs(double time, const std::vector<SeenMode>& mode
       if (mode.shape.size() == 0 || mode.shape.size() != track.shape.size()) continue;
       const double mac = modal_assurance(track.shape, mode.shape)(0, 0);
       const double change = options_.shape_change * options_.shape_change;
-      entry += heavy_tailed((1.0 - mac) / (change + mode.shape_std * mode.shape_std));
+      entry +=
+          heavy_tailed(kShapeWeight * (1.0 - mac) / (change + mode.shape_std * mode.shape_std));
     }
   }
   return cost;
@@ -73,7 +87,8 @@ void ModeTracks::update(Track& track, double time, const SeenMode& mode) const {
 }
 
 std::vector<std::size_t> ModeTracks::add(double time, const std::vector<SeenMode>& modes) {
-  const auto paired = least_cost_pairs(costs(time, modes), kCostLimit);
+  Pairs paired = least_cost_pairs(costs(time, modes, 0.0), kCostLimit);
+  paired = least_cost_pairs(costs(time, modes, common_change(modes, paired)), kCostLimit);
   std::vector<std::size_t> track_of;
   for (std::size_t m = 0; m < modes.size(); ++m) {
     if (paired[m]) {

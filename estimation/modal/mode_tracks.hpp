@@ -26,8 +26,9 @@ struct TrackOptions {
 /// filtered by a scalar Kalman filter, and its shape a slowly changing mean. An identification is paired with all
 /// tracks at once, by least_cost_pairs(). With the predicted deviation of the frequency in standard deviations, z, and
 /// m = 1 - MAC over its variance, a pair costs
-///   h(z^2) + h(m) + ln(variance of the prediction / its variance after one unit of time),   h(x) = 5 ln(1 + x / 4),
+///   h(z^2) + h(4 m) + ln(variance of the prediction / its variance after one unit of time),  h(x) = 5 ln(1 + x / 4),
 /// Student's t with 4 degrees of freedom: one wrong value, such as a frequency after a repair, does not end a track.
+/// Modes are paired twice: the median change of all frequencies, as by temperature, is removed the second time.
 /// Tracks never end; during a gap their variance grows. Modes more than 5 % apart are not paired.
 class ModeTracks {
  public:
@@ -50,7 +51,9 @@ class ModeTracks {
     Eigen::VectorXcd shape;
   };
   double predicted_variance(const Track& track, double time) const;
-  Eigen::MatrixXd costs(double time, const std::vector<SeenMode>& modes) const;
+  using Pairs = std::vector<std::optional<Eigen::Index>>;  // per mode its track
+  double common_change(const std::vector<SeenMode>& modes, const Pairs& pairs) const;
+  Eigen::MatrixXd costs(double time, const std::vector<SeenMode>& modes, double common) const;
   void update(Track& track, double time, const SeenMode& mode) const;
 
   TrackOptions options_;
