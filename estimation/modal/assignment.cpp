@@ -72,8 +72,8 @@ std::vector<std::optional<Eigen::Index>> least_cost_pairs(const Eigen::MatrixXd&
   if (cost.size() == 0) return column_of;
   // Pairs at the limit mean "unpaired", so every row can be paired; rows are the shorter side.
   const bool turned = cost.rows() > cost.cols();
-  const Eigen::MatrixXd limited =
-      (turned ? Eigen::MatrixXd(cost.transpose()) : cost).cwiseMin(limit);
+  const Eigen::MatrixXd sided = turned ? Eigen::MatrixXd(cost.transpose()) : cost;
+  const Eigen::MatrixXd limited = (sided.array() < limit).select(sided, limit);  // NaN: the limit
   Augmentation pairs(limited);
   for (Eigen::Index row = 1; row <= limited.rows(); ++row) pairs.add(row);
   for (Eigen::Index c = 0; c < limited.cols(); ++c) {

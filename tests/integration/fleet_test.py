@@ -101,6 +101,7 @@ class FleetTest(unittest.TestCase):
         self.call("fleet", "fleet.yaml")
         duration = time.monotonic() - start
         chance = random.Random(1)
+        done = []
         for kill in range(self.kills):
             self.setUp()
             process = subprocess.Popen([self.program, "fleet", "fleet.yaml"], cwd=self.work,
@@ -108,8 +109,10 @@ class FleetTest(unittest.TestCase):
             time.sleep(chance.uniform(0.05, 0.95) * duration)
             process.send_signal(signal.SIGKILL)
             process.wait()
-            self.call("fleet", "fleet.yaml")
+            done.append(int(self.call("fleet", "fleet.yaml", "--json").stdout.split('"done_before": ')[1].split(",")[0]))
             self.expect_every_job_once()
+        print("jobs done before each kill:", done, file=sys.stderr)
+        self.assertLess(min(done), LOGS, "every kill came too late")
 
     def test_two_processes_share_the_work(self):
         both = [subprocess.Popen([self.program, "fleet", "fleet.yaml", "--json"], cwd=self.work,

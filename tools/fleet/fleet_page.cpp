@@ -160,8 +160,9 @@ class FleetPage {
         stage);
     while (rows.step()) {
       const auto track = by_track.find(rows.integer(1));
-      if (rows.is_null(1) || track == by_track.end()) continue;
-      track->second.present[place.at(rows.integer(0))] = 1;
+      const auto day = place.find(rows.integer(0));
+      if (rows.is_null(1) || track == by_track.end() || day == place.end()) continue;
+      track->second.present[day->second] = 1;
       track->second.frequency_hz.push_back(rows.number(2));
       track->second.std_hz.push_back(rows.number(3));
     }

@@ -8,6 +8,7 @@
 #include <complex>
 #include <numeric>
 
+#include "acquisition/files/file_error.hpp"
 #include "estimation/modal/mode_tracks.hpp"
 #include "frf/statistics/order_statistic.hpp"
 #include "tools/fleet/fleet_time.hpp"
@@ -44,6 +45,15 @@ std::size_t names_in(const std::string& list) {
   return static_cast<std::size_t>(std::ranges::count(list, ',')) + 1;
 }
 
+/// A damaged store may contain anything.
+double positive_number(const Statement& row, int column, const Database& database) {
+  const double number = row.number(column);
+  if (!std::isfinite(number) || number <= 0.0)
+    throw FormatError(database.file(), "",
+                      fmt::format("contains the frequency {} Hz; restore a copy", number));
+  return number;
+}
+
 StageYear read_stage(const Database& database, std::int64_t stage) {
   StageYear year;
   Statement rows = database.prepare(
@@ -64,7 +74,7 @@ StageYear read_stage(const Database& database, std::int64_t stage) {
     row.number = rows.integer(2);
     row.day = year.days.size() - 1;
     row.damping_ratio = rows.number(5);
-    row.mode = {rows.number(3), rows.number(4),
+    row.mode = {positive_number(rows, 3, database), rows.number(4),
                 residue_shape(rows.bytes(7), names_in(rows.text(8))), rows.number(6)};
     year.rows.push_back(std::move(row));
   }
@@ -182,14 +192,11 @@ std::vector<StageTrack> read_tracks(const Database& database) {
       "AND i.is_current = 1 AND i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
   rows.bind(kLeastShare);
   while (rows.step()) {
-    const std::span<const std::byte> bytes = rows.bytes(3);
-    Eigen::VectorXcf shape(static_cast<Eigen::Index>(bytes.size() / sizeof(std::complex<float>)));
-    std::copy(bytes.begin(), bytes.end(), reinterpret_cast<std::byte*>(shape.data()));
-    const double hz = rows.number(2);
+    const double hz = positive_number(rows, 2, database);
     out.push_back({rows.integer(0),
                    rows.integer(1),
                    0,
-                   {hz, kStageSpread * hz, shape.cast<std::complex<double>>(), 0.0}});
+                   {hz, kStageSpread * hz, shape_in(rows.bytes(3)), 0.0}});
   }
   return out;
 }

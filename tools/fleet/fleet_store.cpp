@@ -187,14 +187,19 @@ void FleetStore::note_log(const std::filesystem::path& log, std::int64_t size,
       .run(log.string(), size, changed_ns, fingerprint);
 }
 
-Eigen::VectorXcd residue_shape(std::span<const std::byte> blob, std::size_t outputs) {
+Eigen::VectorXcd shape_in(std::span<const std::byte> blob) {
   std::vector<ComplexFloat> floats(blob.size() / sizeof(ComplexFloat));
-  if (floats.size() <= outputs) return {};
+  if (floats.empty()) return {};
   std::memcpy(floats.data(), blob.data(), floats.size() * sizeof(ComplexFloat));
-  const Eigen::Map<const Eigen::VectorXcf> shape(floats.data(), std::ssize(floats));
+  return Eigen::Map<const Eigen::VectorXcf>(floats.data(), std::ssize(floats))
+      .cast<std::complex<double>>();
+}
+
+Eigen::VectorXcd residue_shape(std::span<const std::byte> blob, std::size_t outputs) {
+  const Eigen::VectorXcd shape = shape_in(blob);
   const auto rows = static_cast<Eigen::Index>(outputs);
-  const Eigen::MatrixXcd residue =
-      (shape.head(rows) * shape.tail(shape.size() - rows).transpose()).cast<std::complex<double>>();
+  if (shape.size() <= rows) return {};
+  const Eigen::MatrixXcd residue = shape.head(rows) * shape.tail(shape.size() - rows).transpose();
   return residue.reshaped();
 }
 

@@ -99,7 +99,10 @@ class FleetStore {
   std::optional<Statement> change_stages_;
 };
 
-/// vec(output_shape input_shape^T) from the column mode.shape: float32 pairs (re, im), outputs then inputs.
+/// The numbers of a column `shape`: float32 pairs (re, im).
+Eigen::VectorXcd shape_in(std::span<const std::byte> blob);
+
+/// vec(output_shape input_shape^T) from the column mode.shape: outputs, then inputs.
 Eigen::VectorXcd residue_shape(std::span<const std::byte> blob, std::size_t outputs);
 
 }  // namespace stageid

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -55,6 +56,9 @@ TEST(Assignment, GivesUpTheBestPairWhereTheSumRequiresIt) {
 
 TEST(Assignment, PairsNothingAtTheLimit) {
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd{{5.0}, {4.9}}, 5.0), (Pairs{std::nullopt, 0}));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd{{nan, 1.0}, {nan, nan}}, 5.0),
+            (Pairs{1, std::nullopt}));
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd(2, 0), 5.0), Pairs(2));
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd(0, 2), 5.0), Pairs{});
 }

@@ -35,7 +35,7 @@ def make_page(program, configs, work):
         table += f"{seed}.slog,<b>stage {seed % 2}</b>,2026-01-0{seed + 1}T06:00:00Z\n"
     (work / "4.slog").write_bytes((work / "0.slog").read_bytes()[:50000])
     (work / "logs.csv").write_text(table + "4.slog,<b>stage 0</b>,2026-01-09T06:00:00Z\n")
-    (work / "fleet.yaml").write_text("format: stageid-fleet\ntable: logs.csv\nresults: all results\nidentification: "
+    (work / "fleet.yaml").write_text("format: stageid-fleet\ntable: logs.csv\nresults: 'all #results'\nidentification: "
                                      "{fit: {rigid_body: suspension, suspension_hz: [0.4, 0.5], direct_term: full}}\n")
     call("fleet", "fleet.yaml", wanted=1)
     call("fleet", "report", "fleet.db", "-o", "pages/fleet.html")

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "acquisition/files/file_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/fleet/fleet_fixture.hpp"
 
@@ -113,6 +114,15 @@ TEST_F(FleetPairingTest, GivesRareModesNoNumber) {
   pair_fleet(store);
   EXPECT_EQ(rows(store, "SELECT frequency_hz FROM modes WHERE mode IS NULL"),
             std::vector<std::string>{"77.0|"});
+}
+
+TEST_F(FleetPairingTest, EndsOnADamagedStore) {
+  FleetStore store = store_of("a.db", small_fleet(2));
+  store.database().execute(
+      "UPDATE mode SET frequency_std_hz = 9e999, shape = X'0000C07F00' WHERE number = 2");
+  EXPECT_NO_THROW(pair_fleet(store));
+  store.database().execute("UPDATE mode SET frequency_hz = -1; UPDATE stage SET changed = 1");
+  EXPECT_THROW(pair_fleet(store), FormatError);
 }
 
 TEST_F(FleetPairingTest, CompletesAnInterruptedPairing) {

@@ -44,7 +44,8 @@ function reportOf(identification) {
   const folder = content.folders[array('folder')[identification]];
   if (folder === undefined) return null;
   const job = Array.from(array('job').subarray(6 * identification, 6 * identification + 6), hexOf).join('');
-  return encodeURI(folder) + '/' + job.slice(0, 2) + '/' + job + '/report.html';
+  // './': a folder is not a scheme, whatever the store contains.
+  return './' + folder.split('/').map(encodeURIComponent).join('/') + '/' + job.slice(0, 2) + '/' + job + '/report.html';
 }
 
 function stageOf(identification) {
