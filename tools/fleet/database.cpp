@@ -46,18 +46,6 @@ void Statement::put(int index, const std::string& value) {
                         SQLITE_UTF8);
 }
 
-void Statement::put(int index, const std::optional<double>& value) {
-  if (value) put(index, *value);
-}
-
-void Statement::put(int index, const std::optional<std::int64_t>& value) {
-  if (value) put(index, *value);
-}
-
-void Statement::put(int index, const std::optional<std::string>& value) {
-  if (value) put(index, *value);
-}
-
 void Statement::put(int index, const std::vector<std::complex<float>>& value) {
   if (!value.empty())
     ::sqlite3_bind_blob64(statement_.get(), index, value.data(),

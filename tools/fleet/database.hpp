@@ -70,10 +70,10 @@ class Statement {
   void put(int index, std::size_t value) { put(index, static_cast<std::int64_t>(value)); }
   void put(int index, double value);  ///< null unless finite
   void put(int index, const std::string& value);
-  void put(int index,
-           const std::optional<double>& value);  ///< null if empty, as all optional values
-  void put(int index, const std::optional<std::int64_t>& value);
-  void put(int index, const std::optional<std::string>& value);
+  template <typename Value>
+  void put(int index, const std::optional<Value>& value) {  // null if empty
+    if (value) put(index, *value);
+  }
   void put(int index, const std::vector<std::complex<float>>& value);  ///< null if empty
 
   const Database* database_;
@@ -88,6 +88,8 @@ class Database {
 
   /// @throws FileError, FormatError naming the file; here and in all other functions
   Database(std::filesystem::path file, Access access);
+  Database(const Database&) = delete;  // its statements refer to it
+  Database& operator=(const Database&) = delete;
 
   const std::filesystem::path& file() const noexcept { return file_; }
   Statement prepare(const std::string& sql) const;

@@ -27,6 +27,10 @@ std::vector<ComplexFloat> shape_floats(const StoredMode& mode) {
   return shape;
 }
 
+std::optional<std::string> filled(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(text);
+}
+
 void create_tables(const Database& database) {
   Transaction transaction(database);
   // Another process may have created them in the meantime.
@@ -61,11 +65,19 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
   if (access == Database::Access::create) create_tables(database_);
   require_store(database_);
   done_ = database_.prepare("SELECT 1 FROM identification WHERE job = ? AND verdict <> 'failed'");
+  add_stage_ = database_.prepare(
+      "INSERT INTO stage (name, changed) VALUES (?, 1) ON CONFLICT (name) DO UPDATE SET changed = "
+      "1");
+  add_configuration_ =
+      database_.prepare("INSERT INTO configuration (text) VALUES (?) ON CONFLICT DO NOTHING");
+  add_channels_ = database_.prepare(
+      "INSERT INTO channels (outputs, inputs) VALUES (?, ?) ON CONFLICT DO NOTHING");
   add_identification_ = database_.prepare(
       "INSERT INTO identification (is_current, job, stage_id, time_utc, verdict, reasons, "
-      "relative_rms_error, "
-      "health, log, log_fingerprint, version, configuration_id, channels_id, results) "
-      "VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+      "relative_rms_error, health, log, log_fingerprint, version, configuration_id, channels_id, "
+      "results) VALUES (1, ?, (SELECT id FROM stage WHERE name = ?), ?, ?, ?, ?, ?, ?, ?, ?, "
+      "(SELECT id FROM configuration WHERE text = ?), "
+      "(SELECT id FROM channels WHERE outputs = ? AND inputs = ?), ?)");
   add_mode_ = database_.prepare(
       "INSERT INTO mode (identification_id, number, frequency_hz, frequency_std_hz, "
       "damping_ratio, damping_ratio_std, modal_mass, shape_std, shape) "
@@ -81,7 +93,6 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
   change_stages_ = database_.prepare(
       "UPDATE stage SET changed = 1 WHERE id IN (SELECT stage_id FROM identification WHERE " +
       of_log + ")");
-  changed_ = database_.prepare("UPDATE stage SET changed = 1 WHERE id = ? AND changed = 0");
 }
 
 std::map<std::string, bool> FleetStore::done_jobs() const {
@@ -107,65 +118,30 @@ void FleetStore::make_current(const std::string& job) {
 
 bool FleetStore::is_done(const std::string& job) { return done_->found(job); }
 
-std::int64_t FleetStore::id_of(const Lookup& lookup, const std::vector<std::string>& key) {
-  const auto key_and_id = std::pair(std::string(lookup.table), key);
-  if (const auto known = ids_.find(key_and_id); known != ids_.end()) return known->second;
-  const auto bound = [&](const char* sql) {
-    Statement statement = database_.prepare(sql);
-    key.size() == 1 ? statement.bind(key[0]) : statement.bind(key[0], key[1]);
-    return statement;
-  };
-  Statement found = bound(lookup.select);
-  std::int64_t id = 0;
-  if (found.step()) {
-    id = found.integer(0);
-  } else {
-    bound(lookup.insert).step();
-    id = database_.last_id();
-  }
-  return ids_[key_and_id] = id;
-}
-
 bool FleetStore::add(const Identification& result) {
-  static constexpr Lookup kStage = {"stage", "SELECT id FROM stage WHERE name = ?",
-                                    "INSERT INTO stage (name, changed) VALUES (?, 1)"};
-  static constexpr Lookup kConfiguration = {"configuration",
-                                            "SELECT id FROM configuration WHERE text = ?",
-                                            "INSERT INTO configuration (text) VALUES (?)"};
-  static constexpr Lookup kChannels = {"channels",
-                                       "SELECT id FROM channels WHERE outputs = ? AND inputs = ?",
-                                       "INSERT INTO channels (outputs, inputs) VALUES (?, ?)"};
-  const auto optional_text = [](const std::string& text) {
-    return text.empty() ? std::optional<std::string>() : std::optional(text);
-  };
-  try {
-    Transaction transaction(database_);
-    if (is_done(result.job)) return false;
-    remove_tags_->run(result.job, result.log.string());
-    remove_failed_->run(result.job, result.log.string());
-    if (result.verdict != IdentificationVerdict::failed) supersede(result.log_fingerprint);
-    const std::int64_t stage = id_of(kStage, {result.stage});
-    std::optional<std::int64_t> channels;
-    if (!result.outputs.empty())
-      channels = id_of(kChannels, {fmt::format("{}", fmt::join(result.outputs, ",")),
-                                   fmt::format("{}", fmt::join(result.inputs, ","))});
-    add_identification_->run(
-        result.job, stage, result.time_utc, std::string(to_string(result.verdict)),
-        optional_text(result.reasons), result.relative_rms_error, optional_text(result.health_json),
-        result.log.string(), result.log_fingerprint, std::string(version()),
-        id_of(kConfiguration, {result.configuration}), channels, optional_text(result.results));
-    const std::int64_t id = database_.last_id();
-    std::size_t number = 0;
-    for (const StoredMode& mode : result.modes)
-      add_mode_->run(id, ++number, mode.frequency_hz, mode.frequency_std_hz, mode.damping_ratio,
-                     mode.damping_ratio_std, mode.modal_mass, mode.shape_std, shape_floats(mode));
-    for (const auto& [name, text] : result.tags) add_tag_->run(id, name, text, parse_number(text));
-    changed_->run(stage);
-    transaction.commit();
-  } catch (...) {
-    ids_.clear();  // rows of this transaction do not exist
-    throw;
-  }
+  Transaction transaction(database_);
+  if (is_done(result.job)) return false;
+  const bool failed = result.verdict == IdentificationVerdict::failed;
+  const std::string outputs = fmt::format("{}", fmt::join(result.outputs, ","));
+  const std::string inputs = fmt::format("{}", fmt::join(result.inputs, ","));
+  remove_tags_->run(result.job, result.log.string());
+  remove_failed_->run(result.job, result.log.string());
+  if (!failed) supersede(result.log_fingerprint);
+  add_stage_->run(result.stage);
+  add_configuration_->run(result.configuration);
+  if (!failed) add_channels_->run(outputs, inputs);
+  add_identification_->run(result.job, result.stage, result.time_utc, to_string(result.verdict),
+                           filled(result.reasons), result.relative_rms_error,
+                           filled(result.health_json), result.log.string(), result.log_fingerprint,
+                           std::string(version()), result.configuration, outputs, inputs,
+                           filled(result.results));
+  const std::int64_t id = database_.last_id();
+  std::size_t number = 0;
+  for (const StoredMode& mode : result.modes)
+    add_mode_->run(id, ++number, mode.frequency_hz, mode.frequency_std_hz, mode.damping_ratio,
+                   mode.damping_ratio_std, mode.modal_mass, mode.shape_std, shape_floats(mode));
+  for (const auto& [name, text] : result.tags) add_tag_->run(id, name, text, parse_number(text));
+  transaction.commit();
   return true;
 }
 

@@ -58,6 +58,8 @@ class FleetStore {
  public:
   /// @param access create: also the file and its tables @throws FileError, FormatError
   FleetStore(const std::filesystem::path& file, Database::Access access);
+  FleetStore(const FleetStore&) = delete;
+  FleetStore& operator=(const FleetStore&) = delete;
 
   const Database& database() const noexcept { return database_; }
   /// Jobs whose identification is stored and did not fail, and whether it is the current one of its log.
@@ -76,27 +78,14 @@ class FleetStore {
                 const std::string& fingerprint);
 
  private:
-  /// A table whose rows are numbered and identified by one or two texts.
-  struct Lookup {
-    const char* table;
-    const char* select;
-    const char* insert;
-  };
   /// Results of this log are no longer current, and their stages have to be paired again.
   void supersede(const std::string& log_fingerprint);
-  std::int64_t id_of(const Lookup& lookup, const std::vector<std::string>& key);
 
   Database database_;
-  std::map<std::pair<std::string, std::vector<std::string>>, std::int64_t> ids_;
-  std::optional<Statement> done_;
-  std::optional<Statement> add_identification_;
-  std::optional<Statement> add_mode_;
-  std::optional<Statement> add_tag_;
-  std::optional<Statement> remove_failed_;
-  std::optional<Statement> remove_tags_;
-  std::optional<Statement> changed_;
-  std::optional<Statement> supersede_;
-  std::optional<Statement> change_stages_;
+  // Empty until the tables exist.
+  std::optional<Statement> done_, add_stage_, add_configuration_, add_channels_,
+      add_identification_, add_mode_, add_tag_, remove_failed_, remove_tags_, supersede_,
+      change_stages_;
 };
 
 /// The numbers of a column `shape`: float32 pairs (re, im).

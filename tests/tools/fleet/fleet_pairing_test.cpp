@@ -40,7 +40,7 @@ class FleetPairingTest : public testing::Test {
   FleetStore store_of(const std::string& name, const std::vector<Identification>& all) const {
     FleetStore store(folder_ / name, Database::Access::create);
     for (const Identification& one : all) store.add(one);
-    return store;
+    return {folder_ / name, Database::Access::write};
   }
   static std::vector<std::string> rows(const FleetStore& store, const std::string& sql) {
     std::vector<std::string> out;
