@@ -16,11 +16,9 @@
 namespace stageid {
 namespace {
 
-constexpr double kFar = 6.0;  // standard deviations of an outlier
-constexpr double kUsualShare =
-    0.8;  // of the identifications: a mode that is seen so often should be seen
-constexpr double kLeastShare =
-    0.2;  // of the identifications: a mode that is seen less often has no number
+constexpr double kFar = 6.0;           // standard deviations of an outlier
+constexpr double kUsualShare = 0.8;    // share of the days from which a mode should not be missing
+constexpr double kLeastShare = 0.2;    // share of the days from which a mode has a number
 constexpr double kStageSpread = 0.01;  // of a frequency between stages, relative
 constexpr std::size_t kLeastStages = 5;
 
@@ -35,7 +33,7 @@ struct Row {
 };
 
 /// The identifications of a stage by time, and their modes.
-struct StageYear {
+struct StageHistory {
   std::vector<std::int64_t> identifications;
   std::vector<double> days;
   std::vector<Row> rows;
@@ -54,8 +52,8 @@ double positive_number(const Statement& row, int column, const Database& databas
   return number;
 }
 
-StageYear read_stage(const Database& database, std::int64_t stage) {
-  StageYear year;
+StageHistory read_stage(const Database& database, std::int64_t stage) {
+  StageHistory history;
   Statement rows = database.prepare(
       "SELECT i.id, i.time_utc, m.number, m.frequency_hz, m.frequency_std_hz, m.damping_ratio, "
       "m.shape_std, m.shape, c.outputs "
@@ -64,50 +62,50 @@ StageYear read_stage(const Database& database, std::int64_t stage) {
       "WHERE i.stage_id = ? AND i.is_current = 1 ORDER BY i.time_utc, i.job, m.number");
   rows.bind(stage);
   while (rows.step()) {
-    if (year.identifications.empty() || year.identifications.back() != rows.integer(0)) {
-      year.identifications.push_back(rows.integer(0));
-      year.days.push_back(days_of(rows.text(1)).value_or(0.0));
+    if (history.identifications.empty() || history.identifications.back() != rows.integer(0)) {
+      history.identifications.push_back(rows.integer(0));
+      history.days.push_back(days_of(rows.text(1)).value_or(0.0));
     }
     if (rows.is_null(2)) continue;
     Row row;
     row.identification = rows.integer(0);
     row.number = rows.integer(2);
-    row.day = year.days.size() - 1;
+    row.day = history.days.size() - 1;
     row.damping_ratio = rows.number(5);
     row.mode = {positive_number(rows, 3, database), rows.number(4),
                 residue_shape(rows.bytes(7), names_in(rows.text(8))), rows.number(6)};
-    year.rows.push_back(std::move(row));
+    history.rows.push_back(std::move(row));
   }
-  return year;
+  return history;
 }
 
 /// @returns the tracks
-ModeTracks follow(StageYear& year) {
+ModeTracks follow(StageHistory& history) {
   ModeTracks tracks;
   std::size_t first = 0;
-  for (std::size_t day = 0; day < year.days.size(); ++day) {
+  for (std::size_t day = 0; day < history.days.size(); ++day) {
     std::size_t end = first;
     std::vector<SeenMode> modes;
-    for (; end < year.rows.size() && year.rows[end].day == day; ++end)
-      modes.push_back(year.rows[end].mode);
-    const std::vector<std::size_t> found = tracks.add(year.days[day], modes);
-    for (std::size_t i = 0; i < found.size(); ++i) year.rows[first + i].track = found[i];
+    for (; end < history.rows.size() && history.rows[end].day == day; ++end)
+      modes.push_back(history.rows[end].mode);
+    const std::vector<std::size_t> found = tracks.add(history.days[day], modes);
+    for (std::size_t i = 0; i < found.size(); ++i) history.rows[first + i].track = found[i];
     first = end;
   }
   return tracks;
 }
 
 /// The rows of each track, in order of time.
-std::vector<std::vector<Row*>> by_track(StageYear& year, std::size_t tracks) {
+std::vector<std::vector<Row*>> by_track(StageHistory& history, std::size_t tracks) {
   std::vector<std::vector<Row*>> rows(tracks);
-  for (Row& row : year.rows) rows[row.track].push_back(&row);
+  for (Row& row : history.rows) rows[row.track].push_back(&row);
   return rows;
 }
 
 /// Per identification, what is unusual about its modes.
-std::vector<std::vector<std::string>> unusual(const StageYear& year,
+std::vector<std::vector<std::string>> unusual(const StageHistory& history,
                                               const std::vector<std::vector<Row*>>& tracks) {
-  std::vector<std::vector<std::string>> reasons(year.days.size());
+  std::vector<std::vector<std::string>> reasons(history.days.size());
   for (const std::vector<Row*>& rows : tracks) {
     std::vector<double> values;
     std::vector<double> deviation;
@@ -124,10 +122,10 @@ std::vector<std::vector<std::string>> unusual(const StageYear& year,
                         rows[i]->mode.frequency_hz, far[i]));
     }
     const std::size_t begin = rows.front()->day;
-    const auto days = static_cast<double>(year.days.size() - begin);
+    const auto days = static_cast<double>(history.days.size() - begin);
     if (static_cast<double>(rows.size()) < kUsualShare * days) continue;
     auto next = rows.begin();
-    for (std::size_t day = begin; day < year.days.size(); ++day) {
+    for (std::size_t day = begin; day < history.days.size(); ++day) {
       if (next != rows.end() && (*next)->day == day)
         ++next;
       else
@@ -149,18 +147,18 @@ std::vector<std::complex<float>> floats_of(const Eigen::VectorXcd& shape) {
   return {floats.begin(), floats.end()};
 }
 
-void store_stage(const Database& database, std::int64_t stage, const StageYear& year,
+void store_stage(const Database& database, std::int64_t stage, const StageHistory& history,
                  const ModeTracks& tracks, const std::vector<std::vector<Row*>>& rows,
                  const std::vector<std::vector<std::string>>& reasons) {
   Statement mode = database.prepare(
       "UPDATE mode SET track = ?, deviation = ? WHERE identification_id = ? AND number = ?");
-  for (const Row& row : year.rows)
+  for (const Row& row : history.rows)
     mode.run(row.track, row.deviation, row.identification, row.number);
   Statement outlier = database.prepare("UPDATE identification SET outlier = ? WHERE id = ?");
   for (std::size_t i = 0; i < reasons.size(); ++i)
     outlier.run(reasons[i].empty() ? std::optional<std::string>()
                                    : fmt::format("{}", fmt::join(reasons[i], "; ")),
-                year.identifications[i]);
+                history.identifications[i]);
   database.prepare("DELETE FROM track WHERE stage_id = ?").run(stage);
   Statement track = database.prepare(
       "INSERT INTO track (stage_id, track, seen, frequency_hz, frequency_std_hz, damping_ratio, "
@@ -248,10 +246,10 @@ void pair_fleet(FleetStore& store) {
   while (stages.step()) changed.push_back(stages.integer(0));
   for (const std::int64_t stage : changed) {
     Transaction transaction(database);
-    StageYear year = read_stage(database, stage);
-    const ModeTracks tracks = follow(year);
-    const std::vector<std::vector<Row*>> rows = by_track(year, tracks.size());
-    store_stage(database, stage, year, tracks, rows, unusual(year, rows));
+    StageHistory history = read_stage(database, stage);
+    const ModeTracks tracks = follow(history);
+    const std::vector<std::vector<Row*>> rows = by_track(history, tracks.size());
+    store_stage(database, stage, history, tracks, rows, unusual(history, rows));
     transaction.commit();
   }
   // 2: followed over time, but not yet compared with the other stages, even if an earlier call was interrupted.

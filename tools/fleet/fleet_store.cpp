@@ -31,10 +31,14 @@ std::optional<std::string> filled(const std::string& text) {
   return text.empty() ? std::nullopt : std::optional(text);
 }
 
+bool is_empty(const Database& database) {
+  return !database.prepare("SELECT 1 FROM sqlite_master").step();
+}
+
 void create_tables(const Database& database) {
+  if (!is_empty(database)) return;  // without waiting for other writers
   Transaction transaction(database);
-  // Another process may have created them in the meantime.
-  if (!database.prepare("SELECT 1 FROM sqlite_master").step()) {
+  if (is_empty(database)) {
     database.execute(kFleetSchema);
     database.prepare("INSERT INTO store VALUES (?, ?)")
         .run(std::string(kStoreFormat), kFleetSchemaVersion);

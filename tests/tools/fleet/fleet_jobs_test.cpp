@@ -44,7 +44,7 @@ TEST_F(FleetJobsTest, FindsLogsByPatternAndTable) {
   EXPECT_EQ(logs[1].tags,
             (std::vector<std::pair<std::string, std::string>>{{"temperature", "21.5"}}));
   EXPECT_EQ(logs[2].file.filename(), "d.slog");
-  EXPECT_TRUE(logs[2].tags.empty()) << "an empty field is no tag";
+  EXPECT_TRUE(logs[2].tags.empty()) << "an empty field is not a tag";
 }
 
 TEST_F(FleetJobsTest, NamesTheProblemAndItsPlace) {
