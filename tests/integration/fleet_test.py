@@ -153,6 +153,17 @@ class FleetTest(unittest.TestCase):
         self.call("fleet", "fleet.yaml")
         self.expect_every_job_once()
 
+    def test_a_scheduler_runs_single_jobs(self):
+        job = ("fleet", "job", "fleet.yaml", "logs/0.slog", "--stage", "x", "--time", "2026-01-01", "--tag", "bench=3")
+        self.assertRegex(self.call(*job).stdout, r"^fleet_results/../.{12}: done\n$")
+        self.assertRegex(self.call(*job).stdout, r": was done before\n$")
+        self.assertEqual(self.rows("SELECT s.name, i.time_utc, t.name, t.number FROM identification i JOIN stage s ON "
+                                   "s.id = i.stage_id JOIN tag t ON t.identification_id = i.id ORDER BY t.name"),
+                         [("x", "2026-01-01", "bench", 3.0), ("x", "2026-01-01", "site", None)])
+        self.call("fleet", "report", "fleet.db", "-o", "fleet.html")  # pairs the modes first
+        self.assertEqual(self.rows("SELECT COUNT(*) FROM modes WHERE mode IS NULL"), [(0,)])
+        self.assertIn("5 jobs: 1 done before, 4 done now", self.call("fleet", "fleet.yaml").stdout)
+
     def test_a_table_names_stages_times_and_tags(self):
         (self.work / "fleet.csv").write_text("log,stage,time_utc,temperature\n" + "".join(
             f"logs/{i}.slog,stage {i % 2},2026-01-0{i + 1},{20 + i}\n" for i in range(LOGS)) + "logs/missing.slog,x,,\n")
