@@ -139,6 +139,7 @@ Identification identify_log(const FleetConfig& config, const FleetLog& given,
   options.realizations = fitted_realizations(config, *log);
   ReportData report;
   report.frf = estimate_frf({log.get()}, options, {true, {}}, console).frf;
+  note_logs(*report.frf, {given.file}, folder / "frf.h5");
   write_frf(folder / "frf.h5", *report.frf);
   const std::vector<Finding> health = health_of(report.frf->provenance_json);
   if (config.validation_realization >= 0) {
@@ -162,11 +163,15 @@ Identification identify_log(const FleetConfig& config, const FleetLog& given,
                           select_band(*report.validation_frf, setup.frf.frequency_hz[0],
                                       setup.frf.frequency_hz[setup.frf.lines() - 1]),
                           distortion_of(*report.model));
-  const ModelVerdict verdict = judge_model(*report.model, health, validation, log->runs());
+  report.files = {{}, {}, given.file, folder / "frf.h5", folder / "model.json"};
+  const ModelVerdict verdict =
+      judge_model(*report.model, health, validation, log->runs(), report.files);
 
   job.verdict = verdict.trustworthy ? IdentificationVerdict::trustworthy
                                     : IdentificationVerdict::not_trustworthy;
-  job.reasons = fmt::format("{}", fmt::join(verdict.reasons, "; "));
+  std::vector<std::string> reasons;
+  for (const Problem& problem : verdict.problems) reasons.push_back(problem.text());
+  job.reasons = fmt::format("{}", fmt::join(reasons, "; "));
   job.health_json = health_json(health).dump();
   job.relative_rms_error = report.model->fit.relative_rms_error;
   job.outputs = report.model->outputs.names;
