@@ -377,10 +377,13 @@ ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChan
 }
 
 StageChange ModelTracker::State::name(int since) const {
+  // The first difference between two periods contains the transient of the change.
+  const int differences = since - 1;
   const Eigen::VectorXd scores_since = detector->mean_scores(since);
-  // The first difference is to the period of the change.
-  const Eigen::VectorXd noise_scores = detector->mean_scores(std::max(1, since - 1));
-  const double independent = since / (1.0 + static_cast<double>(since) / options.learning_periods);
+  const Eigen::VectorXd scores_of_noise = detector->mean_scores(differences);
+  const auto independent_of = [&](int count) {
+    return count / (1.0 + static_cast<double>(count) / options.learning_periods);
+  };
   const std::size_t kept = std::min(periods.size(), static_cast<std::size_t>(since));
   const PeriodSpectra mean = mean_of(periods, kept);
   // Of a chi-square, by weights from few periods; the same for all, so that it does not choose between them.
@@ -390,11 +393,11 @@ StageChange ModelTracker::State::name(int since) const {
     StageChange change;
     change.what = possible[h];
     change.periods = since;
-    const auto at = static_cast<Eigen::Index>(h);
-    const double score =
-        change.what.kind == ChangeKind::noise ? noise_scores[at] : scores_since[at];
+    const bool of_noise = change.what.kind == ChangeKind::noise;
+    const double score = (of_noise ? scores_of_noise : scores_since)[static_cast<Eigen::Index>(h)];
+    const double independent = independent_of(of_noise ? differences : since);
     change.statistic = score * score * independent;
-    if (change.what.kind == ChangeKind::noise) {
+    if (of_noise) {
       const double deviation = noise_deviation[change.what.index];
       change.size = std::sqrt(std::max(0.0, 1.0 + score * deviation)) - 1.0;
       change.deviation = 0.5 * deviation / std::sqrt(independent) / (1.0 + change.size);
