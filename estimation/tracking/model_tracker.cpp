@@ -400,7 +400,8 @@ StageChange ModelTracker::State::name(int since) const {
     if (of_noise) {
       const double deviation = noise_deviation[change.what.index];
       change.size = std::sqrt(std::max(0.0, 1.0 + score * deviation)) - 1.0;
-      change.deviation = 0.5 * deviation / std::sqrt(independent) / (1.0 + change.size);
+      // The scatter of a noise power is proportional to it.
+      change.deviation = 0.5 * deviation * (1.0 + change.size) / std::sqrt(independent);
     } else {
       const Eigen::VectorXd& d = change.what.direction;
       const double information = d.dot(A * d);
