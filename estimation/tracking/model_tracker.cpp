@@ -468,7 +468,6 @@ TrackedPeriod ModelTracker::add(const PeriodSpectra& period) {
   Eigen::MatrixXcd residual = s.residual_of(period, s.P);
   s.remove_trends(residual);
   const Eigen::VectorXd z = s.J.transpose() * s.whitened(residual);
-  s.filter.add(s.A, s.K, z - s.A * (s.filter.estimate() - s.x));
   if (s.last_residual) out.noise_power = s.noise->relative_power(residual - *s.last_residual);
   s.last_residual = residual;
   s.periods.push_back(period);
@@ -476,7 +475,10 @@ TrackedPeriod ModelTracker::add(const PeriodSpectra& period) {
   const int found = s.detector->add(s.scores(z - s.gradient, out.noise_power));
   out.largest_statistic = s.detector->largest();
   out.threshold = s.detector->threshold();
-  if (found == 0 && s.onset == 0) return out;
+  if (found == 0 && s.onset == 0) {
+    s.filter.add(s.A, s.K, z - s.A * (s.filter.estimate() - s.x));
+    return out;
+  }
   s.onset = s.onset == 0 ? found : s.onset + 1;
   if (s.onset <= kToName) return out;
   out.change = s.name(s.onset - 1);
