@@ -312,6 +312,14 @@ struct ModelTracker::State {
            (change.kind == ChangeKind::parameter &&
             (kind == TrackedKind::sensor_gain || kind == TrackedKind::actuator_gain));
   }
+  /// Of as many periods, each compared with the mean of the learned ones.
+  double independent(int count) const {
+    return count / (1.0 + static_cast<double>(count) / options.learning_periods);
+  }
+  bool keeps(int since) const { return since <= std::ssize(periods); }
+  std::vector<StageChange> changes_of_response(int since) const;
+  /// @param P_ of the most probable other change: in a wrong response, the noise in U raises that of the residual
+  std::vector<StageChange> changes_of_noise(int since, const Eigen::MatrixXcd& P_) const;
   /// The most probable change of the last periods, after the one that contains the transient of the change.
   StageChange name(int since) const;
   /// Whitened, without what the trends explain.
@@ -376,56 +384,82 @@ ModelTracker::State::Explanation ModelTracker::State::explain(const PossibleChan
   return best;
 }
 
-StageChange ModelTracker::State::name(int since) const {
-  // The first difference between two periods contains the transient of the change.
-  const int differences = since - 1;
+std::vector<StageChange> ModelTracker::State::changes_of_response(int since) const {
   const Eigen::VectorXd scores_since = detector->mean_scores(since);
-  const Eigen::VectorXd scores_of_noise = detector->mean_scores(differences);
-  const auto independent_of = [&](int count) {
-    return count / (1.0 + static_cast<double>(count) / options.learning_periods);
-  };
-  const std::size_t kept = std::min(periods.size(), static_cast<std::size_t>(since));
-  const PeriodSpectra mean = mean_of(periods, kept);
-  // Of a chi-square, by weights from few periods; the same for all, so that it does not choose between them.
-  const double inflation = median_inflation();
+  const PeriodSpectra mean =
+      mean_of(periods, std::min(periods.size(), static_cast<std::size_t>(since)));
   std::vector<StageChange> changes;
   for (std::size_t h = 0; h < possible.size(); ++h) {
+    if (possible[h].kind == ChangeKind::noise) continue;
     StageChange change;
     change.what = possible[h];
     change.periods = since;
-    const bool of_noise = change.what.kind == ChangeKind::noise;
-    const double score = (of_noise ? scores_of_noise : scores_since)[static_cast<Eigen::Index>(h)];
-    const double independent = independent_of(of_noise ? differences : since);
-    change.statistic = score * score * independent;
-    if (of_noise) {
-      const double deviation = noise_deviation[change.what.index];
-      change.size = std::sqrt(std::max(0.0, 1.0 + score * deviation)) - 1.0;
-      // The scatter of a noise power is proportional to it.
-      change.deviation = 0.5 * deviation * (1.0 + change.size) / std::sqrt(independent);
-    } else {
-      const Eigen::VectorXd& d = change.what.direction;
-      const double information = d.dot(A * d);
-      const double scale = std::sqrt(d.dot(K * d)) / information;
-      change.size = score * scale;
-      change.deviation = scale / std::sqrt(independent);
-      double explained = change.size * change.size * information;
-      if (static_cast<int>(kept) == since) {
-        const Explanation exact = explain(change.what, mean, change.size);
-        change.size = exact.size;
-        explained = exact.explained;
-      }
-      change.statistic = explained * independent / inflation;
+    const double score = scores_since[static_cast<Eigen::Index>(h)];
+    const Eigen::VectorXd& d = change.what.direction;
+    const double information = d.dot(A * d);
+    const double scale = std::sqrt(d.dot(K * d)) / information;
+    change.size = score * scale;
+    change.deviation = scale / std::sqrt(independent(since));
+    change.statistic = score * score * independent(since);
+    if (!is_gain(change.what) && keeps(since)) {
+      const Explanation exact = explain(change.what, mean, change.size);
+      change.size = exact.size;
+      change.statistic = exact.explained * independent(since) / (scale * scale * information);
     }
     changes.push_back(change);
   }
+  return changes;
+}
+
+std::vector<StageChange> ModelTracker::State::changes_of_noise(int since,
+                                                               const Eigen::MatrixXcd& P_) const {
+  // The first difference contains the transient of the change.
+  const int differences = since - 1;
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(residual.rows());
+  if (keeps(since)) {
+    std::optional<Eigen::MatrixXcd> last;
+    for (auto period = periods.end() - since; period != periods.end(); ++period) {
+      Eigen::MatrixXcd now = residual_of(*period, P_);
+      remove_trends(now);
+      if (last) power += noise->relative_power(now - *last) / differences;
+      last = std::move(now);
+    }
+  }
+  const Eigen::VectorXd scores_since = detector->mean_scores(differences);
+  std::vector<StageChange> changes;
+  for (std::size_t h = 0; h < possible.size(); ++h) {
+    if (possible[h].kind != ChangeKind::noise) continue;
+    StageChange change;
+    change.what = possible[h];
+    change.periods = since;
+    const double deviation = noise_deviation[change.what.index];
+    const double score = keeps(since) ? (power[change.what.index] - 1.0) / deviation
+                                      : scores_since[static_cast<Eigen::Index>(h)];
+    change.size = std::sqrt(std::max(0.0, 1.0 + score * deviation)) - 1.0;
+    // The scatter of a noise power is proportional to it.
+    change.deviation = 0.5 * deviation * (1.0 + change.size) / std::sqrt(independent(differences));
+    change.statistic = score * score * independent(differences);
+    changes.push_back(change);
+  }
+  return changes;
+}
+
+StageChange ModelTracker::State::name(int since) const {
+  std::vector<StageChange> changes = changes_of_response(since);
+  const auto likeliest = std::ranges::max_element(changes, std::less<>(), &StageChange::statistic);
+  const Eigen::MatrixXcd there =
+      likeliest == changes.end() ? P : response.at(x + likeliest->size * likeliest->what.direction);
+  for (StageChange& change : changes_of_noise(since, there)) changes.push_back(std::move(change));
   std::ranges::sort(changes, std::greater<>(), &StageChange::statistic);
   double sum = 0.0;
   for (const StageChange& change : changes)
     sum += std::exp(0.5 * (change.statistic - changes.front().statistic));
   StageChange& named = changes.front();
   named.probability = 1.0 / sum;
-  named.otherwise = changes[1].what;
-  named.other_probability = std::exp(0.5 * (changes[1].statistic - named.statistic)) / sum;
+  if (changes.size() > 1) {
+    named.otherwise = changes[1].what;
+    named.other_probability = std::exp(0.5 * (changes[1].statistic - named.statistic)) / sum;
+  }
   // Chance alone reaches this in 5 % of the disturbances.
   if (named.statistic < 2.0 * std::log(static_cast<double>(changes.size()) / 0.05))
     named.what = {ChangeKind::disturbance, 0, {}};
