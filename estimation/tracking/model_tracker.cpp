@@ -470,6 +470,8 @@ ModelTracker::ModelTracker(const AdditiveModel& model, const Eigen::VectorXd& fr
                            const TrackerOptions& options) {
   if (frequency_hz.size() < 2)
     throw std::invalid_argument("fewer than 2 lines in the band of the model; nothing to track");
+  if (!(model.sample_rate_hz > 0.0))
+    throw std::invalid_argument("the model has no sample rate; tracking needs that of the data");
   if (options.learning_periods < 4)
     throw std::invalid_argument("learning needs at least 4 periods");
   if (!(options.memory_periods >= 1.0))
