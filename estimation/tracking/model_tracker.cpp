@@ -180,16 +180,13 @@ struct ModelTracker::State {
     }
   }
 
-  void learn() {
-    const auto n = static_cast<double>(periods.size());
-    const PeriodSpectra mean = mean_of(periods, periods.size());
-    x = start.value_or(filter.estimate());
-    P = response.at(x);
+  /// The noise and the trends, from residuals at P without trends.
+  std::vector<Eigen::MatrixXcd> learn_noise() {
     std::vector<Eigen::MatrixXcd> residuals;
     for (const PeriodSpectra& period : periods) residuals.push_back(residual_of(period, P));
     noise.emplace(residuals);
-    for (int pass = 0; pass < 2;
-         ++pass) {  // the noise on top of the trends gives the weights to remove them
+    // The noise on top of the trends gives the weights to remove them.
+    for (int pass = 0; pass < 2; ++pass) {
       white_trend = noise->whitened(trend);
       for (Eigen::MatrixXcd& r : residuals) remove_trends(r);
       noise.emplace(residuals);
@@ -197,12 +194,22 @@ struct ModelTracker::State {
     white_trend = noise->whitened(trend);
     trend_basis = white_trend.householderQr().householderQ() *
                   Eigen::MatrixXd::Identity(white_trend.rows(), white_trend.cols());
+    return residuals;
+  }
+
+  void learn() {
+    const auto n = static_cast<double>(periods.size());
+    const PeriodSpectra mean = mean_of(periods, periods.size());
+    x = start.value_or(filter.estimate());
+    P = response.at(x);
+    std::vector<Eigen::MatrixXcd> residuals = learn_noise();
     if (start) {
       settle(mean);
       filter.forget();
       start.reset();
+      P = response.at(x);
+      residuals = learn_noise();  // with feedback, it depends on P
     }
-    P = response.at(x);
     linearize(mean.U);
     const SumCovariance sums = noise->covariance(J);
     // An estimate over a deviation from nu degrees of freedom has the mean square nu / (nu - 2).
