@@ -1,0 +1,232 @@
+#include "estimation/tracking/model_tracker.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/estimation/tracked_stage.hpp"
+
+namespace stageid {
+namespace test_model_tracker {
+
+using test::LoopSpectra;
+using test::model_of;
+using test::StageProperties;
+using test::tracked_lines_hz;
+
+ModelTracker tracker_of(const AdditiveModel& model = model_of({}),
+                        const TrackerOptions& options = {}) {
+  return {model, tracked_lines_hz(), options};
+}
+
+TrackedPeriod watch(ModelTracker& tracker, LoopSpectra& loop, int periods) {
+  TrackedPeriod last;
+  for (int t = 0; t < periods; ++t) {
+    last = tracker.add(loop.next());
+    EXPECT_FALSE(last.change) << describe(last.change->what, tracker, model_of({})) << " in period "
+                              << t;
+  }
+  return last;
+}
+
+/// The estimates, in their deviations from the truth.
+Eigen::VectorXd errors(const ModelTracker& tracker, const Eigen::VectorXd& truth) {
+  return (tracker.estimate() - truth).cwiseQuotient(tracker.covariance().diagonal().cwiseSqrt());
+}
+
+TEST(ModelTracker, LearnsThenWatches) {
+  LoopSpectra loop(1);
+  ModelTracker tracker = tracker_of();
+  EXPECT_EQ(tracker.reference().chi_square.size(), 0);
+  EXPECT_TRUE(watch(tracker, loop, 32).learning);
+  const TrackedPeriod first = watch(tracker, loop, 1);
+  EXPECT_FALSE(first.learning);
+  EXPECT_EQ(first.noise_power.size(), 0) << "there is no difference yet";
+  EXPECT_LT(first.largest_statistic, first.threshold);
+  EXPECT_EQ(watch(tracker, loop, 1).noise_power.size(), 2);
+}
+
+TEST(ModelTracker, EstimatesOfAnUnchangedStageAreWithinTheirDeviations) {
+  constexpr int kRuns = 10;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(14);
+  Eigen::VectorXd chi_square = Eigen::VectorXd::Zero(2);
+  for (int run = 0; run < kRuns; ++run) {
+    LoopSpectra loop(100 + static_cast<std::uint64_t>(run));
+    ModelTracker tracker = tracker_of();
+    watch(tracker, loop, 32 + 30);
+    const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+    squares += ratio.cwiseAbs2() / kRuns;
+    EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+    chi_square += tracker.reference().chi_square / kRuns;
+  }
+  // 10 runs of about 10 independent estimates: one deviation is 0.14.
+  EXPECT_NEAR(squares.mean(), 1.0, 0.4) << squares.transpose();
+  // The model is exact. 10 runs of 120 values of a sensor: one deviation is 0.04; weights from few periods raise the
+  // mean, the estimated parameters lower it.
+  for (const double value : chi_square) EXPECT_NEAR(value, 1.0, 0.2);
+}
+
+// With feedback, the noise of the residual depends on the parameters, which settle far from the model here.
+TEST(ModelTracker, AWrongResidueShowsInTheReferenceAndCausesNoAlarms) {
+  AdditiveModel model = model_of({});
+  // Not a gain of a channel: one entry of one mode.
+  model.submodels[2].numerator[0](1, 0) *= 1.5;
+  LoopSpectra loop(2);
+  ModelTracker tracker = tracker_of(model);
+  watch(tracker, loop, 32 + 60);
+  EXPECT_GT(tracker.reference().chi_square[1], 3.0);
+  EXPECT_GT(tracker.reference().relative_error[1], 1e-3);
+  EXPECT_LT(tracker.reference().relative_error[1], 0.3);
+}
+
+struct Case {
+  std::string name;
+  double size;
+  std::function<void(StageProperties&)> change;
+};
+
+std::vector<Case> cases() {
+  const std::string gains = "gains of all sensors or of all actuators";
+  return {
+      {"frequency of the mode at 122 Hz", 2e-3, [](auto& s) { s.frequency_hz[1] *= 1.002; }},
+      // By three half-power bandwidths.
+      {"frequency of the mode at 122 Hz", 0.06, [](auto& s) { s.frequency_hz[1] *= 1.06; }},
+      {"frequency of the mode at 122 Hz", -0.06, [](auto& s) { s.frequency_hz[1] *= 0.94; }},
+      // General viscous damping.
+      {"frequency of the mode at 253 Hz", -4e-3, [](auto& s) { s.frequency_hz[3] *= 0.996; }},
+      {"damping ratio of the mode at 71 Hz", 0.5, [](auto& s) { s.damping_ratio[0] *= 1.5; }},
+      {"gain of sensor 'y2'", -0.06, [](auto& s) { s.sensor_gain[1] = 0.94; }},
+      {"gain of actuator 'a3'", 0.06, [](auto& s) { s.actuator_gain[2] = 1.06; }},
+      {"delay", 1e-4, [](auto& s) { s.delay_s += 1e-4; }},
+      {"delay", -1e-4, [](auto& s) { s.delay_s -= 1e-4; }},
+      {"frequencies of all modes", -2e-3,
+       [](auto& s) {
+         for (double& hz : s.frequency_hz) hz *= 0.998;
+       }},
+      {gains, 0.06, [](auto& s) { s.sensor_gain *= 1.06; }},
+      {gains, 0.06, [](auto& s) { s.actuator_gain *= 1.06; }},
+  };
+}
+
+/// The change that the tracker finds in the next periods.
+StageChange next_change(ModelTracker& tracker, LoopSpectra& loop) {
+  for (int t = 0; t < 40; ++t)
+    if (const TrackedPeriod period = tracker.add(loop.next()); period.change) return *period.change;
+  ADD_FAILURE() << "no change";
+  return {};
+}
+
+TEST(ModelTracker, NamesAndSizesEachChange) {
+  std::uint64_t seed = 200;
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    LoopSpectra loop(++seed);
+    ModelTracker tracker = tracker_of();
+    watch(tracker, loop, 40);
+    StageProperties stage;
+    c.change(stage);
+    loop.become(stage);
+    const StageChange change = next_change(tracker, loop);
+    EXPECT_EQ(describe(change.what, tracker, model_of({})), c.name);
+    EXPECT_LT(std::abs(change.size - c.size), 4.0 * change.deviation) << change.size;
+    EXPECT_LT(change.deviation, 0.25 * std::abs(c.size)) << "too small to be tested";
+    EXPECT_GT(change.probability, 0.9);
+    EXPECT_LT(change.other_probability, 0.1);
+    EXPECT_GT(change.periods, 0);
+  }
+}
+
+TEST(ModelTracker, NamesAndSizesMoreAndLessNoise) {
+  for (const double factor : {2.0, 0.5}) {
+    LoopSpectra loop(3);
+    ModelTracker tracker = tracker_of();
+    watch(tracker, loop, 40);
+    loop.multiply_noise(1, factor);
+    const StageChange change = next_change(tracker, loop);
+    EXPECT_EQ(describe(change.what, tracker, model_of({})), "noise of sensor 'y2'");
+    EXPECT_LT(std::abs(change.size - (factor - 1.0)), 4.0 * change.deviation) << change.size;
+    EXPECT_LT(change.deviation, 0.25) << "too small to be tested";
+  }
+}
+
+// Far from the model, where the derivatives of the first reference no longer apply.
+TEST(ModelTracker, LearnsTheStageAgainAfterAChange) {
+  LoopSpectra loop(4);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 40);
+  StageProperties stage;
+  stage.frequency_hz[1] *= 1.06;
+  loop.become(stage);
+  next_change(tracker, loop);
+  EXPECT_TRUE(watch(tracker, loop, 32).learning);
+  EXPECT_FALSE(watch(tracker, loop, 30).learning);
+  Eigen::VectorXd truth = Eigen::VectorXd::Zero(14);
+  truth[1] = 0.06;
+  const Eigen::VectorXd ratio = errors(tracker, truth);
+  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+  for (const double value : tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
+}
+
+TEST(ModelTracker, ADisturbancePassesWithoutAChange) {
+  LoopSpectra loop(4);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 40);
+  const Eigen::VectorXd before = tracker.estimate();
+  const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
+  EXPECT_FALSE(tracker.add(loop.next(20.0)).change) << "it may still last";
+  EXPECT_EQ(next_change(tracker, loop).what.kind, ChangeKind::disturbance);
+  EXPECT_EQ(tracker.estimate(), before);
+  EXPECT_FALSE(watch(tracker, loop, 20).learning);
+  // 20 of 60 periods are new: the estimates move by less than their deviations.
+  EXPECT_LT((tracker.estimate() - before).cwiseQuotient(deviation).cwiseAbs().maxCoeff(), 3.0);
+}
+
+TEST(ModelTracker, AnotherExcitationIsLearnedAndTheEstimatesContinue) {
+  LoopSpectra loop(5);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 50);
+  const Eigen::VectorXd before = tracker.covariance().diagonal();
+  tracker.change_excitation();
+  loop.excite();
+  const TrackedPeriod learning = watch(tracker, loop, 32);
+  EXPECT_TRUE(learning.learning);
+  EXPECT_FALSE(watch(tracker, loop, 30).learning);
+  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+  // With a memory of 100, the variance after n periods is proportional to (1 - e^(-2n/100)) / (1 - e^(-n/100))^2: 0.48
+  // of that after 50 remain after 112. The excitations differ by a factor of two on some lines.
+  const double kept = tracker.covariance().diagonal().cwiseQuotient(before).mean();
+  EXPECT_GT(kept, 0.48 / 2.0);
+  EXPECT_LT(kept, 0.48 * 1.6);
+}
+
+TEST(ModelTracker, RefusesWhatItCannotTrack) {
+  const auto refused = [](TrackerOptions options, const AdditiveModel& model,
+                          const Eigen::VectorXd& lines_hz, const char* message) {
+    EXPECT_THAT([&] { ModelTracker(model, lines_hz, options); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(message)));
+  };
+  const AdditiveModel model = model_of({});
+  const Eigen::VectorXd lines_hz = tracked_lines_hz();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused({}, model, lines_hz.head(1), "fewer than 2 lines");
+  refused({}, model, {}, "fewer than 2 lines");
+  refused({.learning_periods = 3}, model, lines_hz, "at least 4 periods");
+  for (const double memory : {0.5, nan})
+    refused({.memory_periods = memory}, model, lines_hz, "at least one period");
+  for (const double rate : {0.0, -1e-3, 0.2, nan})
+    refused({.false_alarms_per_period = rate}, model, lines_hz, "false alarms");
+  AdditiveModel unsampled = model;
+  unsampled.sample_rate_hz = 0.0;
+  refused({}, unsampled, lines_hz, "sample rate");
+  EXPECT_NO_THROW(ModelTracker(model, lines_hz.head(2), {.learning_periods = 4}));
+}
+
+}  // namespace test_model_tracker
+}  // namespace stageid
