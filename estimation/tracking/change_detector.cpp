@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
+#include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
+
+#include "excitation/multisine/random_stream.hpp"
 
 namespace stageid {
 namespace {
@@ -24,6 +27,35 @@ double continued_threshold(double t0, double rate0, double rate) {
     t = std::max(1.0, t0 + 2.0 * std::log(rate0 / rate) + std::log(t / t0));
   return t;
 }
+
+/// Normal and chi-square numbers that are the same on every machine.
+class RandomScores {
+ public:
+  explicit RandomScores(std::uint64_t seed) : uniform_(seed) {}
+  double normal() {
+    if (second_) return *std::exchange(second_, std::nullopt);
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform_.next()));
+    const double angle = 2.0 * std::numbers::pi * uniform_.next();
+    second_ = radius * std::sin(angle);
+    return radius * std::cos(angle);
+  }
+  /// Over its mean. Source: G. Marsaglia and W. W. Tsang, ACM Trans. Math. Softw. 26 (2000) 363.
+  /// @pre freedom >= 2
+  double chi_square(double freedom) {
+    const double d = 0.5 * freedom - 1.0 / 3.0;
+    for (;;) {
+      const double x = normal();
+      const double root = 1.0 + x / std::sqrt(9.0 * d);
+      const double v = root * root * root;
+      if (v > 0.0 && std::log(1.0 - uniform_.next()) < 0.5 * x * x + d * (1.0 - v + std::log(v)))
+        return d * v / (0.5 * freedom);
+    }
+  }
+
+ private:
+  UniformStream uniform_;
+  std::optional<double> second_;  // of the pair of the Box-Muller transform
+};
 
 }  // namespace
 
@@ -80,20 +112,17 @@ void ChangeDetector::calibrate(const Eigen::MatrixXd& correlation, double false_
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
   const Eigen::MatrixXd root =
       eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal;
-  const auto draw = [&] {
-    return (root * Eigen::VectorXd::NullaryExpr(root.cols(), [&] { return normal(random); }))
-        .eval();
+  RandomScores random(1);
+  const auto draw = [&]() -> Eigen::VectorXd {
+    return root * Eigen::VectorXd::NullaryExpr(root.cols(), [&] { return random.normal(); });
   };
   threshold_ = std::numeric_limits<double>::infinity();
   std::vector<double> maxima;
   for (int life = 0; life < kLives; ++life) {
     restart();
     const Eigen::VectorXd error = draw() / std::sqrt(reference_periods_);
-    const Eigen::ArrayXd scale = freedom_.unaryExpr([&](double nu) {
-      return std::sqrt(nu / (2.0 * std::gamma_distribution<double>(0.5 * nu)(random)));
-    });
+    const Eigen::ArrayXd scale =
+        freedom_.unaryExpr([&](double nu) { return 1.0 / std::sqrt(random.chi_square(nu)); });
     double largest = 0.0;
     for (int t = 0; t < kLife; ++t) {
       add(scale * (draw() - error).array());

@@ -11,12 +11,13 @@ namespace stageid {
 /// hypotheses. A change of hypothesis h since w periods shifts its scores; twice the log likelihood ratio is
 ///   nu ln(1 + t^2 / nu),   t^2 = (sum of w scores)^2 / (w (1 + w/n)),
 /// n the periods of the reference, whose mean was subtracted from the scores, and nu the degrees of freedom of the
-/// variance to which they were scaled. The largest over all h and over w = 1, 2, 4, ... is compared with a threshold. It follows from the rate of false alarms: simulated scores with the same
-/// correlation give the rate at their median maximum, and the tail c sqrt(t) e^{-t/2} continues it to rarer alarms.
+/// variance to which they were scaled. The largest over all h and over w = 1, 2, 4, ... is compared with a threshold.
+/// The threshold follows from the rate of false alarms: simulated scores with the same correlation give the rate at
+/// their median maximum, and the tail c sqrt(t) e^{-t/2} continues it to rarer alarms.
 /// Source: M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), sections 2.4.3 and 7.2.4.
 class ChangeDetector {
  public:
-  /// @param correlation of the scores, H x H   @param freedom of their variances, H
+  /// @param correlation of the scores, H x H   @param freedom of their variances, H, at least 2
   /// @param false_alarms_per_period above 0, at most 0.1
   ChangeDetector(const Eigen::MatrixXd& correlation, Eigen::VectorXd freedom,
                  double false_alarms_per_period, int reference_periods);
