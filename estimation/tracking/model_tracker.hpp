@@ -8,6 +8,8 @@
 
 #include "estimation/modal/period_spectra.hpp"
 #include "estimation/model/additive_model.hpp"
+#include "estimation/tracking/reference_quality.hpp"
+#include "estimation/tracking/stage_change.hpp"
 #include "estimation/tracking/tracked_parameters.hpp"
 
 namespace stageid {
@@ -20,38 +22,6 @@ struct TrackerOptions {
   double false_alarms_per_period = 1e-6;
 };
 
-/// What changed. `parameter` is one of tracked_parameters().
-enum class ChangeKind : std::uint8_t {
-  parameter,
-  all_frequencies,  ///< of all tracked modes by the same factor: temperature, mass
-  all_gains,        ///< of all sensors, or of all actuators, by the same factor
-  noise,            ///< of a sensor
-  disturbance       ///< has passed; the stage is as before
-};
-template <>
-inline constexpr std::array kWords<ChangeKind> = {"parameter", "all_frequencies", "all_gains",
-                                                  "noise", "disturbance"};
-
-/// A hypothesis about a change.
-struct PossibleChange {
-  ChangeKind kind = ChangeKind::parameter;
-  Eigen::Index index = 0;     ///< into tracked_parameters(), or of the sensor
-  Eigen::VectorXd direction;  ///< of the tracked parameters; empty for noise
-};
-
-/// A change that was detected.
-struct StageChange {
-  PossibleChange what;
-  double size = 0.0;         ///< as the tracked parameter; noise: relative change of the rms
-  double deviation = 0.0;    ///< standard deviation of size
-  double probability = 0.0;  ///< among all possible changes, equally probable before
-  /// The next probable one, and its probability.
-  std::optional<PossibleChange> otherwise;
-  double other_probability = 0.0;
-  int periods = 0;  ///< since the change
-  double statistic = 0.0;
-};
-
 /// State after a period.
 struct TrackedPeriod {
   bool learning = true;  ///< the estimates are those of the last period before learning
@@ -59,14 +29,6 @@ struct TrackedPeriod {
   double largest_statistic = 0.0;
   double threshold = 0.0;
   Eigen::VectorXd noise_power;  ///< by sensor, relative to that learned; empty while learning
-};
-
-/// How well the model explains the periods from which the reference was learned.
-struct ReferenceQuality {
-  /// Mean square of the constant residual, relative to noise alone: 1 for an exact model, by sensor.
-  Eigen::VectorXd chi_square;
-  Eigen::VectorXd
-      relative_error;  ///< rms of the constant residual over that of the output, without noise
 };
 
 /// Tracks the properties of a stage around a model, period by period, and detects and names their changes.
@@ -101,9 +63,5 @@ class ModelTracker {
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// "natural frequency of the mode at 752.68 Hz", "noise of sensor 'y1'".
-std::string describe(const PossibleChange& change, const ModelTracker& tracker,
-                     const AdditiveModel& model);
 
 }  // namespace stageid

@@ -68,6 +68,20 @@ Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,
   return changes;
 }
 
+Eigen::MatrixXd prior_information(const std::vector<TrackedParameter>& parameters,
+                                  double sample_rate_hz) {
+  const Eigen::VectorXd changes = largest_changes(parameters, sample_rate_hz);
+  Eigen::MatrixXd prior = changes.array().square().inverse().matrix().asDiagonal();
+  Eigen::VectorXd common = Eigen::VectorXd::Zero(changes.size());
+  for (Eigen::Index p = 0; p < common.size(); ++p) {
+    const TrackedKind kind = parameters[static_cast<std::size_t>(p)].kind;
+    if (kind == TrackedKind::sensor_gain) common[p] = 1.0;
+    if (kind == TrackedKind::actuator_gain) common[p] = -1.0;
+  }
+  constexpr double kHeld = 1e12;  // a deviation of 1e-6
+  return prior + kHeld / common.squaredNorm() * common * common.transpose();
+}
+
 Submodel moved(const Submodel& mode, double frequency, double damping) {
   Submodel out = mode;
   const double period = 1.0 / (1.0 + frequency);

@@ -36,6 +36,11 @@ std::string describe(const TrackedParameter& parameter, const AdditiveModel& mod
 Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,
                                 double sample_rate_hz);
 
+/// Information of the tracked parameters without data, q x q: that of largest_changes(). A common factor of all sensors
+/// and its inverse of all actuators cannot be distinguished; it is held at one.
+Eigen::MatrixXd prior_information(const std::vector<TrackedParameter>& parameters,
+                                  double sample_rate_hz);
+
 /// The submodel with its frequency multiplied by 1 + frequency and its damping ratio by 1 + damping. The numerators of
 /// N(s) / (s^2 + 2 zeta omega s + omega^2) stay: the stiffness changes, masses and shapes do not.
 Submodel moved(const Submodel& mode, double frequency, double damping);

@@ -19,6 +19,7 @@ class TrackedResponse {
   const std::vector<TrackedParameter>& parameters() const noexcept { return parameters_; }
   Eigen::Index size() const noexcept { return std::ssize(parameters_); }
   Eigen::Index lines() const noexcept { return lines_.omega_rad_s.size(); }
+  const Eigen::VectorXd& omega_rad_s() const noexcept { return lines_.omega_rad_s; }
 
   /// P(x), (n_y n_u) x N, column k = vec(P_k).
   Eigen::MatrixXcd at(const Eigen::VectorXd& x) const;

@@ -198,7 +198,7 @@ void study(const Bench& bench, const Kind& kind, double deviations, Count& count
   for (int t = 0; t < kLearning + kBefore + kAfter; ++t) {
     const stageid::TrackedPeriod state = tracker.add(loop.next());
     if (!state.change) continue;
-    const std::string name = describe(state.change->what, tracker, bench.model);
+    const std::string name = describe(state.change->what, tracker.parameters(), bench.model);
     if (t < kLearning + kBefore) {
       ++count.before;
       continue;
@@ -212,7 +212,7 @@ void study(const Bench& bench, const Kind& kind, double deviations, Count& count
           "{} seed {} ({} x {}): {} by {:.3g}, told: {} by {:.3g}, p {:.3f}, else {} ({:.2g})\n",
           kind.name, bench.stage.seed, bench.model.n_outputs(), bench.model.n_inputs(),
           planted.name, planted.fault.value, name, state.change->size, state.change->probability,
-          describe(*state.change->otherwise, tracker, bench.model),
+          describe(*state.change->otherwise, tracker.parameters(), bench.model),
           state.change->other_probability);
     }
     return;

@@ -249,7 +249,8 @@ int main(int argc, char** argv) {
           seen = true;
           ++detected;
           delays.push_back(p - planted.period + 1);
-          const bool right = describe(state.change->what, tracker, model) == planted.name;
+          const bool right =
+              describe(state.change->what, tracker.parameters(), model) == planted.name;
           named += right ? 1 : 0;
           fmt::print("{} {} after {} periods; planted: {}\n  ", right ? "right" : "WRONG", seed,
                      p - planted.period + 1, planted.name);
@@ -257,7 +258,7 @@ int main(int argc, char** argv) {
         fmt::print(
             "seed {} period {}: {} {:.3g} +- {:.2g} p {:.3f} since {} statistic {:.1f} (limit "
             "{:.1f})\n",
-            seed, p, describe(state.change->what, tracker, model), state.change->size,
+            seed, p, describe(state.change->what, tracker.parameters(), model), state.change->size,
             state.change->deviation, state.change->probability, state.change->periods,
             state.change->statistic, state.threshold);
       }

@@ -62,7 +62,7 @@ const char* remedy_of(const StageChange& change, const TrackedParameter* paramet
 std::string what_happened(const StageChange& change, const ModelTracker& tracker,
                           const AdditiveModel& model) {
   const TrackedParameter* parameter = parameter_of(change.what, tracker);
-  const std::string name = describe(change.what, tracker, model);
+  const std::string name = describe(change.what, tracker.parameters(), model);
   if (change.what.kind == ChangeKind::disturbance) return name;
   // Gains near 0 or below are faults of their own.
   if (is_channel_gain(parameter)) {
@@ -82,8 +82,9 @@ std::string change_text(const StageChange& change, const ModelTracker& tracker,
       fmt::format("{}, since {:.4g} s, probability {:.3g}", what_happened(change, tracker, model),
                   (change.periods + 1) * period_s, change.probability);
   if (change.probability < kSure && change.otherwise)
-    text += fmt::format("; else {} ({:.2g})", describe(*change.otherwise, tracker, model),
-                        change.other_probability);
+    text +=
+        fmt::format("; else {} ({:.2g})", describe(*change.otherwise, tracker.parameters(), model),
+                    change.other_probability);
   return text + ". " + remedy_of(change, parameter_of(change.what, tracker));
 }
 
@@ -113,7 +114,7 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
   if (change.what.kind == ChangeKind::noise)
     json["channel"] = model.outputs.name(change.what.index);
   if (change.otherwise) {
-    json["otherwise"] = describe(*change.otherwise, tracker, model);
+    json["otherwise"] = describe(*change.otherwise, tracker.parameters(), model);
     json["other_probability"] = change.other_probability;
   }
   json["text"] = change_text(change, tracker, model, period_s);

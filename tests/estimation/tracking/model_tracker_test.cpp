@@ -29,8 +29,8 @@ TrackedPeriod watch(ModelTracker& tracker, LoopSpectra& loop, int periods) {
   TrackedPeriod last;
   for (int t = 0; t < periods; ++t) {
     last = tracker.add(loop.next());
-    EXPECT_FALSE(last.change) << describe(last.change->what, tracker, model_of({})) << " in period "
-                              << t;
+    EXPECT_FALSE(last.change) << describe(last.change->what, tracker.parameters(), model_of({}))
+                              << " in period " << t;
   }
   return last;
 }
@@ -133,7 +133,7 @@ TEST(ModelTracker, NamesAndSizesEachChange) {
     c.change(stage);
     loop.become(stage);
     const StageChange change = next_change(tracker, loop);
-    EXPECT_EQ(describe(change.what, tracker, model_of({})), c.name);
+    EXPECT_EQ(describe(change.what, tracker.parameters(), model_of({})), c.name);
     EXPECT_LT(std::abs(change.size - c.size), 4.0 * change.deviation) << change.size;
     EXPECT_LT(change.deviation, 0.25 * std::abs(c.size)) << "too small to be tested";
     EXPECT_GT(change.probability, 0.9);
@@ -149,7 +149,7 @@ TEST(ModelTracker, NamesAndSizesMoreAndLessNoise) {
     watch(tracker, loop, 40);
     loop.multiply_noise(1, factor);
     const StageChange change = next_change(tracker, loop);
-    EXPECT_EQ(describe(change.what, tracker, model_of({})), "noise of sensor 'y2'");
+    EXPECT_EQ(describe(change.what, tracker.parameters(), model_of({})), "noise of sensor 'y2'");
     EXPECT_LT(std::abs(change.size - (factor - 1.0)), 4.0 * change.deviation) << change.size;
     EXPECT_LT(change.deviation, 0.25) << "too small to be tested";
   }

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace stageid {
+
+/// How well the model explains the periods from which the reference was learned.
+struct ReferenceQuality {
+  /// Mean square of the constant residual, relative to noise alone: 1 for an exact model, by sensor.
+  Eigen::VectorXd chi_square;
+  Eigen::VectorXd
+      relative_error;  ///< rms of the constant residual over that of the output, without noise
+};
+
+}  // namespace stageid

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "estimation/modal/period_spectra.hpp"
+#include "estimation/tracking/line_noise.hpp"
+#include "estimation/tracking/reference_quality.hpp"
+#include "estimation/tracking/tracked_response.hpp"
+
+namespace stageid {
+
+/// The mean of the last periods. @pre 0 < last <= periods.size()
+PeriodSpectra mean_of(const std::deque<PeriodSpectra>& periods, std::size_t last);
+
+/// What was learned from periods of a stage without change, at parameters x: the noise, the constant part of the
+/// residual, and how the residual depends on x.
+///
+/// What a slow motion over the ends of a period leaves on the lines is removed from every residual: the spectra of a
+/// linear and of a quadratic trend of each output.
+class TrackingReference {
+ public:
+  /// @param x at which the periods are; with `settle`, a starting point of Gauss-Newton to their mean
+  /// @param periods at least 4
+  TrackingReference(const TrackedResponse& response, const std::deque<PeriodSpectra>& periods,
+                    Eigen::VectorXd x, bool settle);
+
+  const Eigen::VectorXd& x() const noexcept { return x_; }
+  const Eigen::MatrixXcd& response() const noexcept { return P_; }    ///< at x
+  double periods() const noexcept { return periods_; }                ///< learned from
+  const Eigen::MatrixXd& information() const noexcept { return A_; }  ///< of a period
+  const Eigen::MatrixXd& covariance() const noexcept { return K_; }   ///< of gradient()
+  /// Degrees of freedom of the diagonal of covariance(), q.
+  const Eigen::VectorXd& freedom() const noexcept { return freedom_; }
+  const Eigen::VectorXd& mean_gradient() const noexcept { return gradient_; }
+  /// Standard deviation of noise_power() of two periods, by output, over many of them.
+  const Eigen::VectorXd& noise_deviation() const noexcept { return noise_deviation_; }
+  const ReferenceQuality& quality() const noexcept { return quality_; }
+
+  /// Y - P U without trends, n_y x N.
+  Eigen::MatrixXcd residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
+  Eigen::VectorXd gradient(const Eigen::MatrixXcd& residual) const;  ///< J^T W e
+  /// Of the difference of two residuals; 1 on average without change.
+  Eigen::VectorXd noise_power(const Eigen::MatrixXcd& difference) const;
+  /// Whitened and without trends: a change of the outputs.
+  Eigen::VectorXd whitened_change(const Eigen::MatrixXcd& of) const;
+  /// The same of the residual of a mean, minus the constant part.
+  Eigen::VectorXd whitened_change(const PeriodSpectra& mean) const;
+
+ private:
+  std::vector<Eigen::MatrixXcd> learn_noise(const std::deque<PeriodSpectra>& periods);
+  void linearize(const Eigen::MatrixXcd& U);
+  void settle(const PeriodSpectra& mean);
+  void learn_noise_power(const std::vector<Eigen::MatrixXcd>& residuals);
+  void judge(const PeriodSpectra& mean);
+  Eigen::MatrixXcd raw_residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
+  void remove_trends(Eigen::MatrixXcd& of) const;
+  Eigen::VectorXd whitened(const Eigen::MatrixXcd& of) const;
+
+  const TrackedResponse& response_;
+  double periods_;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXcd P_;
+  Eigen::MatrixXcd trends_;  // n_y N x 2 n_y
+  std::optional<LineNoise> noise_;
+  Eigen::MatrixXd white_trends_;
+  Eigen::MatrixXd trend_basis_;  // orthonormal
+  Eigen::MatrixXd J_;            // whitened derivatives at x, without trends
+  Eigen::MatrixXd A_;
+  Eigen::MatrixXd K_;
+  Eigen::VectorXd freedom_;
+  Eigen::MatrixXcd residual_;  // constant part
+  Eigen::VectorXd gradient_;   // of it
+  Eigen::VectorXd noise_deviation_;
+  ReferenceQuality quality_;
+};
+
+}  // namespace stageid
