@@ -47,4 +47,11 @@ Json parse_json(std::string_view text) {
   }
 }
 
+/// The same; an empty object unless it is an object.
+template <class Json>
+Json parse_json_object(std::string_view text) {
+  Json json = parse_json<Json>(text);
+  return json.is_object() ? json : Json::object();
+}
+
 }  // namespace stageid

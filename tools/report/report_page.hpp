@@ -16,6 +16,7 @@
 #include "frf/response/nonlinearity.hpp"
 #include "hal/stage/stage.hpp"
 #include "tools/steps/problem.hpp"
+#include "tools/steps/problem_commands.hpp"
 
 namespace stageid {
 

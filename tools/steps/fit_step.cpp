@@ -39,8 +39,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   json["decisions"] = result.decisions;
   if (!problems.empty()) json["problems"] = stored(problems);
   if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
-  const Json frf = parse_json<Json>(setup.frf.provenance_json);
-  json["frf"] = frf.is_discarded() ? Json::object() : frf;
+  json["frf"] = parse_json_object<Json>(setup.frf.provenance_json);
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

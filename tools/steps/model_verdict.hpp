@@ -10,6 +10,7 @@
 #include "estimation/model/additive_model.hpp"
 #include "frf/periods/health_finding.hpp"
 #include "tools/steps/problem.hpp"
+#include "tools/steps/problem_commands.hpp"
 
 namespace stageid {
 

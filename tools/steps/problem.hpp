@@ -12,18 +12,10 @@
 
 namespace stageid {
 
-/// The files of a result, which the commands of its problems name; empty: unknown.
-struct ResultFiles {
-  std::filesystem::path experiment;  ///< of `identify`
-  std::filesystem::path directory;   ///< of `identify`
-  std::filesystem::path log;
-  std::filesystem::path frf;
-  std::filesystem::path model;
-};
-
 // Causes of problems that are not those of a finding or the status of a fit.
 inline constexpr const char* kLosses = "losses";       ///< lost or marked samples
 inline constexpr const char* kHeldBack = "held_back";  ///< the model does not explain other data
+inline constexpr const char* kNonlinear = "nonlinear";
 
 /// One thing that is wrong with a result.
 struct Problem {
@@ -34,6 +26,8 @@ struct Problem {
   std::string flags{};    ///< of `stageid fit`, for a refit
   std::string command{};  ///< that does it or begins it, complete; empty: none is known
 
+  /// Whether the cause is this status of a fit.
+  bool is(FitStatus status) const { return cause == to_string(status); }
   /// "what. Remedy", for lines without the command
   std::string text() const;
 };
@@ -51,14 +45,6 @@ std::vector<Problem> problems_of(const FrfEstimate& frf);
 std::vector<Problem> problems_of(const std::vector<Finding>& health);
 /// The same as stored in a model, and why its fit is not to be trusted.
 std::vector<Problem> problems_of(const AdditiveModel& model);
-
-/// Adds the commands for problems of a measured response or of a fit to it.
-/// @param files those that the provenance names are added if they are beside the others
-/// @param model null: not fitted
-void add_commands(std::vector<Problem>& problems, ResultFiles files,
-                  const std::string& frf_provenance_json, const AdditiveModel* model);
-/// The same for the model's own response.
-void add_commands(std::vector<Problem>& problems, ResultFiles files, const AdditiveModel& model);
 
 /// The first problems for people: the text of each, and its command on a line of its own.
 /// @param prefix of the first line

@@ -1,0 +1,196 @@
+#include "tools/steps/problem_commands.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <sstream>
+#include <string_view>
+#include <utility>
+
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
+#include "estimation/request/fit_request.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Path = std::filesystem::path;
+
+constexpr double kMoreIterations = 4.0;  // times those of the fit
+
+std::string in_shell(const std::string& word) {
+  const auto is_plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view("_./,:=+-@%").find(static_cast<char>(c)) != std::string_view::npos;
+  };
+  if (!word.empty() && std::ranges::all_of(word, is_plain)) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+std::string in_shell(const Path& path) { return in_shell(path.string()); }
+
+/// " a b": each word of a text, because files of others contain it.
+std::string words_in_shell(const std::string& text) {
+  std::string out;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) out.append(1, ' ').append(in_shell(word));
+  return out;
+}
+
+/// A file that a provenance names, in the folder of one of the others, or in the current one; empty: not there.
+Path beside(const ResultFiles& files, const std::string& name) {
+  if (name.empty()) return {};
+  std::error_code none;
+  for (const Path& other : {files.frf, files.model, files.log, Path(".")})
+    if (const Path path = (other.parent_path() / name).lexically_normal();
+        !other.empty() && std::filesystem::exists(path, none))
+      return path;
+  return {};
+}
+
+/// The flags of a fit, `changed` instead of those of the same name.
+std::string refit_flags(const Json& asked, const std::string& changed) {
+  std::string text;
+  for (const auto& [flag, value] : asked.items()) {
+    if ((" " + changed + " ").find(" " + flag + " ") != std::string::npos) continue;
+    for (const Json& one : value.is_array() ? value : Json::array({value}))
+      if (one.is_string()) {
+        const auto words = one.get<std::string>();
+        text += fmt::format(
+            " {}{}", in_shell(flag),
+            flag == "--band" ? words_in_shell(words) : fmt::format(" {}", in_shell(words)));
+      }
+  }
+  return text + words_in_shell(changed);
+}
+
+/// Builds the commands of one result.
+class Commands {
+ public:
+  Commands(ResultFiles files, const Json& frf, const AdditiveModel* model)
+      : files_(std::move(files)), frf_(frf), model_(model) {
+    if (model != nullptr) {
+      fit_ = parse_json_object<Json>(model->provenance_json);
+      if (files_.frf.empty() && fit_.contains("inputs") && fit_["inputs"].is_array() &&
+          !fit_["inputs"].empty())
+        files_.frf = beside(files_, text_in(fit_["inputs"][0], "file"));
+    }
+    if (files_.log.empty()) files_.log = beside(files_, log_name());
+  }
+
+  void add(Problem& p) const {
+    const auto cause = from_word<Cause>(p.cause);
+    if (!p.flags.empty())
+      p.command = refit(p.flags);
+    else if (p.is(FitStatus::iteration_limit))
+      p.command = refit(fmt::format("--max-iterations {:.0f}", kMoreIterations * iterations()));
+    else if (from_word<FitStatus>(p.cause))
+      return;  // no remedy is known
+    else if (p.cause == kNonlinear && model_ != nullptr &&
+             model_->fit.weighting == "noise_variance")
+      p.command = refit("--weighting total_variance");
+    else if (cause == Cause::unsettled)
+      p.command = estimate("--method lpm");
+    else
+      again(p);
+  }
+
+ private:
+  std::string log_name() const {
+    if (!frf_.contains("logs") || !frf_["logs"].is_array() || frf_["logs"].empty()) return {};
+    return frf_["logs"][0].is_string() ? frf_["logs"][0].get<std::string>() : "";
+  }
+
+  std::string experiment_name() const {
+    if (!frf_.contains("experiments") || !frf_["experiments"].is_array() ||
+        frf_["experiments"].empty())
+      return {};
+    return text_in(frf_["experiments"][0], "configuration_file");
+  }
+
+  double iterations() const {
+    const auto options = fit_.find("options");
+    return options == fit_.end()
+               ? FitRequest().max_iterations
+               : number_in(*options, "max_iterations").value_or(FitRequest().max_iterations);
+  }
+
+  std::string refit(const std::string& flags) const {
+    if (files_.frf.empty() || files_.model.empty()) return {};
+    const auto options = fit_.find("options");
+    const Json asked =
+        options != fit_.end() && options->contains("flags") ? (*options)["flags"] : Json::object();
+    return fmt::format("stageid fit {} -o {}{}", in_shell(files_.frf), in_shell(files_.model),
+                       refit_flags(asked, flags));
+  }
+
+  std::string estimate(const std::string& flags) const {
+    if (files_.log.empty() || files_.frf.empty()) return {};
+    std::vector<int> realizations;  // counted from 1
+    if (frf_.contains("realizations") && frf_["realizations"].is_array())
+      for (const Json& one : frf_["realizations"])
+        if (one.is_number_integer()) realizations.push_back(one.get<int>() + 1);
+    const std::string some =
+        realizations.empty() ? "" : fmt::format(" --realizations {}", fmt::join(realizations, ","));
+    return fmt::format("stageid frf {} -o {}{} {}", in_shell(files_.log), in_shell(files_.frf),
+                       some, flags);
+  }
+
+  /// What follows a repair, unless the remedy says so already.
+  void again(Problem& p) const {
+    p.command = measure();
+    if (p.command.starts_with("stageid log"))
+      p.remedy += "; then check the log";
+    else if (!p.command.empty() && p.remedy.find("measure") == std::string::npos)
+      p.remedy += "; then measure again";
+  }
+
+  /// A new measurement; without its experiment file, the check of the log.
+  std::string measure() const {
+    const Path run = beside(files_, experiment_name());
+    if (!files_.experiment.empty())
+      return fmt::format("stageid identify {} -o {}", in_shell(files_.experiment),
+                         in_shell(files_.directory.string() + "_again"));
+    if (!run.empty())
+      return fmt::format("stageid run {} -o {}_again.slog", in_shell(run),
+                         in_shell(run.parent_path() / run.stem()));
+    return files_.log.empty() ? ""
+                              : fmt::format("stageid log info {} --health", in_shell(files_.log));
+  }
+
+  ResultFiles files_;
+  const Json& frf_;
+  const AdditiveModel* model_;
+  Json fit_;
+};
+
+void add_all_commands(std::vector<Problem>& problems, ResultFiles files, const Json& frf,
+                      const AdditiveModel* model) {
+  const Commands commands(std::move(files), frf, model);
+  for (auto p = problems.begin(); p != problems.end(); ++p) {
+    commands.add(*p);
+    if (std::find_if(problems.begin(), p,
+                     [&](const Problem& before) { return before.command == p->command; }) != p)
+      p->command.clear();  // once is enough
+  }
+}
+
+}  // namespace
+
+void add_commands(std::vector<Problem>& problems, ResultFiles files,
+                  const std::string& frf_provenance_json, const AdditiveModel* model) {
+  add_all_commands(problems, std::move(files), parse_json_object<Json>(frf_provenance_json), model);
+}
+
+void add_commands(std::vector<Problem>& problems, ResultFiles files, const AdditiveModel& model) {
+  const Json json = parse_json_object<Json>(model.provenance_json);
+  add_all_commands(problems, std::move(files),
+                   json.contains("frf") && json["frf"].is_object() ? json["frf"] : Json::object(),
+                   &model);
+}
+
+}  // namespace stageid

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "estimation/model/additive_model.hpp"
+#include "tools/steps/problem.hpp"
+
+namespace stageid {
+
+/// The files of a result, which the commands of its problems name; empty: unknown.
+struct ResultFiles {
+  std::filesystem::path experiment;  ///< of `identify`
+  std::filesystem::path directory;   ///< of `identify`
+  std::filesystem::path log;
+  std::filesystem::path frf;
+  std::filesystem::path model;
+};
+
+/// Adds the commands for problems of a measured response or of a fit to it.
+/// @param files those that the provenance names are added if they are beside the others
+/// @param model null: not fitted
+void add_commands(std::vector<Problem>& problems, ResultFiles files,
+                  const std::string& frf_provenance_json, const AdditiveModel* model);
+/// The same for the model's own response.
+void add_commands(std::vector<Problem>& problems, ResultFiles files, const AdditiveModel& model);
+
+}  // namespace stageid
