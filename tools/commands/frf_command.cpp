@@ -104,7 +104,6 @@ void estimate_response(const FrfFlags& flags, Console& console) {
       notes.push_back(fmt::format("--compensate: delay {} s, as declared in the log", delay_s));
     step.frf = compensate(step.frf, flags.compensate, delay_s);
   }
-  note_logs(step.frf, flags.logs, flags.output);
   write_frf(flags.output, step.frf);
   const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
   console.result(fmt::format("{}: {}", flags.output.string(), describe(step.frf)));

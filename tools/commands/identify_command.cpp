@@ -202,7 +202,6 @@ class Identification {
     // The fitted data are examined; the findings are stored in frf.h5.
     const bool fitted = realizations == fitted_realizations();
     FrfStep step = estimate_frf({log}, options, {fitted, {}}, console_);
-    note_logs(step.frf, {log}, path(name));
     write_frf(path(name), step.frf);
     finish_step("frf", step.seconds,
                 fmt::format("{}: {}, {:.0f} MB/s", name, describe(step.frf),

@@ -139,7 +139,6 @@ Identification identify_log(const FleetConfig& config, const FleetLog& given,
   options.realizations = fitted_realizations(config, *log);
   ReportData report;
   report.frf = estimate_frf({log.get()}, options, {true, {}}, console).frf;
-  note_logs(*report.frf, {given.file}, folder / "frf.h5");
   write_frf(folder / "frf.h5", *report.frf);
   const std::vector<Finding> health = health_of(report.frf->provenance_json);
   if (config.validation_realization >= 0) {

@@ -50,22 +50,15 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
   provenance["stageid_version"] = version();
   provenance["request_id"] = frf_request_id(logs, options);
   provenance["realizations"] = options.realizations;
+  provenance["logs"] = Json::array();  // without folders: the result does not depend on them
+  for (const LogReader* log : logs)
+    if (!log->path().empty()) provenance["logs"].push_back(log->path().filename().string());
   provenance["experiments"] = Json::array();
   for (const LogReader* log : logs) provenance["experiments"].push_back(lasting_metadata(*log));
   return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
-
-void note_logs(FrfEstimate& frf, const std::vector<std::filesystem::path>& logs,
-               const std::filesystem::path& output) {
-  Json provenance = Json::parse(frf.provenance_json);
-  provenance["logs"] = Json::array();
-  for (const std::filesystem::path& log : logs)
-    provenance["logs"].push_back(
-        std::filesystem::relative(log, std::filesystem::absolute(output).parent_path()).string());
-  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
 
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
   Json provenance = Json::parse(frf.provenance_json);

@@ -27,7 +27,7 @@ struct HealthRequest {
 };
 
 /// Estimates, shows progress, and completes the provenance: configuration, seeds, identity of the request
-/// (frf_request_id()), and the findings on the health of the data, which are examined in the same pass. The result
+/// (frf_request_id()), names of the logs, and the findings on the health of the data, which are examined in the same pass. The result
 /// does not depend on directory, time or threads.
 /// @throws FileError, FormatError, std::invalid_argument, Interrupted
 FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions options,
@@ -35,10 +35,6 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
 /// The same for log files.
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const HealthRequest& health, const Console& console);
-
-/// Adds to the provenance the logs ("logs"), relative to the file to be written. Commands that are suggested name them.
-void note_logs(FrfEstimate& frf, const std::vector<std::filesystem::path>& logs,
-               const std::filesystem::path& output);
 
 /// Adds to the provenance which timed FFT plans were used ("fft_plans"), because rounding depends on them.
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint);
