@@ -25,6 +25,7 @@ using Eigen::MatrixXd;
 
 constexpr const char* kFormat = "stageid-excitation";
 constexpr long long kVersion = 1;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 std::string realization_group(int realization) {
   return fmt::format("/realizations/{:04}", realization);
@@ -58,15 +59,18 @@ void write_axes(Hdf5File& file, const ExperimentPlan& plan) {
   std::vector<std::string> channels;
   std::vector<double> levels;
   MatrixXd shape = MatrixXd::Zero(plan.axes(), grid.size());
+  MatrixXd phase_rad = MatrixXd::Constant(plan.axes(), grid.size(), kNaN);
   for (const ExcitationAxis& axis : plan.spec().axes) {
     const auto row = static_cast<Index>(channels.size());
     if (axis.shape.size() > 0) shape.row(row) = axis.shape.transpose();
+    if (axis.phase_rad.size() > 0) phase_rad.row(row) = axis.phase_rad.transpose();
     channels.push_back(axis.channel);
     levels.push_back(axis.level);
   }
   file.write_texts("/axes", channels);
   write_vector(file, "/level", levels);
   if (!shape.isZero(0.0)) write_matrix(file, "/shape", shape);
+  if (!phase_rad.array().isNaN().all()) write_matrix(file, "/phase_rad", phase_rad);
 }
 
 MatrixXcd unmixed_spectrum(const MatrixXd& amplitude, const MatrixXd& phase_rad) {
@@ -135,10 +139,15 @@ std::vector<ExcitationAxis> read_axes(const Hdf5File& file, const FrequencyGrid&
   const std::vector<double> levels = file.read_reals("/level");
   const MatrixXd shape = file.exists("/shape") ? read_matrix(file, "/shape", count, grid.size())
                                                : MatrixXd::Zero(count, grid.size());
+  const MatrixXd phase_rad = file.exists("/phase_rad")
+                                 ? read_matrix(file, "/phase_rad", count, grid.size())
+                                 : MatrixXd::Constant(count, grid.size(), kNaN);
   std::vector<ExcitationAxis> axes;
   for (Index p = 0; p < count; ++p) {
     const auto i = static_cast<std::size_t>(p);
-    axes.push_back({channels[i], levels[i], {}});
+    axes.push_back({channels[i], levels[i], {}, {}});
+    if (!phase_rad.row(p).array().isNaN().all())
+      axes.back().phase_rad = phase_rad.row(p).transpose();
     if (!shape.row(p).isZero(0.0)) axes.back().shape = shape.row(p).transpose();
   }
   return axes;

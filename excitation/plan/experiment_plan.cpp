@@ -30,6 +30,15 @@ void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size
     throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite; got {}",
                                             place, axis.channel, axis.level));
   }
+  if (axis.phase_rad.size() > 0 &&
+      (axis.phase_rad.size() != grid.size() || !axis.phase_rad.allFinite()))
+    throw std::invalid_argument(
+        fmt::format("{}.phase_rad ({}): has {} entries; expected one finite number per line ({})",
+                    place, axis.channel, axis.phase_rad.size(), grid.size()));
+  if (axis.phase_rad.size() > 0 && spec.crest_iterations > 0)
+    throw std::invalid_argument(
+        fmt::format("{}.phase_rad ({}): given phases are not reduced; set crest_iterations to 0",
+                    place, axis.channel));
   if (axis.shape.size() == 0) return;
   if (axis.shape.size() != grid.size()) {
     throw std::invalid_argument(
@@ -76,9 +85,11 @@ void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   }
 }
 
-/// T, axes x experiments: T T^H = n I for the orthogonal schemes, I for single_axis.
+/// T, axes x experiments: T T^H = n I for the orthogonal schemes, I for single_axis, one column of ones for one
+/// experiment.
 MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
-  if (scheme == ExcitationScheme::zippered) return MatrixXcd::Ones(n, 1);
+  if (scheme == ExcitationScheme::zippered || scheme == ExcitationScheme::simultaneous)
+    return MatrixXcd::Ones(n, 1);
   if (scheme == ExcitationScheme::single_axis) return MatrixXcd::Identity(n, n);
   if (scheme == ExcitationScheme::orthogonal_hadamard) {
     try {
@@ -116,6 +127,12 @@ MatrixXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec, i
   const int axes = static_cast<int>(spec.axes.size());
   MatrixXd phase_rad(axes, grid.size());
   for (int p = 0; p < axes; ++p) {
+    const Eigen::VectorXd& given = spec.axes[static_cast<std::size_t>(p)].phase_rad;
+    if (given.size() > 0) {
+      for (Index k = 0; k < grid.size(); ++k)
+        phase_rad(p, k) = positive_phase_rad(std::polar(1.0, given[k]));
+      continue;
+    }
     const std::uint64_t seed = stream_seed(spec.seed, static_cast<std::uint64_t>(realization),
                                            static_cast<std::uint64_t>(p));
     phase_rad.row(p) =

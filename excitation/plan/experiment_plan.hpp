@@ -17,23 +17,26 @@ enum class ExcitationScheme : std::uint8_t {
   single_axis,     ///< experiment e excites axis e alone
   orthogonal_dft,  ///< all axes at once, axis p in experiment e times exp(2 pi j p e / n); any n
   orthogonal_hadamard,  ///< the same with a Hadamard matrix: n = 1, 2, 4, 8, 12, 16, 20 ...
-  zippered              ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line
+  zippered,             ///< one experiment: axis p has the p-th, (p + n)-th, (p + 2n)-th ... line
+  simultaneous  ///< one experiment: all axes at once; it determines no response, but the changes of a model
 };
 template <>
-inline constexpr std::array kWords<ExcitationScheme> = {"single_axis", "orthogonal_dft",
-                                                        "orthogonal_hadamard", "zippered"};
+inline constexpr std::array kWords<ExcitationScheme> = {
+    "single_axis", "orthogonal_dft", "orthogonal_hadamard", "zippered", "simultaneous"};
 
 /// One excited channel of the stage.
 struct ExcitationAxis {
-  std::string channel;         ///< actuator name
-  double level = 1.0;          ///< rms or peak, unit of the channel
-  Eigen::VectorXd shape = {};  ///< relative amplitude per line; empty: flat
+  std::string channel;             ///< actuator name
+  double level = 1.0;              ///< rms or peak, unit of the channel
+  Eigen::VectorXd shape = {};      ///< relative amplitude per line; empty: flat
+  Eigen::VectorXd phase_rad = {};  ///< per line, in all realizations; empty: random
 };
 
 struct ExperimentSpec {
   ExcitationScheme scheme = ExcitationScheme::single_axis;
   AmplitudeScaling scaling = AmplitudeScaling::rms;
-  std::vector<ExcitationAxis> axes;  ///< one experiment per axis and realization (zippered: one)
+  /// One experiment per axis and realization (zippered, simultaneous: one).
+  std::vector<ExcitationAxis> axes;
   int realizations = 2;
   int periods = 2;            ///< measured periods of every run
   int transient_periods = 1;  ///< discarded periods before the measured ones
@@ -75,9 +78,7 @@ class ExperimentPlan {
   const FrequencyGrid& grid() const noexcept { return grid_; }
   const ExperimentSpec& spec() const noexcept { return spec_; }
   int axes() const noexcept { return static_cast<int>(spec_.axes.size()); }
-  int experiments() const noexcept {
-    return spec_.scheme == ExcitationScheme::zippered ? 1 : axes();
-  }
+  int experiments() const noexcept { return static_cast<int>(mixing_.cols()); }
   std::vector<RunId> runs() const;  ///< in order of measurement: realization by realization
   /// runs() without `done`, to resume an experiment.
   std::vector<RunId> runs_without(const std::vector<RunId>& done) const;
@@ -94,7 +95,7 @@ class ExperimentPlan {
 
   /// A_p(l_k), axes x lines, unit of the channel.
   const Eigen::MatrixXd& amplitude() const noexcept { return amplitude_; }
-  /// T, axes x experiments; the identity for single_axis, ones for zippered.
+  /// T, axes x experiments; the identity for single_axis, ones for zippered and simultaneous.
   const Eigen::MatrixXcd& mixing() const noexcept { return mixing_; }
   /// phi_mp(l_k) of a realization, axes x lines, in [0, 2 pi).
   Eigen::MatrixXd phase_rad(int realization) const;

@@ -9,6 +9,8 @@
 namespace stageid {
 
 FrequencyGrid grid_of(const ExperimentConfig& config) {
+  if (!config.listed_lines.empty())
+    return {config.stage.spec.info.sample_rate_hz, config.samples_per_period, config.listed_lines};
   return FrequencyGrid::band(config.stage.spec.info.sample_rate_hz, config.samples_per_period,
                              config.lines);
 }

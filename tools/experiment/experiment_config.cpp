@@ -1,6 +1,7 @@
 #include "tools/experiment/experiment_config.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +26,9 @@ struct ExperimentFile {
   std::vector<std::string> axes;
   FlexibleValue rms_n;
   FlexibleValue peak_n;
+  FlexibleValue lines = {"odd"};
   FlexibleValue shape = {"flat"};
+  std::vector<std::pair<std::string, std::vector<double>>> phases;  // by axis
   std::vector<double> band_hz;
   double period_s = 0.0;
   ExperimentConfig config;  // without what is derived from the keys above
@@ -79,7 +82,14 @@ void describe_level(ConfigVisitor& v, ExperimentFile& f) {
 
 void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
   LineSpec& lines = f.config.lines;
-  choose(v, "lines", lines.selection, kOptional, "which lines of the period are excited");
+  v.flexible("lines", f.lines,
+             {.words = words_of<LineSelection>(), .list = true, .rule = {"", 1.0}}, kOptional,
+             "which lines of the period are excited; a list: these multiples of 1 / period_s");
+  if (const auto word = from_word<LineSelection>(f.lines.word)) lines.selection = *word;
+  const std::vector<double>& listed = f.lines.numbers;
+  v.require(std::ranges::adjacent_find(listed, std::ranges::greater_equal()) == listed.end() &&
+                std::ranges::all_of(listed, [](double l) { return l == std::floor(l) && l < 1e8; }),
+            "lines", "lines: must be increasing whole numbers, multiples of 1 / period_s");
   count(v, "group_size", lines.group_size, 2, 1000, kOptional,
         "odd_random: one odd line in this many is not excited");
   v.numbers("band_hz", f.band_hz, positive("Hz"), {2, 2}, kRequired,
@@ -93,6 +103,12 @@ void describe_lines(ConfigVisitor& v, ExperimentFile& f) {
       std::is_sorted(f.shape.pairs.begin(), f.shape.pairs.end(),
                      [](const auto& a, const auto& b) { return a.first <= b.first; });
   v.require(increasing, "shape", "shape: the frequencies must increase; sort the points");
+}
+
+void describe_phases(ConfigVisitor& v, decltype(ExperimentFile::phases)& phases) {
+  auto& [axis, rad] = phases.emplace_back();
+  v.text("axis", axis, kRequired, "name of an excited actuator");
+  v.numbers("rad", rad, any_number("rad"), {1}, kRequired, "one phase per excited line");
 }
 
 void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
@@ -113,6 +129,21 @@ void describe_experiment(ConfigVisitor& v, ExperimentFile& f) {
             "crest_iterations: 'limits' also optimizes the phases; write 20");
   v.require(!f.config.limits || f.shape.pairs.empty(), "shape",
             "shape: 'limits' designs the spectrum; remove 'shape'");
+  items(v, "phases", describe_phases, f.phases, {0, 64}, kOptional,
+        "phases of some axes in all realizations; omitted: random");
+  for (const auto& phases : f.phases)
+    v.require(
+        std::ranges::count(f.axes, phases.first) == 1 &&
+            std::ranges::count(f.phases, phases.first, &decltype(f.phases)::value_type::first) == 1,
+        "phases",
+        fmt::format("phases: '{}' is not an axis, or has phases twice; name each of 'axes' at "
+                    "most once",
+                    phases.first));
+  v.require(!f.config.limits || f.phases.empty(), "phases",
+            "phases: 'limits' designs the phases; remove 'phases'");
+  v.require(!f.config.limits || spec.scheme != ExcitationScheme::simultaneous, "scheme",
+            "scheme: 'limits' is for the measurement of a response, which 'simultaneous' does not "
+            "determine; choose another scheme");
   count(v, "seed", spec.seed, 0, std::numeric_limits<std::int64_t>::max(), kOptional,
         "the same seed gives the same experiment on every machine");
 }
@@ -193,6 +224,20 @@ void check_band(const YamlDocument& document, double high_hz, double rate_hz) {
                      0.5 * rate_hz));
 }
 
+std::vector<int> listed_lines(const ExperimentFile& file, const YamlDocument& document) {
+  std::vector<int> lines;
+  for (const double line : file.lines.numbers) {
+    const double frequency_hz = line / file.period_s;
+    if (frequency_hz < file.band_hz[0] * (1.0 - 1e-9) ||
+        frequency_hz > file.band_hz[1] * (1.0 + 1e-9))
+      fail(document, "lines",
+           fmt::format("lines: {} is at {:.6g} Hz, outside band_hz; widen the band or remove it",
+                       line, frequency_hz));
+    lines.push_back(static_cast<int>(line));
+  }
+  return lines;
+}
+
 void check_names(const YamlDocument& document, const char* section, const char* key,
                  const std::vector<std::string>& names, const std::vector<Channel>& channels,
                  const char* kind, FormatErrorList& errors) {
@@ -217,7 +262,11 @@ std::vector<ExcitationAxis> excitation_axes(const ExperimentFile& file, const Fr
   const Eigen::VectorXd shape = shape_on(grid, file.shape.pairs);
   std::vector<ExcitationAxis> axes;
   for (std::size_t i = 0; i < file.axes.size(); ++i)
-    axes.push_back({file.axes[i], levels.size() == 1 ? levels.front() : levels[i], shape});
+    axes.push_back({file.axes[i], levels.size() == 1 ? levels.front() : levels[i], shape, {}});
+  for (const auto& [name, rad] : file.phases)
+    for (ExcitationAxis& axis : axes)
+      if (axis.channel == name)
+        axis.phase_rad = Eigen::Map<const Eigen::VectorXd>(rad.data(), std::ssize(rad));
   return axes;
 }
 
@@ -251,6 +300,9 @@ std::string measurement_id(const ExperimentFile& f) {
     text += fmt::format(" limits {} {} {}", limits->safety, limits->velocity_m_s,
                         std::filesystem::exists(limits->prior) ? fingerprint_of_file(limits->prior)
                                                                : "not there yet");
+  for (const auto& [axis, rad] : f.phases)
+    text += fmt::format(" phases {} {}", axis, fmt::join(rad, " "));
+  for (const int line : f.config.listed_lines) text += fmt::format(" line {}", line);
   for (const auto& [frequency_hz, amplitude] : f.shape.pairs)
     text += fmt::format(" shape {} {}", frequency_hz, amplitude);
   return fingerprint_of(text + "\n" + f.config.stage.text + f.config.stage.controller_text);
@@ -267,6 +319,7 @@ void complete(ExperimentFile& file, const YamlDocument& document) {
   errors.attempt([&] {
     config.samples_per_period = samples_per_period(document, file.period_s, info.sample_rate_hz);
   });
+  errors.attempt([&] { config.listed_lines = listed_lines(file, document); });
   errors.raise();
   config.lines.low_hz = file.band_hz[0];
   config.lines.high_hz = file.band_hz[1];

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "estimation/request/fit_request.hpp"
 #include "excitation/plan/experiment_plan.hpp"
@@ -25,6 +26,7 @@ struct ExperimentConfig {
   std::string text;  ///< of the file, kept for the log
   StageConfig stage;
   LineSpec lines;
+  std::vector<int> listed_lines;  ///< excited instead of those of `lines`; empty: none
   int samples_per_period = 0;
   ExperimentSpec experiment;           ///< if `limits` is set, levels are still to be designed
   std::optional<LimitRequest> limits;  ///< level.limits
