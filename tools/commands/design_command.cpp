@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/output_file.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tools/commands/command_line.hpp"
@@ -17,6 +19,7 @@
 #include "tools/experiment/limited_plan.hpp"
 #include "tools/experiment/link_load.hpp"
 #include "tools/experiment/loop_check.hpp"
+#include "tools/experiment/watch_plan.hpp"
 #include "tools/measure/measurement.hpp"
 #include "tools/terminal/output_paths.hpp"
 
@@ -61,6 +64,7 @@ Json design_json(const ExperimentConfig& config, const ExperimentPlan& plan,
 /// stageid design CONFIG -o excitation.h5
 struct DesignFlags {
   std::filesystem::path config;
+  WatchRequest watch;
   std::filesystem::path output;
   double accuracy = 0.0;
   bool force = false;
@@ -120,8 +124,44 @@ void write_limited(const DesignFlags& flags, Console& console, const ExperimentC
   console.result(json);
 }
 
+/// stageid design CONFIG --watch model.json --frf frf.h5 -o watch.yaml
+void design_watch(const DesignFlags& flags, Console& console, const ExperimentConfig& config) {
+  require_ending(flags.output, "an experiment", {".yaml", ".yml"});
+  require_writable(flags.output, {flags.config, flags.watch.model, flags.watch.frf});
+  if (config.stage.spec.controller.by_peer)
+    console.warning(
+        "the stage closes the loop itself; the effect of its controller on the forces is "
+        "neglected");
+  const WatchPlan plan = make_watch_plan(config, flags.watch);
+  write_text_file(flags.output, watch_experiment_text(plan, config, flags.output));
+  const double period_s = config.samples_per_period / config.stage.spec.info.sample_rate_hz;
+  std::vector<std::vector<std::string>> rows = {
+      {"tracked", "deviation per period", fmt::format("{:.2g} detected after", flags.watch.drift)}};
+  Json json = {{"lines", plan.lines}, {"rms", plan.levels}, {"tracked", Json::array()}};
+  for (std::size_t i = 0; i < plan.parameters.size(); ++i) {
+    const auto p = static_cast<Eigen::Index>(i);
+    const std::string name = describe(plan.parameters[i], plan.model);
+    const double deviation = plan.forecast.deviation[p];
+    const double detected_s = plan.forecast.periods[p] * period_s;
+    const bool delay = plan.parameters[i].kind == TrackedKind::delay;
+    rows.push_back({name, fmt::format("{:.2e}{}", deviation, delay ? " s" : ""),
+                    std::isfinite(detected_s) ? fmt::format("{:.3g} s", detected_s) : "-"});
+    json["tracked"].push_back({{"name", name}, {"deviation", deviation}});
+    if (std::isfinite(detected_s)) json["tracked"].back()["detected_s"] = detected_s;
+  }
+  console.result(fmt::format(
+      "{}, {:.6g} ... {:.6g} Hz; the largest deviation of a natural frequency is within {:.1g} % "
+      "of the optimum for these phases",
+      counted(plan.lines.size(), "line"), plan.lines.front() / period_s,
+      plan.lines.back() / period_s, 100.0 * std::expm1(0.5 * plan.gap)));
+  for (const std::string& line : table_lines(rows)) console.result(line);
+  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result(json);
+}
+
 void design(const DesignFlags& flags, Console& console) {
   const ExperimentConfig config = load_experiment_config(flags.config);
+  if (!flags.watch.model.empty()) return design_watch(flags, console, config);
   require_writable(flags.output, {flags.config});
   require_stable_loop(config, console);
   if (config.limits) {
@@ -153,12 +193,35 @@ void design_command(CLI::App& app, Console& console) {
       app, console, "design",
       "Design the multisines; check the predicted forces and motions against the limits", design);
   command.add_option("config", flags.config, "experiment file (.yaml)")->required();
-  command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
+  command
+      .add_option("-o,--output", flags.output,
+                  "HDF5 file to write; with --watch an experiment file")
+      ->required();
   command
       .add_option("--accuracy", flags.accuracy,
                   "print the measuring time for this mean relative variance of the response, e.g. "
                   "1e-6 for 0.1 % rms; needs level.limits")
       ->check(kPositive);
+  CLI::Option* watch = command.add_option(
+      "--watch", flags.watch.model,
+      "design a permanent excitation that tracks this model.json: an experiment file (.yaml) with "
+      "the most informative lines, amplitudes and phases");
+  CLI::Option* frf =
+      command.add_option("--frf", flags.watch.frf, "frf.h5 with the noise, for --watch");
+  watch->needs(frf);
+  frf->needs(watch);
+  command
+      .add_option_function<double>(
+          "--rms-nm", [&flags](double rms_nm) { flags.watch.rms_m = 1e-9 * rms_nm; },
+          "with --watch: largest rms of a sensor in nm; omitted: the levels of the experiment")
+      ->check(kPositive)
+      ->needs(watch);
+  command
+      .add_option("--drift", flags.watch.drift,
+                  "with --watch: relative drift of a natural frequency, to predict its detection")
+      ->check(kPositive)
+      ->needs(watch)
+      ->capture_default_str();
   command.add_flag("--force", flags.force, "write even if a limit would be exceeded");
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -23,6 +24,8 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kSmoothedLines = 10;  // on each side
+/// Least degrees of freedom of a covariance, so that its inverse is accurate.
+constexpr double kFreedomPerOutput = 10.0;
 
 /// Indices of the channels in the stage.
 std::vector<Index> places(const std::filesystem::path& file, const ChannelList& channels,
@@ -177,6 +180,35 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
     prior.noise_density(sensors, k) =
         interpolated(density, between(frf.frequency_hz, frequency_hz[k]));
   return prior;
+}
+
+std::vector<Eigen::MatrixXcd> output_noise(const FrfEstimate& frf,
+                                           const Eigen::VectorXd& frequency_hz, double period_s) {
+  const double measured_s = period_s_of(frf);
+  if (frf.residual_covariance_re.size() == 0 || !(measured_s > 0.0) || frf.periods < 1) return {};
+  const auto n_y = static_cast<double>(frf.n_outputs());
+  const double line_freedom = std::max(1.0, frf.noise_dof);
+  const auto half =
+      static_cast<Index>(std::ceil(0.5 * (kFreedomPerOutput * n_y / line_freedom - 1.0)));
+  const auto around = [&](Index k) {
+    const Index first = std::max<Index>(0, k - half);
+    const Index last = std::min(frf.lines() - 1, k + half);
+    Eigen::MatrixXcd sum = output_covariance(frf, first);
+    for (Index l = first + 1; l <= last; ++l) sum += output_covariance(frf, l);
+    const double count = static_cast<double>(last - first + 1);
+    // A covariance of nu degrees of freedom has an inverse that is larger by nu / (nu - n_y).
+    const double freedom = std::max(line_freedom * count, n_y + 1.0);
+    return Eigen::MatrixXcd(sum * (freedom / (freedom - n_y) / count));
+  };
+  const double scale = frf.periods * measured_s / period_s;
+  std::vector<Eigen::MatrixXcd> noise;
+  for (const double f_hz : frequency_hz) {
+    const Between at = between(frf.frequency_hz, f_hz);
+    Eigen::MatrixXcd C = (1.0 - at.part) * around(at.below);
+    if (at.part > 0.0) C += at.part * around(at.below + 1);
+    noise.emplace_back(scale * C);
+  }
+  return noise;
 }
 
 }  // namespace stageid

@@ -2,8 +2,10 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <vector>
 
 #include "acquisition/prediction/plant_prior.hpp"
+#include "frf/response/frf_estimate.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -20,5 +22,11 @@ namespace stageid {
 PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& stage,
                             const Eigen::VectorXd& frequency_hz,
                             const Eigen::VectorXd& below_band_hz = {});
+
+/// Covariance of the outputs' noise (DFT / N) in one period of a given length, by frequency, from /residual_covariance.
+/// It is interpolated linearly, averaged over neighbouring lines if its degrees of freedom are few, and enlarged so that
+/// its inverse is unbiased. Empty if the noise or the period of the FRF is unknown.
+std::vector<Eigen::MatrixXcd> output_noise(const FrfEstimate& frf,
+                                           const Eigen::VectorXd& frequency_hz, double period_s);
 
 }  // namespace stageid
