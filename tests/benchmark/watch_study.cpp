@@ -1,10 +1,11 @@
 // Tracks a simulated stage around its model while the stage works, and counts what is found.
 //
 //   watch_study STAGE.yaml MODEL.json [runs = 20] [periods = 100] [kind = none] [size = 1e-5] [rms of an axis, N = 0.2]
-//               [first seed = 1] [false alarms per period = 1e-3] [ramp in periods = 0]
+//               [first seed = 1] [false alarms per period = 1e-3] [ramp in periods = 0] [EXPERIMENT.yaml FRF.h5]
 //
 // kind: none, or a fault of the stage file (mode_frequency, sensor_gain, ...), planted at a random channel after the
-// learning and 8 periods. All actuators of the model are excited at once, on 500 lines.
+// learning and 8 periods. All actuators of the model are excited at once, on 500 lines, or by the first run of an
+// experiment of `stageid design --watch`; with its FRF, the forecast is compared with the scatter over the runs.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,17 +13,21 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "estimation/tracking/model_tracker.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/multisine.hpp"
+#include "frf/file/frf_file.hpp"
 #include "hal/simulator/plant_spec.hpp"
 #include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tools/config/stage_config.hpp"
+#include "tools/experiment/config_plan.hpp"
+#include "tools/experiment/watch_plan.hpp"
 
 namespace {
 
@@ -40,30 +45,60 @@ struct Request {
   double ramp = 0.0;
 };
 
+/// Periodic excitation of the stage's actuators.
+struct Excitation {
+  std::vector<int> lines;
+  int period_samples = 0;
+  std::vector<std::string> axes;
+  Eigen::MatrixXd samples;  ///< of one period, by axis
+};
+
+Excitation flat_excitation(const stageid::StageConfig& config, const AdditiveModel& model,
+                           double rms, std::uint64_t seed) {
+  Excitation out;
+  out.period_samples = static_cast<int>(config.spec.info.sample_rate_hz);
+  for (int l = 21; l < 2000 && l < out.period_samples / 2; l += 4) out.lines.push_back(l);
+  out.axes = model.inputs.names;
+  const stageid::FrequencyGrid grid(config.spec.info.sample_rate_hz, out.period_samples, out.lines);
+  out.samples.resize(out.period_samples, std::ssize(out.axes));
+  for (std::size_t j = 0; j < out.axes.size(); ++j) {
+    stageid::MultisineSpec spec;
+    spec.level = rms;
+    spec.seed = 1000 * seed + j;
+    out.samples.col(static_cast<Eigen::Index>(j)) =
+        stageid::random_phase_multisine(grid, spec).samples;
+  }
+  return out;
+}
+
+Excitation designed_excitation(const stageid::ExperimentConfig& experiment) {
+  const stageid::ExperimentPlan plan = stageid::make_plan(experiment);
+  Excitation out{
+      plan.grid().lines(), plan.grid().samples_per_period(), {}, plan.excitation({0, 0})};
+  for (const stageid::ExcitationAxis& axis : experiment.experiment.axes)
+    out.axes.push_back(axis.channel);
+  return out;
+}
+
 /// A closed loop in progress that gives the spectra of period after period.
 class Loop {
  public:
   Loop(const stageid::StageConfig& config, const stageid::SimulationSpec& simulation,
-       const AdditiveModel& model, const std::vector<int>& lines, int period_samples, double rms,
-       std::uint64_t seed)
+       const AdditiveModel& model, const Excitation& excitation, std::uint64_t seed)
       : stage_(config.spec.info, *config.plant, simulation),
         controller_(config.spec.controller),
-        dft_(period_samples),
-        lines_(lines),
+        dft_(excitation.period_samples),
+        lines_(excitation.lines),
         u_(config.spec.info.actuators.size()),
         y_(config.spec.info.sensors.size()) {
     for (const std::string& name : model.inputs.names)
       inputs_.push_back(stageid::channel_index(config.spec.info.actuators, name));
     for (const std::string& name : model.outputs.names)
       outputs_.push_back(stageid::channel_index(config.spec.info.sensors, name));
-    const stageid::FrequencyGrid grid(config.spec.info.sample_rate_hz, period_samples, lines);
-    excitation_.setZero(period_samples, static_cast<Eigen::Index>(u_.size()));
-    for (std::size_t j = 0; j < inputs_.size(); ++j) {
-      stageid::MultisineSpec spec;
-      spec.level = rms;
-      spec.seed = 1000 * seed + j;
-      excitation_.col(inputs_[j]) = stageid::random_phase_multisine(grid, spec).samples;
-    }
+    excitation_.setZero(excitation.period_samples, static_cast<Eigen::Index>(u_.size()));
+    for (std::size_t j = 0; j < excitation.axes.size(); ++j)
+      excitation_.col(stageid::channel_index(config.spec.info.actuators, excitation.axes[j])) =
+          excitation.samples.col(static_cast<Eigen::Index>(j));
     measured_.y = y_;
     controller_.reset();
     stage_.start(seed, measured_);
@@ -116,9 +151,9 @@ struct Planted {
   int period = 0;
 };
 
-Planted plant_change(const Request& request, int learning, const stageid::StageConfig& config,
-                     const AdditiveModel& model, std::uint64_t seed,
-                     stageid::SimulationSpec& simulation) {
+Planted plant_change(const Request& request, int learning, int period_samples,
+                     const stageid::StageConfig& config, const AdditiveModel& model,
+                     std::uint64_t seed, stageid::SimulationSpec& simulation) {
   using Fault = stageid::SimulationSpec::Fault;
   using stageid::TrackedKind;
   Planted planted;
@@ -131,7 +166,7 @@ Planted plant_change(const Request& request, int learning, const stageid::StageC
     kind = kind.substr(4);
   }
   fault.kind = *stageid::from_word<Fault::Kind>(kind);
-  const auto period = static_cast<std::uint64_t>(config.spec.info.sample_rate_hz);
+  const auto period = static_cast<std::uint64_t>(period_samples);
   fault.from_cycle = static_cast<std::uint64_t>(planted.period + 1) * period;
   fault.ramp_s = request.ramp;
   stageid::test::RandomNumbers random(seed);
@@ -206,12 +241,22 @@ int main(int argc, char** argv) {
 
   const stageid::StageConfig config = stageid::load_stage_config(argv[1]);
   const AdditiveModel model = stageid::read_model(argv[2]);
-  const int period_samples = static_cast<int>(config.spec.info.sample_rate_hz);
-  std::vector<int> lines;
-  for (int l = 21; l < 2000 && l < period_samples / 2; l += 4) lines.push_back(l);
-  Eigen::VectorXd frequency_hz(std::ssize(lines));
-  for (std::size_t k = 0; k < lines.size(); ++k)
-    frequency_hz[static_cast<Eigen::Index>(k)] = lines[k];
+  std::optional<Excitation> designed;
+  std::optional<stageid::WatchForecast> forecast;
+  if (argc > 11) {
+    const stageid::ExperimentConfig experiment = stageid::load_experiment_config(argv[11]);
+    designed = designed_excitation(experiment);
+    if (argc > 12)
+      forecast = stageid::forecast_of(experiment, model, stageid::read_frf(argv[12]), 1e-5);
+  }
+  const auto excitation_of = [&](std::uint64_t seed) {
+    return designed ? *designed : flat_excitation(config, model, request.rms, seed);
+  };
+  const Excitation first = excitation_of(request.seed);
+  const Eigen::VectorXd frequency_hz =
+      stageid::FrequencyGrid(config.spec.info.sample_rate_hz, first.period_samples, first.lines)
+          .frequency_hz();
+  Eigen::ArrayXXd estimates;
 
   int alarms = 0, watched = 0, detected = 0, named = 0;
   std::vector<int> delays;
@@ -226,10 +271,12 @@ int main(int argc, char** argv) {
     simulation.seed = seed;
     Planted planted;
     if (request.kind != "none")
-      planted = plant_change(request, options.learning_periods, config, model, seed, simulation);
-    Loop loop(config, simulation, model, lines, period_samples, request.rms, seed);
+      planted = plant_change(request, options.learning_periods, first.period_samples, config, model,
+                             seed, simulation);
+    Loop loop(config, simulation, model, excitation_of(seed), seed);
     stageid::ModelTracker tracker(model, frequency_hz, options);
     bool seen = false;
+    Eigen::VectorXd learned_estimate;
     loop.next();
     const auto began = std::chrono::steady_clock::now();
     for (int p = 0; p < request.periods; ++p) {
@@ -241,6 +288,7 @@ int main(int argc, char** argv) {
       tracking_s += spent_s;
       slowest_s = std::max(slowest_s, spent_s);
       if (!state.learning) ++watched;
+      if (p + 1 == options.learning_periods) learned_estimate = tracker.estimate();
       if (getenv("DBG") && state.noise_power.size() > 0)
         fmt::print("{:.3f}\n", fmt::join(state.noise_power, " "));
       if (state.change) {
@@ -276,7 +324,9 @@ int main(int argc, char** argv) {
       sum.setZero(deviation.size());
       square.setZero(deviation.size());
       inside.setZero(deviation.size());
+      estimates.resize(deviation.size(), request.runs);
     }
+    estimates.col(run) = tracker.estimate() - learned_estimate;
     const Eigen::ArrayXd ratio =
         tracker.estimate().array() / tracker.covariance().diagonal().array().sqrt();
     sum += ratio;
@@ -295,6 +345,26 @@ int main(int argc, char** argv) {
                request.runs, named, delays.empty() ? 0 : delays[delays.size() / 2],
                delays.empty() ? 0 : delays[delays.size() * 95 / 100]);
     return 0;
+  }
+  if (forecast) {
+    // From the mean of the learned periods to that of all, with weights lambda^n: the error of the model, which depends
+    // on the learned weights of the lines, is part of both.
+    const double lambda = std::exp(-1.0 / stageid::TrackerOptions{}.memory_periods);
+    const int learned = stageid::TrackerOptions{}.learning_periods;
+    double later = 0.0, squares = 0.0;
+    for (int n = 0; n < request.periods - learned; ++n) {
+      later += std::pow(lambda, n);
+      squares += std::pow(lambda, 2 * n);
+    }
+    const double all = later + learned * std::pow(lambda, request.periods - learned);
+    const double share = std::sqrt(squares + later * later / learned) / all;
+    for (Eigen::Index i = 0; i < estimates.rows(); ++i) {
+      const Eigen::ArrayXd x = estimates.row(i);
+      const double seen = std::sqrt((x - x.mean()).square().sum() / (counted - 1.0));
+      const double expected = share * forecast->deviation[i];
+      fmt::print("forecast {:.2e} seen {:.2e} ratio {:.2f} {:.1f} periods\n", expected, seen,
+                 seen / expected, forecast->periods[i]);
+    }
   }
   const Eigen::ArrayXd mean = sum / counted;
   const Eigen::ArrayXd scatter =
