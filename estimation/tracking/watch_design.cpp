@@ -79,7 +79,7 @@ InformativePower most_informative_power(const std::vector<Eigen::MatrixXd>& info
   Eigen::VectorXd lambda = Eigen::VectorXd::Ones(bounds.rows());
   InformativePower out;
   out.variance.setZero(scale.size());
-  out.power.setOnes(std::ssize(information));
+  out.power = bounds.colwise().sum().cwiseInverse().transpose();
   out.power /= (bounds * out.power).maxCoeff();
   for (int i = 0;; ++i) {
     Eigen::MatrixXd M = prior;

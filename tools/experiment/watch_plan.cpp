@@ -23,8 +23,8 @@ namespace {
 
 using Eigen::Index;
 
-/// Lines of less power, relative to the largest, are dropped.
-constexpr double kNegligiblePower = 1e-3;
+/// Lines are dropped that have a smaller share in the optimum and in the information on each natural frequency.
+constexpr double kNegligible = 1e-3;
 /// Rounds of power and phases. Twice as many lower the deviations by 1 %.
 constexpr int kRounds = 8;
 constexpr double kYear_s = 365.25 * 86400.0;
@@ -48,6 +48,31 @@ double period_s(const ExperimentConfig& config) {
   return config.samples_per_period / config.stage.spec.info.sample_rate_hz;
 }
 
+FrfEstimate with_outputs(const FrfEstimate& frf, const AdditiveModel& model,
+                         const ExperimentConfig& config) {
+  try {
+    return select_channels(frf, frf.inputs.names, model.outputs.names);
+  } catch (const std::invalid_argument& error) {
+    throw FormatError(
+        config.file, "",
+        fmt::format("--frf: {}; use the FRF from which the model was fitted", error.what()));
+  }
+}
+
+/// As measured, because the model of a stage that works includes hold and delay. @throws FormatError
+FrfEstimate read_noise(const WatchRequest& request, const Eigen::VectorXd& frequency_hz) {
+  FrfEstimate frf = read_frf(request.frf);
+  if (frf.compensated != Compensation::none) frf = as_measured(std::move(frf));
+  const double low_hz = frf.frequency_hz[0];
+  const double high_hz = frf.frequency_hz[frf.lines() - 1];
+  if (frequency_hz[0] < 0.98 * low_hz || frequency_hz[frequency_hz.size() - 1] > 1.02 * high_hz)
+    throw FormatError(request.frf, "/frequency_hz",
+                      fmt::format("{:.6g} ... {:.6g} Hz do not cover band_hz of the experiment; "
+                                  "narrow band_hz",
+                                  low_hz, high_hz));
+  return frf;
+}
+
 /// What a stage reveals about its tracked parameters on some lines if every line has the whole power of every axis.
 class WatchedStage {
  public:
@@ -61,8 +86,7 @@ class WatchedStage {
     const std::vector<Index> inputs = places(model.inputs.names, stage.info.actuators, config);
     const std::vector<Index> outputs = places(model.outputs.names, stage.info.sensors, config);
     const std::vector<Eigen::MatrixXcd> noise =
-        output_noise(select_channels(frf, frf.inputs.names, model.outputs.names), frequency_hz,
-                     period_s(config));
+        output_noise(with_outputs(frf, model, config), frequency_hz, period_s(config));
     if (noise.empty())
       throw FormatError(config.file, "",
                         "--frf: has no noise estimate; use an FRF of `stageid frf` from two or "
@@ -176,9 +200,8 @@ WatchForecast forecast_of(const ExperimentConfig& config, const AdditiveModel& m
 WatchPlan make_watch_plan(const ExperimentConfig& config, const WatchRequest& request) {
   if (config.limits || config.experiment.scaling != AmplitudeScaling::rms)
     throw FormatError(config.file, "", "--watch: needs 'level: {rms_n: ...}'");
-  FrfEstimate frf = read_frf(request.frf);
-  if (frf.compensated != Compensation::none) frf = as_measured(std::move(frf));
   const FrequencyGrid candidates = grid_of(config);
+  const FrfEstimate frf = read_noise(request, candidates.frequency_hz());
   WatchPlan plan;
   plan.model = read_model(request.model);
   const WatchedStage stage(config, plan.model, frf, candidates.frequency_hz());
@@ -189,12 +212,24 @@ WatchPlan make_watch_plan(const ExperimentConfig& config, const WatchRequest& re
                     candidates.frequency_hz()[0], candidates.frequency_hz()[candidates.size() - 1],
                     config.file.string()));
   const JointDesign best = design(stage, unit_phasors(outline_plan(config).phase_rad(0)), request);
+  const Eigen::MatrixXd use = stage.use_of_limits(best.r, request.rms_m);
+  const std::vector<Eigen::MatrixXd> information = stage.information(best.r);
+  Eigen::VectorXd power = best.power.power;
+  Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(stage.response().size());
+  for (std::size_t k = 0; k < information.size(); ++k)
+    sum += power[static_cast<Index>(k)] * information[k].diagonal().array();
+  for (std::size_t k = 0; k < information.size(); ++k) {
+    double& p = power[static_cast<Index>(k)];
+    const Eigen::MatrixXd& V = best.power.gradient_root;
+    const Eigen::ArrayXd shares = p * information[k].diagonal().array() / sum;
+    if ((stage.change(1.0).array() * shares).maxCoeff() < kNegligible &&
+        p * (V.transpose() * information[k] * V).trace() < kNegligible)
+      p = 0.0;
+  }
   // The first and the last line stay: ModelTracker looks for modes between them.
-  const double least = kNegligiblePower * best.power.power.maxCoeff();
-  Eigen::VectorXd power = (best.power.power.array() >= least).select(best.power.power, 0.0);
-  power[0] = std::max(power[0], least);
-  power[power.size() - 1] = std::max(power[power.size() - 1], least);
-  power /= (stage.use_of_limits(best.r, request.rms_m) * power).maxCoeff();
+  for (const Index k : {Index{0}, power.size() - 1})
+    power[k] = std::max(power[k], kNegligible / use.col(k).maxCoeff());
+  power /= (use * power).maxCoeff();
   const Eigen::MatrixXcd r = best.r * power.cwiseSqrt().asDiagonal();
   std::vector<Index> kept;
   for (Index k = 0; k < power.size(); ++k)

@@ -80,6 +80,28 @@ TEST(ExperimentPlan, SingleAxisIsTheMultisineOfItsStream) {
   EXPECT_LT((plan.excitation({2, 1}).col(1) - wanted.samples).cwiseAbs().maxCoeff(), 64.0 * kEps);
 }
 
+TEST(ExperimentPlan, SimultaneousPlaysGivenPhasesInOneRunPerRealization) {
+  const FrequencyGrid grid = small_grid();
+  ExperimentSpec spec = spec_of(2, ExcitationScheme::simultaneous);
+  spec.axes[1].phase_rad = Eigen::VectorXd::LinSpaced(grid.size(), -1.0, 7.0);
+  const ExperimentPlan plan(grid, spec);
+  EXPECT_EQ(plan.runs().size(), 3U);
+  for (const RunId run : plan.runs()) {
+    const Eigen::MatrixXcd R = plan.spectrum(run);
+    for (Eigen::Index k = 0; k < grid.size(); ++k) {
+      const std::complex<double> wanted =
+          std::polar(0.5 * plan.amplitude()(1, k), spec.axes[1].phase_rad[k]);
+      EXPECT_NEAR(std::abs(R(1, k) - wanted), 0.0, 1e-12);
+    }
+  }
+  EXPECT_NE(plan.phase_rad(0).row(0), plan.phase_rad(1).row(0));
+  spec.crest_iterations = 5;
+  EXPECT_THROW(ExperimentPlan(grid, spec), std::invalid_argument);
+  spec.crest_iterations = 0;
+  spec.axes[1].phase_rad.conservativeResize(1);
+  EXPECT_THROW(ExperimentPlan(grid, spec), std::invalid_argument);
+}
+
 TEST(ExperimentPlan, PhasesAreThoseOfTheIndependentReference) {
   ExperimentSpec spec = spec_of(4, ExcitationScheme::orthogonal_dft);
   spec.seed = ~std::uint64_t{4};  // 2^64 - 5

@@ -68,6 +68,12 @@ TEST_F(WatchPlanTest, NeedsNoiseAndLevels) {
   fail({"design", peak, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml"}, 2, "rms_n");
 }
 
+TEST_F(WatchPlanTest, TheNoiseMustCoverTheBandAndTheSensors) {
+  const std::string wide = experiment("wide.yaml", "[16, 800]", "[16, 950]");
+  fail({"design", wide, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml"}, 2,
+       "narrow band_hz");
+}
+
 TEST_F(WatchPlanTest, ListedLinesAndPhasesAreChecked) {
   const auto refuses = [&](const std::string& lines, const std::string& text) {
     fail({"design", experiment("x.yaml", "lines: all", lines), "-o", "x.h5"}, 2, text);
