@@ -18,13 +18,11 @@
 #include <vector>
 
 #include "estimation/tracking/model_tracker.hpp"
-#include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/multisine.hpp"
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/plant_spec.hpp"
-#include "hal/simulator/simulated_stage.hpp"
-#include "hal/stage/motion_controller.hpp"
 #include "tests/support/process/random_numbers.hpp"
+#include "tests/support/stages/excited_loop.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/watch_plan.hpp"
@@ -80,70 +78,19 @@ Excitation designed_excitation(const stageid::ExperimentConfig& experiment) {
   return out;
 }
 
-/// A closed loop in progress that gives the spectra of period after period.
-class Loop {
- public:
-  Loop(const stageid::StageConfig& config, const stageid::SimulationSpec& simulation,
-       const AdditiveModel& model, const Excitation& excitation, std::uint64_t seed)
-      : stage_(config.spec.info, *config.plant, simulation),
-        controller_(config.spec.controller),
-        dft_(excitation.period_samples),
-        lines_(excitation.lines),
-        u_(config.spec.info.actuators.size()),
-        y_(config.spec.info.sensors.size()) {
-    for (const std::string& name : model.inputs.names)
-      inputs_.push_back(stageid::channel_index(config.spec.info.actuators, name));
-    for (const std::string& name : model.outputs.names)
-      outputs_.push_back(stageid::channel_index(config.spec.info.sensors, name));
-    excitation_.setZero(excitation.period_samples, static_cast<Eigen::Index>(u_.size()));
-    for (std::size_t j = 0; j < excitation.axes.size(); ++j)
-      excitation_.col(stageid::channel_index(config.spec.info.actuators, excitation.axes[j])) =
-          excitation.samples.col(static_cast<Eigen::Index>(j));
-    measured_.y = y_;
-    controller_.reset();
-    stage_.start(seed, measured_);
-  }
-
-  PeriodSpectra next() {
-    const Eigen::Index N = excitation_.rows();
-    Eigen::MatrixXd u(N, std::ssize(u_));
-    Eigen::MatrixXd y(N, std::ssize(y_));
-    for (Eigen::Index n = 0; n < N; ++n) {
-      controller_.update(y_.data(), u_.data());
-      for (std::size_t j = 0; j < u_.size(); ++j)
-        u_[j] += excitation_(n, static_cast<Eigen::Index>(j));
-      u.row(n) = Eigen::Map<const Eigen::RowVectorXd>(u_.data(), std::ssize(u_));
-      y.row(n) = Eigen::Map<const Eigen::RowVectorXd>(y_.data(), std::ssize(y_));
-      (void)stage_.exchange({measured_.cycle, u_}, measured_, {});
-    }
-    return {spectra(y, outputs_), spectra(u, inputs_)};
-  }
-
- private:
-  Eigen::MatrixXcd spectra(const Eigen::MatrixXd& samples, const std::vector<int>& channels) {
-    Eigen::MatrixXcd out(std::ssize(channels), std::ssize(lines_));
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      std::copy(samples.col(channels[c]).begin(), samples.col(channels[c]).end(),
-                dft_.input().begin());
-      const auto X = dft_.forward();
-      for (std::size_t k = 0; k < lines_.size(); ++k)
-        out(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(k)) =
-            X[static_cast<std::size_t>(lines_[k])] / static_cast<double>(dft_.length());
-    }
-    return out;
-  }
-
-  stageid::SimulatedStage stage_;
-  stageid::MotionController controller_;
-  stageid::RealDft dft_;
-  std::vector<int> lines_;
-  std::vector<double> u_;
-  std::vector<double> y_;
-  std::vector<int> inputs_;
-  std::vector<int> outputs_;
-  Eigen::MatrixXd excitation_;
-  stageid::Inputs measured_;
-};
+stageid::test::ExcitedLoop make_loop(const stageid::StageConfig& config,
+                                     const stageid::SimulationSpec& simulation,
+                                     const AdditiveModel& model, const Excitation& excitation,
+                                     std::uint64_t seed) {
+  const std::vector<stageid::Channel>& actuators = config.spec.info.actuators;
+  Eigen::MatrixXd samples = Eigen::MatrixXd::Zero(excitation.period_samples, std::ssize(actuators));
+  for (std::size_t j = 0; j < excitation.axes.size(); ++j)
+    samples.col(stageid::channel_index(actuators, excitation.axes[j])) =
+        excitation.samples.col(static_cast<Eigen::Index>(j));
+  const stageid::test::SimulatedSpec spec{config.spec, *config.plant, simulation};
+  return {spec, std::move(samples), excitation.lines, model.inputs.names, model.outputs.names,
+          seed};
+}
 
 /// A change of the stage, and its name by the tracker.
 struct Planted {
@@ -273,7 +220,7 @@ int main(int argc, char** argv) {
     if (request.kind != "none")
       planted = plant_change(request, options.learning_periods, first.period_samples, config, model,
                              seed, simulation);
-    Loop loop(config, simulation, model, excitation_of(seed), seed);
+    auto loop = make_loop(config, simulation, model, excitation_of(seed), seed);
     stageid::ModelTracker tracker(model, frequency_hz, options);
     bool seen = false;
     Eigen::VectorXd learned_estimate;
