@@ -138,6 +138,17 @@ class WatchTest(ProcessTest):
         self.assertEqual(done.returncode, 2)
         self.assertIn("log recover", done.stderr)
 
+    def test_another_sample_rate(self):
+        stage = (CONFIGS / "stage/small_stage.yaml").read_text().replace("sample_rate_hz: 2000", "sample_rate_hz: 1600")
+        (WORK / "configs/stage/small_stage.yaml").write_text(stage)
+        experiment = (CONFIGS / "experiment/small_stage_watch.yaml").read_text().replace("800]", "700]")
+        (WORK / "configs/experiment/slower.yaml").write_text(experiment)
+        done = self.call("run", "configs/experiment/slower.yaml", "-o", "slower.slog")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for tracked in self.watch("slower.slog", 0)["tracked"]:
+            if tracked["kind"] in ("frequency", "delay"):  # a wrong hold would be a delay of 60 us
+                self.assertLess(abs(tracked["change"]), 1e-4 if tracked["kind"] == "frequency" else 1e-6, tracked)
+
     def test_too_few_periods(self):
         told = self.watch("same.slog", 3, "--learn", "500")
         self.assertEqual((told["changes"], told["learning_periods"]), ([], 120))

@@ -66,7 +66,7 @@ class Watch {
         model_(read_model(flags.model)),
         source_(model_, flags.log, band(), flags.follow),
         period_s_(source_.info().period_samples / source_.info().sample_rate_hz),
-        tracker_(model_, source_.frequency_hz(), options()) {
+        tracker_(sampled_at(source_.info().sample_rate_hz), source_.frequency_hz(), options()) {
     if (!flags.output.empty()) tracks_.emplace(flags.output, tracker_, model_, flags.model);
     if (!flags.events.empty()) events_.emplace(flags.events);
   }
@@ -89,6 +89,13 @@ class Watch {
     if (!flags_.band_hz.empty()) return {flags_.band_hz[0], flags_.band_hz[1]};
     if (model_.fit.band_hz[1] > 0.0) return {model_.fit.band_hz[0], model_.fit.band_hz[1]};
     return {0.0, 0.5 * model_.sample_rate_hz};
+  }
+
+  /// The model behind the hold of the log, which may have another rate than the data of the fit.
+  AdditiveModel sampled_at(double rate_hz) const {
+    AdditiveModel model = model_;
+    model.sample_rate_hz = rate_hz;
+    return model;
   }
 
   TrackerOptions options() const {
