@@ -118,6 +118,21 @@ std::vector<StageChange> ChangeNaming::changes_of_response(
   return changes;
 }
 
+/// A variance that became `ratio` times as large; of the square root of the latter.
+/// @param freedom half the degrees of freedom, 1 / (mean square of the ratio) without change
+StageChange ChangeNaming::change_of_scatter(const PossibleChange& what, int since, double ratio,
+                                            double freedom) const {
+  ratio = std::max(1e-6, ratio);
+  StageChange change;
+  change.what = what;
+  change.periods = since;
+  change.size = std::sqrt(ratio) - 1.0;
+  // The scatter of a power is proportional to it.
+  change.deviation = 0.5 * (1.0 + change.size) / std::sqrt(freedom);
+  change.statistic = 2.0 * freedom * (ratio - 1.0 - std::log(ratio));
+  return change;
+}
+
 /// @param P of the most probable other change: in a wrong response, the noise in U raises that of the residual
 std::vector<StageChange> ChangeNaming::changes_of_noise(int since,
                                                         const Eigen::VectorXd& mean_scores,
@@ -134,20 +149,25 @@ std::vector<StageChange> ChangeNaming::changes_of_noise(int since,
   }
   std::vector<StageChange> changes;
   for (std::size_t h = 0; h < scores_.possible().size(); ++h) {
-    StageChange change;
-    change.what = scores_.possible()[h];
-    if (change.what.kind != ChangeKind::noise) continue;
-    change.periods = since;
-    const double deviation = reference_.noise_deviation()[change.what.index];
-    const double score = keeps(since) ? (power[change.what.index] - 1.0) / deviation
-                                      : mean_scores[static_cast<Eigen::Index>(h)];
-    change.size = std::sqrt(std::max(0.0, 1.0 + score * deviation)) - 1.0;
-    // The scatter of a noise power is proportional to it.
-    change.deviation = 0.5 * deviation * (1.0 + change.size) / std::sqrt(independent(differences));
-    change.statistic = score * score * independent(differences);
-    changes.push_back(change);
+    const PossibleChange& what = scores_.possible()[h];
+    if (what.kind != ChangeKind::noise) continue;
+    const double deviation = reference_.noise_deviation()[what.index];
+    const double ratio = keeps(since) ? power[what.index]
+                                      : 1.0 + deviation * mean_scores[static_cast<Eigen::Index>(h)];
+    changes.push_back(
+        change_of_scatter(what, since, ratio, independent(differences) / (deviation * deviation)));
   }
   return changes;
+}
+
+/// @param P of the most probable other change: what it explains is no motion
+StageChange ChangeNaming::change_of_motion(int since, const Eigen::MatrixXcd& P) const {
+  const auto kept = std::min(since, static_cast<int>(recent_.size()));
+  double power = 0.0;
+  for (auto period = recent_.end() - kept; period != recent_.end(); ++period)
+    power += reference_.motion_power(*period, P) / kept;
+  return change_of_scatter({ChangeKind::motion, 0, {}}, since, power,
+                           0.5 * reference_.motion_freedom() * independent(since));
 }
 
 StageChange ChangeNaming::name(int since, const Eigen::VectorXd& mean_scores,
@@ -160,6 +180,7 @@ StageChange ChangeNaming::name(int since, const Eigen::VectorXd& mean_scores,
           : response_.at(reference_.x() + likeliest->size * likeliest->what.direction);
   for (StageChange& change : changes_of_noise(since, mean_scores_of_differences, there))
     changes.push_back(std::move(change));
+  if (reference_.motion_freedom() > 0.0) changes.push_back(change_of_motion(since, there));
   std::ranges::sort(changes, std::greater<>(), &StageChange::statistic);
   double sum = 0.0;
   for (const StageChange& change : changes)

@@ -11,6 +11,9 @@
 
 namespace stageid {
 
+/// Least number of periods after the one that contains the transient of a change, for its name.
+inline constexpr int kPeriodsToName = 2;
+
 /// Finds the most probable change of the last periods.
 class ChangeNaming {
  public:
@@ -18,7 +21,7 @@ class ChangeNaming {
   ChangeNaming(const TrackedResponse& response, const TrackingReference& reference,
                const ChangeScores& scores, const std::deque<PeriodSpectra>& recent);
 
-  /// @param since periods after the one that contains the transient of the change, at least 2
+  /// @param since periods after the one that contains the transient of the change, at least kPeriodsToName
   /// @param mean_scores over them, and over one fewer
   StageChange name(int since, const Eigen::VectorXd& mean_scores,
                    const Eigen::VectorXd& mean_scores_of_differences) const;
@@ -34,6 +37,9 @@ class ChangeNaming {
   std::vector<StageChange> changes_of_response(int since, const Eigen::VectorXd& mean_scores) const;
   std::vector<StageChange> changes_of_noise(int since, const Eigen::VectorXd& mean_scores,
                                             const Eigen::MatrixXcd& P) const;
+  StageChange change_of_motion(int since, const Eigen::MatrixXcd& P) const;
+  StageChange change_of_scatter(const PossibleChange& what, int since, double ratio,
+                                double freedom) const;
   double narrowest(const PossibleChange& change) const;
   double inflation() const;
   double independent(int count) const;

@@ -18,8 +18,6 @@ namespace {
 
 /// Periods that are kept to name a change.
 constexpr std::size_t kKept = 32;
-/// Least number of periods after the one of the change, for its name.
-constexpr int kToName = 2;
 
 }  // namespace
 
@@ -94,7 +92,7 @@ TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
     return out;
   }
   onset = onset == 0 ? found : onset + 1;
-  if (onset <= kToName) return out;
+  if (onset <= kPeriodsToName) return out;
   // The period of the change contains its transient.
   const int since = std::exchange(onset, 0) - 1;
   out.change = ChangeNaming(response, *reference, *scores, periods)
@@ -103,7 +101,7 @@ TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
     detector->restart();
     return out;
   }
-  start = reference->x();
+  if (out.change->what.kind != ChangeKind::motion) start = reference->x();
   if (out.change->what.direction.size() > 0)
     *start += out.change->size * out.change->what.direction;
   periods.clear();

@@ -41,6 +41,8 @@ std::string describe(const PossibleChange& change, const std::vector<TrackedPara
       return "frequencies of all modes";
     case ChangeKind::all_gains:
       return "gains of all sensors or of all actuators";
+    case ChangeKind::motion:
+      return "another motion";
     case ChangeKind::disturbance:
       return "disturbance that has passed";
     case ChangeKind::noise:

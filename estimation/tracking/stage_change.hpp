@@ -18,11 +18,12 @@ enum class ChangeKind : std::uint8_t {
   all_frequencies,  ///< of all tracked modes by the same factor: temperature, mass
   all_gains,        ///< of all sensors, or of all actuators, by the same factor
   noise,            ///< of a sensor
+  motion,           ///< the stage moves in another way than while it was learned; it is as before
   disturbance       ///< has passed; the stage is as before
 };
 template <>
 inline constexpr std::array kWords<ChangeKind> = {"parameter", "all_frequencies", "all_gains",
-                                                  "noise", "disturbance"};
+                                                  "noise",     "motion",          "disturbance"};
 
 /// A hypothesis about a change.
 struct PossibleChange {
@@ -43,6 +44,11 @@ struct StageChange {
   int periods = 0;         ///< since the one that contains the transient of the change
   double statistic = 0.0;  ///< twice the logarithm of the likelihood ratio
 };
+
+/// Whether the stage itself is another one.
+constexpr bool is_of_stage(ChangeKind kind) {
+  return kind != ChangeKind::motion && kind != ChangeKind::disturbance;
+}
 
 /// All changes that the data can show, those of the noise last: the parameters with a standard deviation below their
 /// largest_changes(), their common changes, and the noise of every sensor. @param information q x q

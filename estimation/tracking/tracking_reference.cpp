@@ -3,26 +3,24 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <cmath>
-#include <complex>
 #include <utility>
+
+#include "estimation/tracking/free_motion.hpp"
 
 namespace stageid {
 namespace {
 
-/// The spectra of a linear and of a quadratic trend of every output, n_y N x 2 n_y.
-Eigen::MatrixXcd spectra_of_trends(const TrackedResponse& response) {
-  const Eigen::Index N = response.lines();
-  const Eigen::Index n_y = response.model().n_outputs();
-  Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(n_y * N, 2 * n_y);
-  for (Eigen::Index k = 0; k < N; ++k) {
-    const double turn = response.omega_rad_s()[k] / response.model().sample_rate_hz;
-    const std::complex<double> sum = 1.0 / (1.0 - std::polar(1.0, -turn));
-    for (Eigen::Index i = 0; i < n_y; ++i) {
-      out(k * n_y + i, i) = sum;
-      out(k * n_y + i, n_y + i) = sum * sum;
-    }
-  }
-  return out;
+/// A mode moves if its free motion has this times the power of noise alone, while the stage is learned.
+constexpr double kMoves = 2.0;
+
+Eigen::MatrixXd basis_of(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& factors) {
+  return factors.householderQ() * Eigen::MatrixXd::Identity(factors.rows(), factors.rank());
+}
+
+template <typename Matrix>
+void append(Matrix& to, const Matrix& columns) {
+  to.conservativeResize(Eigen::NoChange, to.cols() + columns.cols());
+  to.rightCols(columns.cols()) = columns;
 }
 
 }  // namespace
@@ -45,7 +43,7 @@ TrackingReference::TrackingReference(const TrackedResponse& response,
       periods_(static_cast<double>(periods.size())),
       x_(std::move(x)),
       P_(response.at(x_)),
-      trends_(spectra_of_trends(response)) {
+      all_motions_(free_motions(response)) {
   const PeriodSpectra mean = mean_of(periods, periods.size());
   std::vector<Eigen::MatrixXcd> residuals = learn_noise(periods);
   if (settle) {
@@ -62,6 +60,9 @@ TrackingReference::TrackingReference(const TrackedResponse& response,
   freedom_ = sums.freedom;
   residual_ = residual(mean, P_);
   gradient_ = gradient(residual_);
+  double power = 0.0;
+  for (const PeriodSpectra& period : periods) power += motion_power(period, P_) / (periods_ - 1.0);
+  if (power > 0.0) other_power_ = power;
   learn_noise_power(residuals);
   judge(mean);
 }
@@ -75,15 +76,14 @@ Eigen::VectorXd TrackingReference::whitened(const Eigen::MatrixXcd& of) const {
   return noise_->whitened(of.reshaped());
 }
 
-void TrackingReference::remove_trends(Eigen::MatrixXcd& of) const {
-  const Eigen::VectorXd size = white_trends_.householderQr().solve(whitened(of));
-  of.reshaped() -= trends_ * size;
+void TrackingReference::remove_motions(Eigen::MatrixXcd& of) const {
+  of.reshaped() -= motions_ * white_motions_.solve(whitened(of));
 }
 
 Eigen::MatrixXcd TrackingReference::residual(const PeriodSpectra& period,
                                              const Eigen::MatrixXcd& P) const {
   Eigen::MatrixXcd out = raw_residual(period, P);
-  remove_trends(out);
+  remove_motions(out);
   return out;
 }
 
@@ -97,34 +97,73 @@ Eigen::VectorXd TrackingReference::noise_power(const Eigen::MatrixXcd& differenc
 
 Eigen::VectorXd TrackingReference::whitened_change(const Eigen::MatrixXcd& of) const {
   const Eigen::VectorXd white = whitened(of);
-  return white - trend_basis_ * (trend_basis_.transpose() * white);
+  return white - motion_basis_ * (motion_basis_.transpose() * white);
 }
 
 Eigen::VectorXd TrackingReference::whitened_change(const PeriodSpectra& mean) const {
   return whitened_change(raw_residual(mean, P_) - residual_);
 }
 
-/// The noise and the trends at P. @returns the residuals without trends
-std::vector<Eigen::MatrixXcd> TrackingReference::learn_noise(
-    const std::deque<PeriodSpectra>& periods) {
-  std::vector<Eigen::MatrixXcd> residuals;
-  for (const PeriodSpectra& period : periods) residuals.push_back(raw_residual(period, P_));
-  noise_.emplace(residuals);
-  // The noise on top of the trends gives the weights to remove them.
+/// @returns the residuals without these motions; sets the noise beside them
+std::vector<Eigen::MatrixXcd> TrackingReference::without(Eigen::MatrixXcd motions,
+                                                         std::vector<Eigen::MatrixXcd> residuals) {
+  motions_ = std::move(motions);
+  // The noise beside the motions gives the weights to remove them.
   for (int pass = 0; pass < 2; ++pass) {
-    white_trends_ = noise_->whitened(trends_);
-    for (Eigen::MatrixXcd& r : residuals) remove_trends(r);
+    white_motions_.compute(noise_->whitened(motions_));
+    for (Eigen::MatrixXcd& r : residuals) remove_motions(r);
     noise_.emplace(residuals);
   }
-  white_trends_ = noise_->whitened(trends_);
-  trend_basis_ = white_trends_.householderQr().householderQ() *
-                 Eigen::MatrixXd::Identity(white_trends_.rows(), white_trends_.cols());
+  white_motions_.compute(noise_->whitened(motions_));
+  motion_basis_ = basis_of(white_motions_);
   return residuals;
+}
+
+/// Adds those of the modes that move: their lines are correlated with each other, those of noise are not.
+/// @param residuals without motions_
+void TrackingReference::add_motions(const std::vector<Eigen::MatrixXcd>& residuals) {
+  Eigen::MatrixXd scatter(motion_basis_.rows(), std::ssize(residuals));
+  for (Eigen::Index t = 0; t < scatter.cols(); ++t)
+    scatter.col(t) = whitened(residuals[static_cast<std::size_t>(t)]);
+  scatter.colwise() -= scatter.rowwise().mean().eval();
+  others_.resize(motions_.rows(), 0);
+  for (std::size_t i = 1; i < all_motions_.size(); ++i) {
+    Eigen::MatrixXd white = noise_->whitened(all_motions_[i]);
+    white -= motion_basis_ * (motion_basis_.transpose() * white);
+    const Eigen::MatrixXd basis = basis_of(white.colPivHouseholderQr());
+    const Eigen::MatrixXd part = basis.transpose() * scatter;
+    const double chance = (periods_ - 1.0) * static_cast<double>(basis.cols());
+    const bool moves = part.squaredNorm() > kMoves * chance;
+    append(moves ? motions_ : others_, all_motions_[i]);
+    if (!moves) continue;
+    scatter -= basis * part;
+    append(motion_basis_, basis);
+  }
+}
+
+/// The noise at P. @returns the residuals without free motions
+std::vector<Eigen::MatrixXcd> TrackingReference::learn_noise(
+    const std::deque<PeriodSpectra>& periods) {
+  std::vector<Eigen::MatrixXcd> raw;
+  for (const PeriodSpectra& period : periods) raw.push_back(raw_residual(period, P_));
+  noise_.emplace(raw);
+  add_motions(without(all_motions_.front(), raw));
+  std::vector<Eigen::MatrixXcd> residuals = without(std::move(motions_), std::move(raw));
+  Eigen::MatrixXd white = noise_->whitened(others_);
+  white -= motion_basis_ * (motion_basis_.transpose() * white);
+  other_basis_ = basis_of(white.colPivHouseholderQr());
+  return residuals;
+}
+
+double TrackingReference::motion_power(const PeriodSpectra& period,
+                                       const Eigen::MatrixXcd& P) const {
+  return (other_basis_.transpose() * whitened(raw_residual(period, P) - residual_)).squaredNorm() /
+         (motion_freedom() * other_power_);
 }
 
 void TrackingReference::linearize(const Eigen::MatrixXcd& U) {
   J_ = noise_->whitened(response_.derivatives(x_, U));
-  J_ -= trend_basis_ * (trend_basis_.transpose() * J_);
+  J_ -= motion_basis_ * (motion_basis_.transpose() * J_);
   A_ = J_.transpose() * J_;
 }
 

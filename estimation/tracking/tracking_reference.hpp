@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/QR>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -18,8 +19,8 @@ PeriodSpectra mean_of(const std::deque<PeriodSpectra>& periods, std::size_t last
 /// What was learned from periods of a stage without change, at parameters x: the noise, the constant part of the
 /// residual, and how the residual depends on x.
 ///
-/// What a slow motion over the ends of a period leaves on the lines is removed from every residual: the spectra of a
-/// linear and of a quadratic trend of each output.
+/// A motion that does not repeat leaves free_motions() on the lines. Those of the free body, and those of the modes that
+/// it moved while this was learned, are removed from every residual.
 class TrackingReference {
  public:
   /// @param x at which the periods are; with `settle`, a starting point of Gauss-Newton to their mean
@@ -39,35 +40,45 @@ class TrackingReference {
   const Eigen::VectorXd& noise_deviation() const noexcept { return noise_deviation_; }
   const ReferenceQuality& quality() const noexcept { return quality_; }
 
-  /// Y - P U without trends, n_y x N.
+  /// Y - P U without free motions, n_y x N.
   Eigen::MatrixXcd residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
   Eigen::VectorXd gradient(const Eigen::MatrixXcd& residual) const;  ///< J^T W e
   /// Of the difference of two residuals; 1 on average without change.
   Eigen::VectorXd noise_power(const Eigen::MatrixXcd& difference) const;
-  /// Whitened and without trends: a change of the outputs.
+  /// Mean square of the free motions that were not there, in a residual at P, relative to that learned.
+  double motion_power(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
+  double motion_freedom() const { return static_cast<double>(other_basis_.cols()); }
+  /// Whitened and without free motions: a change of the outputs.
   Eigen::VectorXd whitened_change(const Eigen::MatrixXcd& of) const;
   /// The same of the residual of a mean, minus the constant part.
   Eigen::VectorXd whitened_change(const PeriodSpectra& mean) const;
 
  private:
   std::vector<Eigen::MatrixXcd> learn_noise(const std::deque<PeriodSpectra>& periods);
+  std::vector<Eigen::MatrixXcd> without(Eigen::MatrixXcd motions,
+                                        std::vector<Eigen::MatrixXcd> residuals);
+  void add_motions(const std::vector<Eigen::MatrixXcd>& residuals);
   void linearize(const Eigen::MatrixXcd& U);
   void settle(const PeriodSpectra& mean);
   void learn_noise_power(const std::vector<Eigen::MatrixXcd>& residuals);
   void judge(const PeriodSpectra& mean);
   Eigen::MatrixXcd raw_residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
-  void remove_trends(Eigen::MatrixXcd& of) const;
+  void remove_motions(Eigen::MatrixXcd& of) const;
   Eigen::VectorXd whitened(const Eigen::MatrixXcd& of) const;
 
   const TrackedResponse& response_;
   double periods_;
   Eigen::VectorXd x_;
   Eigen::MatrixXcd P_;
-  Eigen::MatrixXcd trends_;  // n_y N x 2 n_y
+  std::vector<Eigen::MatrixXcd> all_motions_;
+  Eigen::MatrixXcd motions_;  // that are removed
+  Eigen::MatrixXcd others_;
   std::optional<LineNoise> noise_;
-  Eigen::MatrixXd white_trends_;
-  Eigen::MatrixXd trend_basis_;  // orthonormal
-  Eigen::MatrixXd J_;            // whitened derivatives at x, without trends
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> white_motions_;
+  Eigen::MatrixXd motion_basis_;  // orthonormal
+  Eigen::MatrixXd other_basis_;
+  double other_power_ = 1.0;
+  Eigen::MatrixXd J_;  // whitened derivatives at x, without free motions
   Eigen::MatrixXd A_;
   Eigen::MatrixXd K_;
   Eigen::VectorXd freedom_;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "estimation/tracking/change_detector.hpp"
+#include "estimation/tracking/change_naming.hpp"
 
 namespace stageid {
 namespace {
@@ -17,8 +18,6 @@ using Eigen::Index;
 constexpr double kTiny = std::numeric_limits<double>::min();
 /// Longest window of ChangeDetector.
 constexpr int kLongest = 512;
-/// Least periods after which ModelTracker names a change.
-constexpr int kToName = 3;
 
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& M) {
   // Scaled, because a delay in s and a relative gain differ by many decades.
@@ -150,7 +149,8 @@ WatchForecast watch_forecast(const std::vector<Eigen::MatrixXd>& information,
   out.periods.resize(M.rows());
   for (Index p = 0; p < M.rows(); ++p)
     out.periods[p] = std::max<double>(
-        kToName, periods_to_detect(change[p] * change[p] * M(p, p), freedom[p], threshold, n));
+        kPeriodsToName + 1,
+        periods_to_detect(change[p] * change[p] * M(p, p), freedom[p], threshold, n));
   return out;
 }
 

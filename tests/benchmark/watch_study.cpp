@@ -23,6 +23,7 @@
 #include "hal/simulator/plant_spec.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/excited_loop.hpp"
+#include "tests/support/stages/point_to_point.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/watch_plan.hpp"
@@ -217,13 +218,22 @@ int main(int argc, char** argv) {
     stageid::SimulationSpec simulation = config.simulation;
     simulation.seed = seed;
     Planted planted;
-    if (request.kind != "none")
+    const bool moves = request.kind.ends_with("motion");
+    if (request.kind != "none" && !moves)
       planted = plant_change(request, options.learning_periods, first.period_samples, config, model,
                              seed, simulation);
     auto loop = make_loop(config, simulation, model, excitation_of(seed), seed);
     stageid::ModelTracker tracker(model, frequency_hz, options);
     bool seen = false;
     Eigen::VectorXd learned_estimate;
+    const int n_y = static_cast<int>(config.spec.info.sensors.size());
+    const double rate_hz = config.spec.info.sample_rate_hz;
+    if (moves)
+      loop.follow([=, motion = stageid::test::PointToPoint(request.size, rate_hz, seed),
+                   still_s = request.kind == "later_motion" ? 60.0 : 0.0](std::uint64_t n) mutable {
+        const double z = static_cast<double>(n) < still_s * rate_hz ? 0.0 : motion.next();
+        return Eigen::VectorXd::Constant(n_y, z);
+      });
     loop.next();
     const auto began = std::chrono::steady_clock::now();
     for (int p = 0; p < request.periods; ++p) {
@@ -286,7 +296,7 @@ int main(int argc, char** argv) {
       "{:.2f} ms\n",
       alarms, watched, 1e3 * tracking_s / (counted * request.periods), 1e3 * slowest_s,
       1e3 * (simulated_s - tracking_s) / (counted * request.periods));
-  if (request.kind != "none") {
+  if (request.kind != "none" && !request.kind.ends_with("motion")) {
     std::sort(delays.begin(), delays.end());
     fmt::print("{} of {} detected, {} named right; delay median {}, 95 % {} periods\n", detected,
                request.runs, named, delays.empty() ? 0 : delays[delays.size() / 2],

@@ -86,6 +86,8 @@ class LoopSpectra {
   void become(const StageProperties& stage) {
     P_ = reference_response(model_of(stage), tracked_lines_hz(), HoldModel::exact);
   }
+  /// From now on, every period begins in another state of two modes: of the rms of the noise, times this.
+  void move(double motion) { motion_ = motion; }
   void multiply_noise(Eigen::Index sensor, double factor) { noise_[sensor] *= factor; }
 
   /// @param disturbance rms of a force on the stage in this period, relative to the noise
@@ -95,12 +97,35 @@ class LoopSpectra {
     v.row(1) += 0.5 * v.row(0);
     v += disturbance * random_spectra(random_, 2, N);
     v = noise_.asDiagonal() * v;
+    if (motion_ > 0.0)
+      for (const std::size_t mode : {0UL, 2UL})
+        v += motion_ * 1e-5 * free_response(mode, random_.normal(), random_.normal());
     PeriodSpectra period;
     period.U = U0_ - controller() * v;
     period.Y = v;
     for (Eigen::Index k = 0; k < N; ++k)
       period.Y.col(k) += P_.col(k).reshaped(2, 3) * period.U.col(k);
     return period;
+  }
+
+  /// Spectra, n_y x N, of one period of y(t) = phi e^(-zeta omega t) (a cos + b sin)(omega_d t), sample by sample.
+  static Eigen::MatrixXcd free_response(std::size_t mode, double a, double b) {
+    const StageProperties stage;
+    const double omega = 2.0 * std::numbers::pi * stage.frequency_hz[mode];
+    const double zeta = stage.damping_ratio[mode];
+    const double omega_d = omega * std::sqrt(1.0 - zeta * zeta);
+    const Eigen::VectorXd lines_hz = tracked_lines_hz();
+    const int samples = static_cast<int>(std::lround(kTrackedRateHz / (lines_hz[1] - lines_hz[0])));
+    Eigen::VectorXcd spectrum = Eigen::VectorXcd::Zero(lines_hz.size());
+    for (int n = 0; n < samples; ++n) {
+      const double t = n / kTrackedRateHz;
+      const double y = std::exp(-zeta * omega * t) *
+                       (a * std::cos(omega_d * t) + b * std::sin(omega_d * t)) / samples;
+      for (Eigen::Index k = 0; k < spectrum.size(); ++k)
+        spectrum[k] += y * std::polar(1.0, -2.0 * std::numbers::pi * lines_hz[k] * t);
+    }
+    const Eigen::MatrixXd N = mode_numerator(mode)[0];
+    return N.col(0).normalized() * spectrum.transpose();
   }
 
  private:
@@ -111,6 +136,7 @@ class LoopSpectra {
   }
 
   RandomNumbers random_;
+  double motion_ = 0.0;
   Eigen::VectorXd noise_ = Eigen::Vector2d(8e-7, 16e-7);
   Eigen::MatrixXcd U0_;
   Eigen::MatrixXcd P_;

@@ -113,7 +113,7 @@ class Watch {
     if (state.learning) ++learned_;
     if (tracks_) tracks_->add(period, state, tracker_);
     if (!state.change) return;
-    if (state.change->what.kind != ChangeKind::disturbance) console_.exit_code = kNotTrustworthy;
+    if (is_of_stage(state.change->what.kind)) console_.exit_code = kNotTrustworthy;
     nlohmann::ordered_json event = change_json(*state.change, tracker_, model_, period, period_s_);
     console_.result(fmt::format("{:.6g} s: {}", period.time_s, event["text"].get<std::string>()));
     if (events_) events_->write("change", fields_of(event));

@@ -39,6 +39,8 @@ const char* remedy_of(const StageChange& change, const TrackedParameter* paramet
       return "Check what all sensors or all amplifiers have in common: supply, reference, scale";
     case ChangeKind::noise:
       return "Check the cable, the ground and the light or target of this sensor";
+    case ChangeKind::motion:
+      return "The stage is learned again beside this motion; nothing has to be done";
     case ChangeKind::disturbance:
       return "Nothing has to be done unless it comes again";
     case ChangeKind::parameter:
@@ -63,7 +65,7 @@ std::string what_happened(const StageChange& change, const ModelTracker& tracker
                           const AdditiveModel& model) {
   const TrackedParameter* parameter = parameter_of(change.what, tracker);
   const std::string name = describe(change.what, tracker.parameters(), model);
-  if (change.what.kind == ChangeKind::disturbance) return name;
+  if (!is_of_stage(change.what.kind)) return name;
   // Gains near 0 or below are faults of their own.
   if (is_channel_gain(parameter)) {
     const double gain = 1.0 + change.size;

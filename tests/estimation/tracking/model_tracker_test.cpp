@@ -195,6 +195,35 @@ TEST(ModelTracker, LearnsTheStageAgainAfterAChange) {
   for (const double value : tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
 }
 
+// The power of the motion is some hundred times that of the noise on the lines near two resonances.
+TEST(ModelTracker, AMotionThatWasLearnedCausesNeitherAlarmsNorErrors) {
+  LoopSpectra loop(11);
+  loop.move(10.0);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 32 + 100);
+  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+  for (const double value : tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
+  // Not because nothing is seen any more.
+  StageProperties stage;
+  stage.frequency_hz[2] *= 1.005;
+  loop.become(stage);
+  EXPECT_EQ(describe(next_change(tracker, loop).what, tracker.parameters(), model_of({})),
+            "frequency of the mode at 188 Hz");
+}
+
+TEST(ModelTracker, AMotionThatBeginsIsNamedAndLearned) {
+  LoopSpectra loop(12);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 40);
+  loop.move(10.0);
+  EXPECT_EQ(next_change(tracker, loop).what.kind, ChangeKind::motion);
+  EXPECT_TRUE(watch(tracker, loop, 32).learning);
+  EXPECT_FALSE(watch(tracker, loop, 60).learning);
+  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+}
+
 TEST(ModelTracker, ADisturbancePassesWithoutAChange) {
   LoopSpectra loop(4);
   ModelTracker tracker = tracker_of();

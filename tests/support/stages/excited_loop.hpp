@@ -1,7 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimation/modal/period_spectra.hpp"
@@ -33,12 +36,18 @@ class ExcitedLoop {
     stage_->start(seed, measured_);
   }
 
+  /// The loop follows a setpoint: m at every sensor, by sample since the start.
+  void follow(std::function<Eigen::VectorXd(std::uint64_t)> setpoint) {
+    setpoint_ = std::move(setpoint);
+  }
+
   PeriodSpectra next() {
     const Eigen::Index N = excitation_.rows();
     Eigen::MatrixXd u(N, u_.size());
     Eigen::MatrixXd y(N, y_.size());
     for (Eigen::Index n = 0; n < N; ++n) {
-      controller_.update(y_.data(), u_.data());
+      const Eigen::VectorXd error = setpoint_ ? Eigen::VectorXd(y_ - setpoint_(sample_++)) : y_;
+      controller_.update(error.data(), u_.data());
       u_ += excitation_.row(n).transpose();
       u.row(n) = u_;
       y.row(n) = y_;
@@ -63,6 +72,8 @@ class ExcitedLoop {
   MotionController controller_;
   RealDft dft_;
   Eigen::MatrixXd excitation_;
+  std::function<Eigen::VectorXd(std::uint64_t)> setpoint_;
+  std::uint64_t sample_ = 0;
   std::vector<int> lines_;
   Eigen::VectorXd u_;
   Eigen::VectorXd y_;
