@@ -85,9 +85,12 @@ Eigen::ArrayXd ChangeDetector::statistics(std::int64_t periods) const {
 Eigen::Index ChangeDetector::scan() {
   Eigen::Index best = 0;
   largest_ = -1.0;
+  by_hypothesis_ = Eigen::ArrayXd::Zero(freedom_.size());
   for (int w = 1; w <= std::min<std::int64_t>(count_, kLongest); w *= 2) {
     Eigen::Index h = 0;
-    const double value = statistics(w).maxCoeff(&h);
+    const Eigen::ArrayXd values = statistics(w);
+    by_hypothesis_ = by_hypothesis_.max(values);
+    const double value = values.maxCoeff(&h);
     if (value <= largest_) continue;
     largest_ = value;
     window_ = w;

@@ -31,6 +31,8 @@ class ChangeDetector {
   double threshold() const noexcept { return threshold_; }
   /// The largest statistic of the last period, and that of its hypothesis.
   double largest() const noexcept { return largest_; }
+  /// The largest statistic of the last period, by hypothesis.
+  const Eigen::ArrayXd& largest_by_hypothesis() const noexcept { return by_hypothesis_; }
 
  private:
   Eigen::ArrayXd statistics(std::int64_t periods) const;
@@ -42,6 +44,7 @@ class ChangeDetector {
   double reference_periods_;
   double threshold_ = 0.0;
   double largest_ = 0.0;
+  Eigen::ArrayXd by_hypothesis_;
   int window_ = 1;  // of the largest statistic
   std::int64_t count_ = 0;
   Eigen::ArrayXXd sums_;  // H x ring: of all scores before a period

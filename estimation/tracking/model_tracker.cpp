@@ -35,6 +35,7 @@ struct ModelTracker::State {
 
   void learn();
   TrackedPeriod watch(const PeriodSpectra& period);
+  Eigen::VectorXd statistics() const;
   /// Adds the gradients of some periods to the tracked estimate.
   void track(const Eigen::VectorXd& mean_gradient, int count);
 
@@ -74,6 +75,17 @@ void ModelTracker::State::learn() {
   onset = 0;
 }
 
+Eigen::VectorXd ModelTracker::State::statistics() const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(response.size() + response.model().n_outputs());
+  for (std::size_t h = 0; h < scores->possible().size(); ++h) {
+    const PossibleChange& change = scores->possible()[h];
+    const double value = detector->largest_by_hypothesis()[static_cast<Eigen::Index>(h)];
+    if (change.kind == ChangeKind::parameter) out[change.index] = value;
+    if (change.kind == ChangeKind::noise) out[response.size() + change.index] = value;
+  }
+  return out;
+}
+
 TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
   TrackedPeriod out;
   out.learning = false;
@@ -87,6 +99,7 @@ TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
       detector->add(scores->of(gradient - reference->mean_gradient(), out.noise_power));
   out.largest_statistic = detector->largest();
   out.threshold = detector->threshold();
+  out.statistics = statistics();
   if (found == 0 && onset == 0) {
     track(gradient, 1);
     return out;

@@ -26,8 +26,11 @@ struct TrackerOptions {
 struct TrackedPeriod {
   bool learning = true;  ///< the estimates are those of the last period before learning
   std::optional<StageChange> change;
+  double threshold = 0.0;  ///< of the statistics
   double largest_statistic = 0.0;
-  double threshold = 0.0;
+  /// The same by tracked parameter, then by sensor for its noise; zero: the data cannot show the change; empty while
+  /// learning.
+  Eigen::VectorXd statistics;
   Eigen::VectorXd noise_power;  ///< by sensor, relative to that learned; empty while learning
 };
 

@@ -131,6 +131,26 @@ class WatchTest(ProcessTest):
         event = json.loads((WORK / "growing.jsonl").read_text())
         self.assertEqual((event["event"], event["kind"]), ("change", "frequency"))
 
+    def test_a_killed_watch_tells_the_same_when_started_again(self):
+        self.record("killed", f"kind: mode_frequency, mode: 7, value: 1e-4, from_cycle: {FROM_CYCLE}")
+        outputs = ["-o", "killed.h5", "--events", "killed.jsonl"]
+        content = (WORK / "killed.slog").read_bytes()
+        growing = WORK / "killed_growing.slog"
+        growing.write_bytes(content[: len(content) * 3 // 4])
+        for wait_s in (0.0, 0.1, 0.3, 1.0):
+            watching = subprocess.Popen([PROGRAM, "watch", "model/model.json", growing.name, "--follow", *outputs], cwd=WORK,
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(wait_s)
+            watching.kill()
+            watching.wait()
+            self.assertFalse((WORK / "killed.h5").exists(), "half a file under its name")
+        growing.write_bytes(content)
+        again = self.watch(growing.name, 3, "--follow", *outputs)
+        whole = self.watch("killed.slog", 3, "-o", "whole.h5")
+        self.assertEqual(again["changes"], whole["changes"])
+        self.assertEqual((WORK / "killed.h5").read_bytes(), (WORK / "whole.h5").read_bytes())
+        self.assertEqual(len((WORK / "killed.jsonl").read_text().splitlines()), 1, "told once")
+
     def test_a_cut_log(self):
         content = (WORK / "same.slog").read_bytes()
         (WORK / "cut.slog").write_bytes(content[: len(content) // 2])

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <vector>
 
 #include "tools/terminal/console.hpp"
 
 namespace stageid {
+
+struct WatchOptions;
 
 /// Each adds one command to the program; parsing a command line that contains it runs it.
 void identify_command(CLI::App& app, Console& console);
@@ -25,5 +28,8 @@ void config_command(CLI::App& app, Console& console);
 void node_command(CLI::App& app, Console& console);
 void manual_command(CLI::App& app, Console& console);
 void help_command(CLI::App& app, Console& console);
+
+/// Adds the options of a watch except its model. @returns them
+std::vector<CLI::Option*> add_watch_options(CLI::App& command, WatchOptions& options);
 
 }  // namespace stageid

@@ -31,6 +31,7 @@ struct RunFlags {
   std::filesystem::path excitation;
   std::string backend;
   std::string dashboard;
+  WatchOptions watch;
   MeasurementRequest request;
 };
 
@@ -49,6 +50,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   const ExperimentPlan plan =
       flags.excitation.empty() ? make_plan(config) : read_plan_of(config, flags.excitation);
   if (!flags.dashboard.empty()) request.dashboard = parse_dashboard_address(flags.dashboard);
+  if (!flags.watch.model.empty()) request.watch = flags.watch;
   const MeasurementResult result = measure(config, plan, request, console);
   console.exit_code = result.exit_code;
 
@@ -64,6 +66,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
                   counted(health.cycles, "cycle"), health.late, health.missing, health.marked,
                   stage_s, result.seconds, static_cast<double>(result.log_bytes) / 1e6));
   if (result.variance) console.result(result.message);
+  if (request.watch) console.result("watch: " + result.watch_summary);
   nlohmann::ordered_json json = {{"log", request.log.string()},
                                  {"exit_code", result.exit_code},
                                  {"message", result.message},
@@ -77,6 +80,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
                                  {"seconds", result.seconds},
                                  {"log_bytes", result.log_bytes}};
   if (result.variance) json["relative_variance"] = *result.variance;
+  if (request.watch) json["watch"] = result.watch;
   console.result(json);
   if (result.exit_code != 0)
     console.warning(fmt::format("{}{}", named(request.log, result.message),
@@ -115,6 +119,10 @@ void run_command(CLI::App& app, Console& console) {
                      "live view in a browser. PORT: on this machine (0: any free port) | "
                      "HOST:PORT: also on other machines. These and the stop button need the "
                      "access token in the printed address");
+  CLI::Option* const watch = command.add_option(
+      "--watch", flags.watch.model,
+      "model.json: watch the stage around this model meanwhile, and tell what changes");
+  for (CLI::Option* const option : add_watch_options(command, flags.watch)) option->needs(watch);
   command.add_flag("--reset-fault", flags.request.reset_fault,
                    "clear a fault of the node or plant before the first run");
 }

@@ -117,6 +117,10 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
     if (EventLog* const events = events_)
       events->write("abort", {{"from", std::string("dashboard")}});
   };
+  content_.history = [this] {
+    const StageWatch* const watch = watch_;
+    return watch != nullptr ? watch->history_json() : "{}";
+  };
   content_.watched = [this] { response_.watch(); };
   shown_levels_ = levels_.take();
   publish();
@@ -126,6 +130,7 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
 /// What changes during a measurement, for the script of the page: one line.
 std::string Dashboard::state_json() const {
   const ExperimentProgress& p = progress_;
+  const StageWatch* const watch = watch_;
   const double rate = wall_s_ > 0.0 ? p.seconds_done / wall_s_ : 0.0;
   Json json = {
       {"state", state_},
@@ -143,6 +148,7 @@ std::string Dashboard::state_json() const {
         {"largest_peak", list(shown_levels_.largest_peak)}}},
       {"response", {{"edition", content_.response.get().number}, {"status", response_.status()}}},
       {"supervisor", plant_ ? plant_json(plant_()) : Json()},
+      {"watch", watch != nullptr ? Json(watch->state()) : Json()},
       {"watchers", server_ ? server_->watchers() : 0},
       {"message", message_},
       {"exit_code", exit_code_ ? Json(*exit_code_) : Json()}};
@@ -166,6 +172,8 @@ void Dashboard::watch(EventLog& events) noexcept {
 }
 
 void Dashboard::watch(std::function<PlantSnapshot()> snapshot) { plant_ = std::move(snapshot); }
+
+void Dashboard::watch(const StageWatch& watch) noexcept { watch_ = &watch; }
 
 void Dashboard::update(const ExperimentProgress& progress) {
   state_ = aborted_ ? "stopping" : "running";

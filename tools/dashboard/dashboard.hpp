@@ -15,6 +15,7 @@
 #include "tools/dashboard/live_levels.hpp"
 #include "tools/dashboard/live_response.hpp"
 #include "tools/experiment/experiment_config.hpp"
+#include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
 
@@ -39,6 +40,8 @@ class Dashboard {
   void watch(EventLog& events) noexcept;
   /// Shows the state of the plant around the stage; `snapshot` may be called during the lifetime of *this.
   void watch(std::function<PlantSnapshot()> snapshot);
+  /// Shows what a watch of the stage tracks and finds; `watch` must outlive *this.
+  void watch(const StageWatch& watch) noexcept;
 
   /// Must be called a few times per second, from one thread.
   void update(const ExperimentProgress& progress);
@@ -63,6 +66,7 @@ class Dashboard {
   std::optional<int> exit_code_;  ///< set at the end
   std::string message_;
   std::function<PlantSnapshot()> plant_;
+  std::atomic<const StageWatch*> watch_ = nullptr;
   std::atomic<EventLog*> events_ = nullptr;
   std::atomic<bool> aborted_ = false;
   LiveLevels levels_;

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "hal/stage/stage.hpp"
+#include "tools/dashboard/metrics.hpp"
 
 namespace stageid {
 namespace {
@@ -222,6 +223,14 @@ struct DashboardServer::State {
       } else {
         response.set_content(*edition.text, "application/json");
       }
+    });
+    server.Get("/watch.json", [this](const httplib::Request&, httplib::Response& response) {
+      response.set_content(content.history(), "application/json");
+    });
+    server.Get("/metrics", [this](const httplib::Request&, httplib::Response& response) {
+      const LatestText::Edition edition = content.state.get();
+      response.set_content(edition.number > 0 ? metrics_text(*edition.text) : "",
+                           "text/plain; version=0.0.4; charset=utf-8");
     });
     server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
       if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {

@@ -12,15 +12,16 @@ namespace stageid {
 
 /// Content and actions of the dashboard.
 struct DashboardContent {
-  std::string page;                       ///< HTML
-  LatestText state;                       ///< the stream: one JSON object per line
-  LatestText response;                    ///< JSON of the newest FRF
+  std::string page;     ///< HTML
+  LatestText state;     ///< the stream: one JSON object per line
+  LatestText response;  ///< JSON of the newest FRF
+  std::function<std::string()> history = [] { return "{}"; };  ///< JSON of what a watch has tracked
   std::function<void()> abort;            ///< called at the request of a watcher; must not block
   std::function<void()> watched = [] {};  ///< called when a watcher connects
 };
 
 /// Serves a page, the stream of its state (server-sent events), the newest response, and the abort:
-///   GET /   GET /events   GET /response.json   POST /abort
+///   GET /   GET /events   GET /response.json   GET /watch.json   GET /metrics   POST /abort
 ///
 /// It has its own threads of low priority and at most kWatchers streams at once (then 503). A watcher receives the
 /// newest state when it is ready to read; nothing is queued for slow watchers, and one that does not read for

@@ -17,6 +17,7 @@
 #include "hal/stage/sample_clock.hpp"
 #include "tools/dashboard/dashboard.hpp"
 #include "tools/experiment/run_metadata.hpp"
+#include "tools/measure/live_watch.hpp"
 #include "tools/measure/measured_stage.hpp"
 #include "tools/measure/until_variance.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -181,6 +182,18 @@ void tell_reached(UntilVariance& until, MeasurementResult& result, const Console
   result.variance = until.reached();
 }
 
+/// Waits for the watch to reach the end of the log. Its failures are warnings.
+void conclude_watch(const StageWatch& watch, LiveWatch& live, MeasurementResult& result,
+                    const Console& console) {
+  const std::string failure = live.finish(result.experiment.end != ExperimentEnd::log_failed);
+  if (!failure.empty()) console.warning("--watch: " + failure);
+  result.watch_summary = watch.summary();
+  result.watch = watch.json();
+  if (!watch.stage_changed() || result.exit_code != kDone) return;
+  result.exit_code = kNotTrustworthy;
+  result.message = "the stage has changed, so the model no longer describes it";
+}
+
 /// Connects observers of the measurement.
 void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
             Dashboard* dashboard) {
@@ -226,6 +239,8 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const bool exists = check_log(request);
   RunExperimentOptions options;
   if (exists) options.skip = runs_to_skip(config, request.log);
+  std::optional<StageWatch> watch;  // must outlive the dashboard, which shows it
+  if (request.watch) watch.emplace(*request.watch, console);
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
@@ -247,6 +262,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const std::unique_ptr<Dashboard> dashboard =
       make_dashboard(config, plan, request, info, result.runs_before, console);
   if (dashboard && plant) dashboard->watch([&plant] { return plant->supervisor.snapshot(); });
+  if (dashboard && watch) dashboard->watch(*watch);
   const LogInfo log_info =
       experiment_log_info(plan, info, run_metadata(config, request.backend, info));
   SlogWriter log = exists ? SlogWriter::resume(request.log, log_info)
@@ -259,6 +275,11 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
     until.emplace(request.log, config.frf, *request.until);
     options.enough = [&until] { return until->enough(); };
   }
+  std::optional<LiveWatch> live_watch;
+  if (watch) {
+    watch->write_events(*events);
+    live_watch.emplace(*watch, request.log);
+  }
   Progress progress(console, "run", "s of stage time");
   listen(options, *events, progress, dashboard.get());
   result.experiment = stage->perform(log, options);
@@ -268,6 +289,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
     tell_reached(*until, result, console);
   if (result.experiment.end != ExperimentEnd::log_failed)
     log.close(result.exit_code, result.message.c_str());
+  if (watch) conclude_watch(*watch, *live_watch, result, console);
   tell_end(*events, *stage, result);
   if (dashboard) dashboard->finish(result.exit_code, result.message);
   if (const std::string error = events->error(); !error.empty()) console.warning(error);

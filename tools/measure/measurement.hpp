@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "tools/dashboard/dashboard_address.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
 
@@ -25,6 +27,7 @@ struct MeasurementRequest {
   bool reset_fault = false;  ///< clear a fault of the node or plant first
   std::optional<DashboardAddress> dashboard = {};
   std::optional<double> until = {};  ///< target of the mean relative variance
+  std::optional<WatchOptions> watch = {};
 };
 
 struct MeasurementResult {
@@ -34,6 +37,8 @@ struct MeasurementResult {
   int exit_code = 0;    ///< kDone, kWorldFailed, kNotTrustworthy, kStoppedForSafety or kInterrupted
   std::string message;  ///< one line, the reason of the end
   std::optional<double> variance = {};  ///< mean relative, of the last estimate; with `until` only
+  std::string watch_summary = {};       ///< one line; empty: not watched
+  nlohmann::ordered_json watch = {};    ///< changes and tracked properties
   double seconds = 0.0;
   std::uint64_t log_bytes = 0;
 };

@@ -47,6 +47,11 @@ WatchSource::WatchSource(const AdditiveModel& model, std::filesystem::path log,
   period_ = static_cast<std::uint64_t>(log_->info().transient_periods);
 }
 
+bool WatchSource::has_begun(const std::filesystem::path& log) {
+  const SlogReader reader(log, false);
+  return !reader.runs().empty() || reader.end();
+}
+
 void WatchSource::open() {
   if (!follow_) {
     log_ = open_log(file_);

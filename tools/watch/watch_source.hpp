@@ -30,6 +30,9 @@ class WatchSource {
   WatchSource(const AdditiveModel& model, std::filesystem::path log,
               const std::array<double, 2>& band_hz, bool follow);
 
+  /// Whether a log that is being written has a run, or has ended.
+  static bool has_begun(const std::filesystem::path& log);
+
   const LogInfo& info() const { return log_->info(); }
   const Eigen::VectorXd& frequency_hz() const noexcept { return frequency_hz_; }
   /// The next period; none at the end of the log, or at present if the log is being written.

@@ -9,11 +9,11 @@ function showState(state) {
   showTiming(state);
   showSupervisor(state);
   showEvents(state);
-  const loaded = fetchResponse(state.response.edition);
+  const loaded = Promise.all([fetchResponse(state.response.edition), showWatch(state)]);
   if (state.state !== 'ended') return;
   ended = true;
-  // The program waits for this page to disconnect, so fetch the last response first.
-  loaded.then(() => fetchResponse(state.response.edition)).finally(() => {
+  // The program waits for this page to disconnect, so fetch what is last first.
+  loaded.then(() => Promise.all([fetchResponse(state.response.edition), showWatch(state)])).finally(() => {
     stream.close();
     window.stageidDashboard.left = true;
   });
