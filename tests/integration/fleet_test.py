@@ -153,6 +153,22 @@ class FleetTest(unittest.TestCase):
         self.call("fleet", "fleet.yaml")
         self.expect_every_job_once()
 
+    def test_ends_if_the_signal_of_an_ended_child_is_ignored(self):
+        self.call("fleet", "fleet.yaml", preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
+        self.expect_every_job_once()
+
+    def test_completes_the_work_after_the_program_was_removed(self):
+        copy = self.work / "fleet_program"
+        shutil.copy(self.program, copy)
+        process = subprocess.Popen([copy, "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        while not children.read_text():
+            time.sleep(0.001)
+        copy.unlink()
+        self.assertEqual((process.communicate()[1], process.returncode), ("", 0))
+        self.expect_every_job_once()
+
     def test_a_scheduler_runs_single_jobs(self):
         job = ("fleet", "job", "fleet.yaml", "logs/0.slog", "--stage", "x", "--time", "2026-01-01", "--tag", "bench=3")
         self.assertRegex(self.call(*job).stdout, r"^fleet_results/../.{12}: done\n$")

@@ -40,6 +40,9 @@ std::string last_error(std::string_view text) {
 
 }  // namespace
 
+// A program that ignores SIGCHLD, as some daemons let it do, cannot wait for its children.
+ChildPool::ChildPool() { std::signal(SIGCHLD, SIG_DFL); }
+
 ChildPool::~ChildPool() {
   for (const auto& [pid, child] : running_) ::kill(pid, SIGKILL);
   while (size() > 0) {
@@ -51,8 +54,9 @@ ChildPool::~ChildPool() {
 }
 
 void ChildPool::start(std::size_t task, const std::vector<std::string>& arguments) {
-  static const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  std::vector<char*> argv = {const_cast<char*>(program.c_str())};
+  // Also this program, and this version, after its file was replaced.
+  constexpr const char* kProgram = "/proc/self/exe";
+  std::vector<char*> argv = {const_cast<char*>("stageid")};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   const int messages = ::memfd_create("stageid messages", MFD_CLOEXEC);
@@ -70,7 +74,7 @@ void ChildPool::start(std::size_t task, const std::vector<std::string>& argument
     ::dup2(nothing, STDIN_FILENO);
     ::dup2(nothing, STDOUT_FILENO);
     ::dup2(messages, STDERR_FILENO);
-    ::execv(program.c_str(), argv.data());
+    ::execv(kProgram, argv.data());
     ::_exit(1);
   }
   running_[child] = {task, messages};

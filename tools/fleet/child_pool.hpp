@@ -22,7 +22,7 @@ struct ChildEnd {
 /// Child processes that run this program. They end with it, whatever ends it.
 class ChildPool {
  public:
-  ChildPool() = default;
+  ChildPool();
   ~ChildPool();  ///< kills those that are running
   ChildPool(const ChildPool&) = delete;
   ChildPool& operator=(const ChildPool&) = delete;
