@@ -209,17 +209,18 @@ void design_command(CLI::App& app, Console& console) {
   CLI::Option* frf =
       command.add_option("--frf", flags.watch.frf, "frf.h5 with the noise, for --watch");
   watch->needs(frf);
+  watch->excludes("--accuracy");
   frf->needs(watch);
   command
       .add_option_function<double>(
           "--rms-nm", [&flags](double rms_nm) { flags.watch.rms_m = 1e-9 * rms_nm; },
           "with --watch: largest rms of a sensor in nm; omitted: the levels of the experiment")
-      ->check(kPositive)
+      ->check(CLI::Range(1e-6, 1e9))
       ->needs(watch);
   command
       .add_option("--drift", flags.watch.drift,
                   "with --watch: relative drift of a natural frequency, to predict its detection")
-      ->check(kPositive)
+      ->check(CLI::Range(1e-12, 1.0))
       ->needs(watch)
       ->capture_default_str();
   command.add_flag("--force", flags.force, "write even if a limit would be exceeded");

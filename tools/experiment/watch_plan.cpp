@@ -4,9 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <complex>
+#include <iterator>
 #include <numbers>
+#include <string_view>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
@@ -159,6 +162,18 @@ Eigen::MatrixXcd unit_phasors(const Eigen::MatrixXd& phase_rad) {
   return phase_rad.unaryExpr([](double phase) { return std::polar(1.0, phase); });
 }
 
+/// A text as a value of a YAML file.
+std::string in_yaml(const std::string& text) {
+  const bool plain = std::ranges::all_of(text, [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view("_./").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (plain && !text.empty()) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("''") : std::string(1, c);
+  return quoted + "'";
+}
+
 struct JointDesign {
   InformativePower power;
   Eigen::MatrixXcd r;
@@ -253,25 +268,27 @@ std::string watch_experiment_text(const WatchPlan& plan, const ExperimentConfig&
           .frequency_hz();
   std::vector<std::string> axes, points, phases;
   for (std::size_t j = 0; j < experiment.axes.size(); ++j) {
-    axes.push_back(experiment.axes[j].channel);
+    axes.push_back(in_yaml(experiment.axes[j].channel));
     phases.push_back(fmt::format("    - {{axis: {}, rad: [{:.4f}]}}\n", axes.back(),
                                  fmt::join(plan.phase_rad.row(static_cast<Index>(j)), ", ")));
   }
   for (Index k = 0; k < plan.shape.size(); ++k)
     points.push_back(fmt::format("[{}, {:.5g}]", frequency_hz[k], plan.shape[k]));
+  std::vector<std::string> outputs;
+  std::ranges::transform(plan.model.outputs.names, std::back_inserter(outputs), &in_yaml);
   return fmt::format(
       "# Permanent excitation for tracking a model, by `stageid design --watch`.\n"
       "format: stageid-experiment\nstage: {}\n\nexperiment:\n  axes: [{}]\n  scheme: simultaneous\n"
       "  level: {{rms: [{:.6g}]}}\n  band_hz: [{}, {}]\n  period_s: {}\n  transient_periods: {}\n"
       "  periods: {}\n  realizations: 1\n  crest_iterations: 0\n  seed: {}\n  lines: [{}]\n"
       "  shape: [{}]\n  phases:\n{}\nfrf:\n  outputs: [{}]\n",
-      std::filesystem::proximate(std::filesystem::absolute(config.stage.file),
-                                 std::filesystem::absolute(file).parent_path())
-          .string(),
+      in_yaml(std::filesystem::proximate(std::filesystem::absolute(config.stage.file),
+                                         std::filesystem::absolute(file).parent_path())
+                  .string()),
       fmt::join(axes, ", "), fmt::join(plan.levels, ", "), frequency_hz[0],
       frequency_hz[frequency_hz.size() - 1], period_s(config), experiment.transient_periods,
       experiment.periods, experiment.seed, fmt::join(plan.lines, ", "), fmt::join(points, ", "),
-      fmt::join(phases, ""), fmt::join(plan.model.outputs.names, ", "));
+      fmt::join(phases, ""), fmt::join(outputs, ", "));
 }
 
 }  // namespace stageid

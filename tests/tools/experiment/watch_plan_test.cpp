@@ -64,8 +64,30 @@ TEST_F(WatchPlanTest, KeepsTheSensorsWithinARms) {
 TEST_F(WatchPlanTest, NeedsNoiseAndLevels) {
   fail({"design", config_, "--watch", "model.json", "-o", "w.yaml"}, 2, "--frf");
   fail({"design", config_, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.h5"}, 2, ".yaml");
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"--drift", "1e300"},
+                                               {"--rms-nm", "1e-300"},
+                                               {"--rms-nm", "inf"}}) {
+    std::vector<std::string> words = {"design", config_,  "--watch", "model.json",
+                                      "--frf",  "frf.h5", "-o",      "w.yaml"};
+    words.insert(words.end(), more.begin(), more.end());
+    fail(words, 2, "expected");
+  }
+  fail({"design", config_, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml", "--accuracy",
+        "1e-6"},
+       2, "--accuracy");
   const std::string peak = experiment("peak.yaml", "rms_n: 1.0", "peak_n: 1.0");
   fail({"design", peak, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml"}, 2, "rms_n");
+}
+
+TEST_F(WatchPlanTest, TheFileNamesAStageInAFolderWithAnyName) {
+  const std::filesystem::path folder = at("of a: 'b' #1 [x]");
+  std::filesystem::create_directory(folder);
+  ExperimentConfig config = load_experiment_config(config_);
+  const WatchPlan plan = make_watch_plan(config, {at("model.json"), at("frf.h5")});
+  std::filesystem::copy_file(config.stage.file, folder / "stage.yaml");
+  config.stage.file = folder / "stage.yaml";
+  write_bytes(at("w.yaml"), watch_experiment_text(plan, config, at("w.yaml")));
+  EXPECT_NO_THROW(load_experiment_config(at("w.yaml")));
 }
 
 TEST_F(WatchPlanTest, TheNoiseMustCoverTheBandAndTheSensors) {
