@@ -73,6 +73,12 @@ std::int64_t Statement::integer(int column) const {
   return ::sqlite3_column_int64(statement_.get(), column);
 }
 std::string Statement::text(int column) const {
+  if (::sqlite3_column_type(statement_.get(), column) == SQLITE_BLOB) {
+    std::string digits;
+    for (const std::byte byte : bytes(column))
+      digits += fmt::format("{:02x}", std::to_integer<unsigned>(byte));
+    return digits;
+  }
   const auto* text = reinterpret_cast<const char*>(::sqlite3_column_text(statement_.get(), column));
   return text == nullptr ? "" : text;
 }
@@ -103,9 +109,16 @@ Database::Database(std::filesystem::path file, Access access) : file_(std::move(
 
 Statement Database::prepare(const std::string& sql) const {
   sqlite3_stmt* statement = nullptr;
-  const int code = ::sqlite3_prepare_v2(handle_.get(), sql.c_str(), -1, &statement, nullptr);
+  const char* rest = "";
+  const int code = ::sqlite3_prepare_v2(handle_.get(), sql.c_str(), -1, &statement, &rest);
   Statement prepared(*this, statement);
   if (code != SQLITE_OK) fail(code);
+  sqlite3_stmt* second = nullptr;  // remains empty after a comment
+  const int code_of_rest = ::sqlite3_prepare_v2(handle_.get(), rest, -1, &second, nullptr);
+  const Statement not_used(*this, second);
+  if (code_of_rest != SQLITE_OK || second != nullptr)
+    throw std::invalid_argument(
+        fmt::format("{}: got several SQL statements; write one", file_.string()));
   return prepared;
 }
 

@@ -54,7 +54,7 @@ class Statement {
   bool is_real(int column) const;
   double number(int column) const;  ///< 0 for null
   std::int64_t integer(int column) const;
-  std::string text(int column) const;
+  std::string text(int column) const;                  ///< bytes as hexadecimal digits
   std::span<const std::byte> bytes(int column) const;  ///< until the next step()
 
  private:
@@ -92,7 +92,8 @@ class Database {
   Database& operator=(const Database&) = delete;
 
   const std::filesystem::path& file() const noexcept { return file_; }
-  Statement prepare(const std::string& sql) const;
+  Statement prepare(
+      const std::string& sql) const;  ///< @throws std::invalid_argument also if there are several
   void execute(const std::string& sql) const;  ///< one or several statements
   std::int64_t last_id() const;
   [[noreturn]] void fail(int code) const;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <stdexcept>
 #include <thread>
 
 #include "acquisition/files/file_error.hpp"
@@ -85,6 +86,21 @@ TEST_F(FleetStoreTest, KeepsWhatWasStored) {
   EXPECT_TRUE(tags.is_null(1));
   ASSERT_TRUE(tags.step());
   EXPECT_EQ(tags.number(1), 21.5);
+}
+
+TEST_F(FleetStoreTest, ShowsBytesAsHexadecimalDigits) {
+  const FleetStore store = open();
+  Statement row = store.database().prepare("SELECT X'00ff1b', 'text', X''; -- a comment");
+  ASSERT_TRUE(row.step());
+  EXPECT_EQ(row.text(0), "00ff1b");
+  EXPECT_EQ(row.text(1), "text");
+  EXPECT_EQ(row.text(2), "");
+}
+
+TEST_F(FleetStoreTest, RefusesASecondStatement) {
+  const FleetStore store = open();
+  EXPECT_THROW(store.database().prepare("SELECT 1; DELETE FROM stage"), std::invalid_argument);
+  EXPECT_THROW(store.database().prepare("SELECT 1; SELEC"), std::invalid_argument);
 }
 
 TEST_F(FleetStoreTest, HasEveryJobOnceWithTwoWriters) {
