@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <stdexcept>
 
@@ -21,7 +22,7 @@ using Json = nlohmann::json;
 constexpr unsigned char kNoFolder = 255;
 
 /// For display; the page would be larger with all digits.
-double rounded(double value) { return std::stod(fmt::format("{:.7g}", value)); }
+double rounded(double value) { return std::strtod(fmt::format("{:.7g}", value).c_str(), nullptr); }
 
 class FleetPage {
  public:
@@ -30,7 +31,9 @@ class FleetPage {
 
   std::string html() {
     Json stages = Json::array();
-    for (const auto& [name, id] : chosen_stages()) stages.push_back(stage(id, name));
+    for (const auto& [name, id] : chosen_stages())
+      if (Json content = stage(id, name); content["count"] > 0)
+        stages.push_back(std::move(content));
     if (count_ == 0)
       throw std::invalid_argument(
           fmt::format("{}: contains no identification of this time; change --since and --until",

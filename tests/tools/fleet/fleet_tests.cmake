@@ -2,6 +2,7 @@
 target_sources(tools_tests PRIVATE
   fleet/fleet_fixture.cpp
   fleet/fleet_jobs_test.cpp
+  fleet/fleet_page_test.cpp
   fleet/fleet_pairing_test.cpp
   fleet/fleet_store_test.cpp)
 add_test(NAME fleet_in_browser
