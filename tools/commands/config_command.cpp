@@ -94,7 +94,8 @@ void check_file(const std::filesystem::path& file, Console& console) {
   }
   if (format_of(file) == "stageid-fleet") {
     const FleetConfig fleet = load_fleet_config(file);
-    console.result(fmt::format("{}: {}", file.string(), counted(fleet_logs(fleet).size(), "log")));
+    console.result(
+        fmt::format("{}: {}", file.string(), counted(fleet_logs(fleet, console).size(), "log")));
     return;
   }
   const ExperimentConfig experiment = load_experiment_config(file);

@@ -1,7 +1,9 @@
 #include "tools/commands/commands.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -35,8 +37,8 @@ struct FleetFlags {
 
 void run_jobs(const FleetFlags& flags, Console& console) {
   const FleetConfig config = load_fleet_config(flags.config);
-  const std::vector<FleetLog> logs = fleet_logs(config);
-  require_directory(config.results);
+  const std::vector<FleetLog> logs = fleet_logs(config, console);
+  require_directory(config.results, fmt::format("change 'results' in {}", config.file.string()));
   say_at_interrupt("finished jobs are stored; run the command again to continue");
   const FleetSummary summary = run_fleet(config, logs, flags.workers, console);
   FleetStore store(config.store, Database::Access::write);
@@ -130,6 +132,17 @@ bool is_name(const std::string& text) {
   return text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string::npos;
 }
 
+void require_table(const Database& database, const std::string& name) {
+  std::vector<std::string> tables;
+  Statement rows = database.prepare(
+      "SELECT name FROM sqlite_master WHERE type IN ('table', 'view') ORDER BY name");
+  while (rows.step()) tables.push_back(rows.text(0));
+  if (std::ranges::find(tables, name) == tables.end())
+    throw std::invalid_argument(
+        fmt::format("{}: unknown table '{}'; use one of {}, or an SQL statement",
+                    database.file().string(), name, fmt::join(tables, ", ")));
+}
+
 Json value_of(const Statement& row, int column) {
   if (row.is_null(column)) return {};
   if (row.is_integer(column)) return row.integer(column);
@@ -143,6 +156,8 @@ void query_fleet(const FleetQueryFlags& flags, Console& console) {
     require_ending(flags.csv, "a table", {".csv"});
     require_writable(flags.csv, {flags.store});
   }
+  if (is_name(flags.sql) && !flags.sql.starts_with("sqlite_"))
+    require_table(store.database(), flags.sql);
   Statement rows =
       store.database().prepare(is_name(flags.sql) ? "SELECT * FROM " + flags.sql : flags.sql);
   if (!rows.changes_nothing() || rows.columns() == 0)

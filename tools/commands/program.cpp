@@ -185,7 +185,9 @@ class Program {
         return fmt::format("unknown argument '{}'; did you mean '{}'? See 'stageid{} --help'",
                            unknown, nearest, path);
     }
-    if (innermost != &app_ && !command.commands.empty())
+    const bool words_differ = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
+                              dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    if (words_differ && innermost != &app_ && !command.commands.empty())
       return fmt::format("{}; use one of {}; see 'stageid{} --help'",
                          left_over.empty()
                              ? "a subcommand is missing"

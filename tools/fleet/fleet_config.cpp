@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "tools/config/config_reader.hpp"
 #include "tools/config/yaml_document.hpp"
@@ -61,6 +62,16 @@ nlohmann::json values_of(const YamlDocument& document, const YamlNode& node) {
   return out;
 }
 
+/// The name of a folder within a pattern.
+std::string escaped(const std::string& name) {
+  std::string out;
+  for (const char c : name) {
+    if (std::string_view("*?[]\\").find(c) != std::string_view::npos) out += '\\';
+    out += c;
+  }
+  return out;
+}
+
 }  // namespace
 
 void describe_fleet_keys(ConfigVisitor& visitor) {
@@ -77,7 +88,8 @@ FleetConfig load_fleet_config(const std::filesystem::path& path) {
     return (path.parent_path() / name).lexically_normal();
   };
   config.file = path;
-  for (std::string& pattern : config.logs) pattern = beside(pattern).string();
+  const std::filesystem::path folder = escaped(path.parent_path().string());
+  for (std::string& pattern : config.logs) pattern = (folder / pattern).lexically_normal().string();
   if (!file.table.empty()) config.table = beside(file.table);
   config.store = beside(file.store);
   config.results = beside(file.results);

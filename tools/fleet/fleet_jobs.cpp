@@ -32,13 +32,19 @@ std::vector<FleetLog> logs_of_table(const std::filesystem::path& table) {
   if (place == rows.names.end())
     throw FormatError(table, "1", "column 'log' is missing; add it to the first line");
   std::vector<FleetLog> logs;
-  for (const std::vector<std::string>& fields : rows.rows) {
+  for (std::size_t r = 0; r < rows.rows.size(); ++r) {
+    const std::vector<std::string>& fields = rows.rows[r];
+    const auto fail = [&](const std::string& problem) {
+      throw FormatError(table, fmt::format("{}", rows.lines[r]), problem);
+    };
+    const std::string& name_of_log = fields[static_cast<std::size_t>(place - rows.names.begin())];
+    if (name_of_log.empty()) fail("the field 'log' is empty; name a log, or remove the line");
     FleetLog log;
+    log.file = (table.parent_path() / name_of_log).lexically_normal();
     for (std::size_t c = 0; c < fields.size(); ++c) {
       const std::string& name = rows.names[c];
-      if (name == "log")
-        log.file = (table.parent_path() / fields[c]).lexically_normal();
-      else if (name == "stage")
+      if (name == "log") continue;
+      if (name == "stage")
         log.stage = fields[c];
       else if (name == "time_utc")
         log.time_utc = fields[c];
@@ -46,8 +52,7 @@ std::vector<FleetLog> logs_of_table(const std::filesystem::path& table) {
         log.tags.emplace_back(name, fields[c]);
     }
     if (!log.time_utc.empty() && !days_of(log.time_utc))
-      throw FormatError(
-          table, "", fmt::format("got time_utc '{}'; expected 2026-05-04T12:34:56Z", log.time_utc));
+      fail(fmt::format("got time_utc '{}'; expected 2026-05-04T12:34:56Z", log.time_utc));
     logs.push_back(std::move(log));
   }
   return logs;
@@ -55,8 +60,9 @@ std::vector<FleetLog> logs_of_table(const std::filesystem::path& table) {
 
 }  // namespace
 
-std::vector<FleetLog> fleet_logs(const FleetConfig& config) {
+std::vector<FleetLog> fleet_logs(const FleetConfig& config, const Console& console) {
   std::vector<FleetLog> logs;
+  std::vector<std::string> unmatched;
   std::map<std::filesystem::path, std::size_t> place;
   const auto add = [&](FleetLog log) {
     const auto [at, added] = place.emplace(log.file, logs.size());
@@ -65,13 +71,19 @@ std::vector<FleetLog> fleet_logs(const FleetConfig& config) {
     else
       logs[at->second] = std::move(log);
   };
-  for (const std::string& pattern : config.logs)
-    for (const std::filesystem::path& file : matches_of(pattern)) add({file, "", "", {}});
+  for (const std::string& pattern : config.logs) {
+    const std::vector<std::filesystem::path> files = matches_of(pattern);
+    if (files.empty()) unmatched.push_back(pattern);
+    for (const std::filesystem::path& file : files) add({file, "", "", {}});
+  }
   if (!config.table.empty())
     for (FleetLog& log : logs_of_table(config.table)) add(std::move(log));
   if (logs.empty())
     throw std::invalid_argument(
         fmt::format("{}: no log matches; check 'logs' and 'table'", config.file.string()));
+  for (const std::string& pattern : unmatched)
+    console.warning(fmt::format("{}: logs: no file matches '{}'; correct or remove the pattern",
+                                config.file.string(), pattern));
   return logs;
 }
 
@@ -83,7 +95,7 @@ std::string log_fingerprint(FleetStore& store, const std::filesystem::path& log)
       std::chrono::nanoseconds(std::filesystem::last_write_time(log).time_since_epoch()).count());
   const std::filesystem::path name = std::filesystem::absolute(log).lexically_normal();
   if (const auto known = store.log_fingerprint(name, size, changed_ns)) return *known;
-  const std::string fingerprint = fingerprint_of_file(log);
+  std::string fingerprint = fingerprint_of_file(log);
   store.note_log(name, size, changed_ns, fingerprint);
   return fingerprint;
 }

@@ -8,6 +8,7 @@
 
 #include "tools/fleet/fleet_config.hpp"
 #include "tools/fleet/fleet_store.hpp"
+#include "tools/terminal/console.hpp"
 
 namespace stageid {
 
@@ -20,9 +21,9 @@ struct FleetLog {
 };
 
 /// The logs that match a pattern, in the order of their names, then those of the table; each once. That of the table
-/// wins.
+/// wins. Warns of a pattern without a log.
 /// @throws FileError, FormatError "FILE:LINE: ..."; std::invalid_argument if there are none
-std::vector<FleetLog> fleet_logs(const FleetConfig& config);
+std::vector<FleetLog> fleet_logs(const FleetConfig& config, const Console& console);
 
 /// Fingerprint of a log. The store remembers those of logs that have not changed.
 std::string log_fingerprint(FleetStore& store, const std::filesystem::path& log);

@@ -58,7 +58,8 @@ std::vector<std::string> arguments_of(const Job& job, const FleetConfig& config)
   std::vector<std::string> out = {"--verbosity", "quiet", "fleet", "job"};
   if (!job.log.stage.empty()) out.push_back("--stage=" + job.log.stage);
   if (!job.log.time_utc.empty()) out.push_back("--time=" + job.log.time_utc);
-  for (const auto& [name, value] : job.log.tags) out.push_back("--tag=" + name + "=" + value);
+  for (const auto& [name, value] : job.log.tags)
+    out.push_back(fmt::format("--tag={}={}", name, value));
   for (const std::string& name : {std::string("--"), config.file.string(), job.log.file.string()})
     out.push_back(name);
   return out;

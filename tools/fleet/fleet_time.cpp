@@ -1,22 +1,25 @@
 #include "tools/fleet/fleet_time.hpp"
 
 #include <chrono>
-#include <cstdio>
+#include <regex>
+#include <string>
 
 namespace stageid {
 
 std::optional<double> days_of(const std::string& time_utc) {
-  int year = 0, hour = 0, minute = 0;
-  unsigned month = 0, day = 0;
-  double second = 0.0;
-  if (std::sscanf(time_utc.c_str(), "%d-%u-%uT%d:%d:%lf", &year, &month, &day, &hour, &minute,
-                  &second) < 3)
-    return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month),
-                                         std::chrono::day(day)};
+  static const std::regex form(
+      R"((\d{4})-(\d\d)-(\d\d)(?:T([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,9})?)Z?)?)");
+  std::smatch parts;
+  if (!std::regex_match(time_utc, parts, form)) return std::nullopt;
+  const auto number = [&](std::size_t part) {
+    return parts[part].matched ? std::stod(parts[part].str()) : 0.0;
+  };
+  const std::chrono::year_month_day date{std::chrono::year(static_cast<int>(number(1))),
+                                         std::chrono::month(static_cast<unsigned>(number(2))),
+                                         std::chrono::day(static_cast<unsigned>(number(3)))};
   if (!date.ok()) return std::nullopt;
   return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) +
-         (hour + (minute + second / 60.0) / 60.0) / 24.0;
+         (number(4) + (number(5) + number(6) / 60.0) / 60.0) / 24.0;
 }
 
 }  // namespace stageid

@@ -20,6 +20,7 @@
 #include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/stage_config.hpp"
+#include "tools/fleet/fleet_time.hpp"
 #include "tools/report/report_input.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/frf_step.hpp"
@@ -61,7 +62,7 @@ void complete_from_log(Identification& job, const FleetConfig& config, const Fle
     }
   }
   if (const std::string started = text_in(metadata, "started_utc");
-      given.time_utc.empty() && !started.empty())
+      given.time_utc.empty() && days_of(started))
     job.time_utc = started;
 }
 

@@ -61,13 +61,12 @@ void require_frf_ending(const std::filesystem::path& file) {
   require_ending(file, "a frequency response", {".h5", ".hdf5"});
 }
 
-void require_directory(const std::filesystem::path& directory) {
+void require_directory(const std::filesystem::path& directory, const std::string& remedy) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error || !std::filesystem::is_directory(directory))
-    throw FileError(fmt::format("{}: cannot create the directory: {}; choose another with -o",
-                                directory.string(),
-                                error ? error.message() : "a file of that name exists"));
+    throw FileError(fmt::format("{}: cannot create the directory: {}; {}", directory.string(),
+                                error ? error.message() : "a file of that name exists", remedy));
 }
 
 }  // namespace stageid

@@ -32,6 +32,7 @@ void require_model_ending(const std::filesystem::path& file);
 void require_frf_ending(const std::filesystem::path& file);
 
 /// Creates the directory if it does not exist. @throws FileError
-void require_directory(const std::filesystem::path& directory);
+void require_directory(const std::filesystem::path& directory,
+                       const std::string& remedy = "choose another with -o");
 
 }  // namespace stageid

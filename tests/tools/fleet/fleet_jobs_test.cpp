@@ -22,7 +22,7 @@ class FleetJobsTest : public testing::Test {
   }
   std::string problem(const std::string& text) const {
     try {
-      fleet_logs(config(text));
+      fleet_logs(config(text), Console());
     } catch (const std::exception& error) {
       return std::string(error.what()).substr((folder_ / "").string().size());
     }
@@ -35,7 +35,8 @@ TEST_F(FleetJobsTest, FindsLogsByPatternAndTable) {
   for (const char* name : {"b.slog", "a.slog", "c.h5"}) write(name, name);
   write("logs.csv",
         "log,stage,time_utc,temperature\nb.slog,left,2026-01-02,21.5\nd.slog,right,,\n");
-  const std::vector<FleetLog> logs = fleet_logs(config("logs: ['*.slog']\ntable: logs.csv\n"));
+  const std::vector<FleetLog> logs =
+      fleet_logs(config("logs: ['*.slog']\ntable: logs.csv\n"), Console());
   ASSERT_EQ(logs.size(), 3U);
   EXPECT_EQ(logs[0].file.filename(), "a.slog");
   EXPECT_EQ(logs[0].stage, "");
@@ -45,6 +46,26 @@ TEST_F(FleetJobsTest, FindsLogsByPatternAndTable) {
             (std::vector<std::pair<std::string, std::string>>{{"temperature", "21.5"}}));
   EXPECT_EQ(logs[2].file.filename(), "d.slog");
   EXPECT_TRUE(logs[2].tags.empty()) << "an empty field is not a tag";
+}
+
+TEST_F(FleetJobsTest, FindsLogsInAFolderWhoseNameLooksLikeAPattern) {
+  std::filesystem::create_directory(folder_ / "[a]*");
+  write("[a]*/x.slog", "x");
+  const std::filesystem::path file =
+      write("[a]*/fleet.yaml", "format: stageid-fleet\nlogs: ['*.slog', '../[[]a]*/x.slog']\n");
+  const std::vector<FleetLog> logs = fleet_logs(load_fleet_config(file), Console());
+  ASSERT_EQ(logs.size(), 1U);
+  EXPECT_EQ(logs[0].file, folder_ / "[a]*" / "x.slog");
+}
+
+TEST_F(FleetJobsTest, WarnsOfAPatternWithoutALog) {
+  write("a.slog", "a");
+  const FleetConfig given = config("logs: ['*.slog', missing.slog]\n");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(fleet_logs(given, Console()).size(), 1U);
+  const std::string warning = testing::internal::GetCapturedStderr();
+  EXPECT_NE(warning.find("fleet.yaml: logs: no file matches '"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("missing.slog'"), std::string::npos) << warning;
 }
 
 TEST_F(FleetJobsTest, NamesTheProblemAndItsPlace) {
@@ -58,7 +79,10 @@ TEST_F(FleetJobsTest, NamesTheProblemAndItsPlace) {
             "logs.csv:1: column 'log' is missing; add it to the first line");
   write("logs.csv", "log,time_utc\nx,yesterday\n");
   EXPECT_EQ(problem("table: logs.csv\n"),
-            "logs.csv: got time_utc 'yesterday'; expected 2026-05-04T12:34:56Z");
+            "logs.csv:2: got time_utc 'yesterday'; expected 2026-05-04T12:34:56Z");
+  write("logs.csv", "log,stage\n\n,left\n");
+  EXPECT_EQ(problem("table: logs.csv\n"),
+            "logs.csv:3: the field 'log' is empty; name a log, or remove the line");
   write("logs.csv", "log,stage\nx\n");
   EXPECT_EQ(problem("table: logs.csv\n"), "logs.csv:2: got 1 fields; the header has 2");
 }
@@ -86,7 +110,15 @@ TEST(FleetTime, ReadsDatesInUtc) {
   EXPECT_EQ(days_of("1970-01-02"), 1.0);
   EXPECT_EQ(days_of("1970-01-02T12:00:00Z"), 1.5);
   EXPECT_EQ(days_of("2026-02-30"), std::nullopt);
+  EXPECT_EQ(days_of("1970-01-02T12:00:00.000"), 1.5);
   EXPECT_EQ(days_of("yesterday"), std::nullopt);
+}
+
+TEST(FleetTime, RefusesTimesThatWouldBeReadOrSortedWrongly) {
+  for (const char* text : {"2026-5-4", "2026-05-04 12:34:56", "2026-05-04T12:34:56+02:00",
+                           "2026-05-04T24:00:00Z", "2026-05-04T12:34Z", "2026-05-04T12:34:nan",
+                           "99999-01-01", "2026-05-04 and more", "+026-05-04"})
+    EXPECT_EQ(days_of(text), std::nullopt) << text;
 }
 
 }  // namespace

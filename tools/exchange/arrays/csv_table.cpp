@@ -147,6 +147,7 @@ TextTable read_text_table(const std::filesystem::path& file) {
           fmt::format("got {} fields; the header has {}", fields.size(), table.names.size()));
     for (std::string& field : fields) field = utf8_of_text(trimmed(field));
     table.rows.push_back(std::move(fields));
+    table.lines.push_back(lines.line_number());
   }
   return table;
 }

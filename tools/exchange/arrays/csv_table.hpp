@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ struct TextTable {
   std::vector<std::string> names;
   std::vector<std::vector<std::string>>
       rows;  ///< each with as many fields as names, without blanks around them
+  std::vector<std::size_t> lines;  ///< per row its line in the file, 1-based
 };
 
 /// Separators, quotes and comments as in read_csv(). @throws FileError, FormatError "FILE:LINE: ..."
