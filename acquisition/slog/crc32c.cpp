@@ -46,66 +46,23 @@ std::uint64_t load_word(const std::byte* bytes) noexcept {
 
 #ifdef __SSE4_2__
 
-/// A linear map on 32-bit CRC registers: column i is the image of bit i.
-using RegisterMap = std::array<std::uint32_t, 32>;
+constexpr std::size_t kStream = 4096;
 
-constexpr std::uint32_t map_bits(const RegisterMap& map, std::uint32_t value) {
-  std::uint32_t image = 0;
-  for (std::size_t bit = 0; bit < 32; ++bit) {
-    if (((value >> bit) & 1U) != 0) image ^= map[bit];
+/// The register x^0, bit 31, after `kStream` zero bytes: the factor that they multiply a register with.
+constexpr std::uint32_t kShift = [] {
+  std::uint32_t crc = 1U << 31;
+  for (std::size_t i = 0; i < kStream; ++i) crc = (crc >> 8) ^ kByteTables[0][crc & 0xFFU];
+  return crc;
+}();
+
+/// The register after `kStream` zero bytes: its product with kShift, modulo the polynomial.
+std::uint32_t shifted(std::uint32_t crc) noexcept {
+  std::uint32_t product = 0;
+  for (std::uint32_t bits = kShift; bits != 0; bits <<= 1) {
+    product ^= crc & (0U - (bits >> 31));
+    crc = (crc >> 1) ^ (kPolynomial & (0U - (crc & 1U)));
   }
-  return image;
-}
-
-using ShiftTables = std::array<std::array<std::uint32_t, 256>, 4>;
-
-/// Tables of the map that `length` zero bytes (a power of two) apply to a CRC register. It is the map of one zero
-/// byte, squared log2(length) times.
-constexpr ShiftTables make_shift_tables(std::size_t length) {
-  RegisterMap map{};
-  for (std::size_t bit = 0; bit < 32; ++bit) {
-    const std::uint32_t value = 1U << bit;
-    map[bit] = (value >> 8) ^ kByteTables[0][value & 0xFFU];
-  }
-  for (; length > 1; length /= 2) {
-    RegisterMap square{};
-    for (std::size_t bit = 0; bit < 32; ++bit) square[bit] = map_bits(map, map[bit]);
-    map = square;
-  }
-  ShiftTables tables{};
-  for (std::size_t k = 0; k < 4; ++k) {
-    for (std::uint32_t b = 0; b < 256; ++b) tables[k][b] = map_bits(map, b << (8 * k));
-  }
-  return tables;
-}
-
-constexpr std::size_t kLongStream = 2048;
-constexpr std::size_t kShortStream = 256;
-constexpr ShiftTables kLongShift = make_shift_tables(kLongStream);
-constexpr ShiftTables kShortShift = make_shift_tables(kShortStream);
-
-std::uint32_t shift(const ShiftTables& tables, std::uint64_t crc) noexcept {
-  return tables[0][crc & 0xFFU] ^ tables[1][(crc >> 8) & 0xFFU] ^ tables[2][(crc >> 16) & 0xFFU] ^
-         tables[3][(crc >> 24) & 0xFFU];
-}
-
-/// Removes whole triples of `stream` bytes from the front.
-template <std::size_t stream>
-void add_triples(const ShiftTables& tables, const std::byte*& at, std::size_t& size,
-                 std::uint64_t& crc) noexcept {
-  while (size >= 3 * stream) {
-    std::uint64_t crc1 = 0;
-    std::uint64_t crc2 = 0;
-    for (std::size_t i = 0; i < stream; i += 8) {
-      crc = _mm_crc32_u64(crc, load_word(at + i));
-      crc1 = _mm_crc32_u64(crc1, load_word(at + stream + i));
-      crc2 = _mm_crc32_u64(crc2, load_word(at + 2 * stream + i));
-    }
-    crc = shift(tables, crc) ^ crc1;
-    crc = shift(tables, crc) ^ crc2;
-    at += 3 * stream;
-    size -= 3 * stream;
-  }
+  return product;
 }
 
 #endif
@@ -130,8 +87,17 @@ std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t previous) n
   std::uint64_t crc = ~previous;
   const std::byte* at = bytes.data();
   std::size_t size = bytes.size();
-  add_triples<kLongStream>(kLongShift, at, size, crc);
-  add_triples<kShortStream>(kShortShift, at, size, crc);
+  for (; size >= 3 * kStream; size -= 3 * kStream, at += 3 * kStream) {
+    std::uint64_t crc1 = 0;
+    std::uint64_t crc2 = 0;
+    for (std::size_t i = 0; i < kStream; i += 8) {
+      crc = _mm_crc32_u64(crc, load_word(at + i));
+      crc1 = _mm_crc32_u64(crc1, load_word(at + kStream + i));
+      crc2 = _mm_crc32_u64(crc2, load_word(at + 2 * kStream + i));
+    }
+    crc = shifted(static_cast<std::uint32_t>(crc)) ^ crc1;
+    crc = shifted(static_cast<std::uint32_t>(crc)) ^ crc2;
+  }
   for (; size >= 8; size -= 8, at += 8) crc = _mm_crc32_u64(crc, load_word(at));
   auto rest = static_cast<std::uint32_t>(crc);
   for (; size > 0; --size, ++at) rest = add_byte(rest, *at);
