@@ -32,6 +32,7 @@ class EventLog {
 
   void write(std::string_view event, const std::vector<EventField>& fields = {}) noexcept;
 
+  const std::filesystem::path& path() const noexcept { return path_; }
   /// The newest lines, oldest first; at most `most`, and at most 100.
   std::vector<std::string> latest(std::size_t most) const;
   /// Why writing has stopped; empty if it has not.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/record/event_log.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/commands/commands.hpp"
@@ -49,6 +50,7 @@ void watch(const WatchFlags& flags, Console& console) {
   json["log"] = flags.log.string();
   console.result(json);
   if (interrupt_flag()) console.exit_code = kInterrupted;
+  if (events && !events->error().empty()) throw FileError(events->error());
 }
 
 }  // namespace

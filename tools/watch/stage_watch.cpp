@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <fstream>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -70,6 +71,17 @@ StageWatch::StageWatch(WatchOptions options, const Console& console)
   state_ = state_of({});
 }
 
+void StageWatch::write_events(EventLog& events) {
+  events_ = &events;
+  std::ifstream file(events.path());
+  for (std::string line; std::getline(file, line);) {
+    auto event = nlohmann::ordered_json::parse(line, nullptr, false);
+    if (!event.is_object()) continue;
+    event.erase("time_utc");
+    told_before_.insert(event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  }
+}
+
 void StageWatch::run(const std::filesystem::path& log, bool follow,
                      const std::function<bool(double)>& go_on) {
   double time_s = 0.0;
@@ -125,10 +137,12 @@ void StageWatch::add(const WatchedPeriod& period) {
 }
 
 void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
-  stage_changed_ = stage_changed_ || change.what.kind != ChangeKind::disturbance;
+  stage_changed_ = stage_changed_ || is_of_stage(change.what.kind);
   nlohmann::ordered_json event = change_json(change, *tracker_, model_, period, period_s_);
   console_.result(fmt::format("{:.6g} s: {}", period.time_s, event["text"].get<std::string>()));
-  if (events_ != nullptr) events_->write("change", fields_of(event));
+  const std::string line = event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (events_ != nullptr && !told_before_.contains(line))
+    events_->write("change", fields_of(event));
   const std::lock_guard lock(mutex_);
   changes_.push_back(std::move(event));
 }

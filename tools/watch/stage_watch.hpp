@@ -6,6 +6,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,8 +41,9 @@ class StageWatch {
 
   /// Writes watch.h5 too.
   void write_tracks(std::filesystem::path file) { track_file_ = std::move(file); }
-  /// Writes the changes there too. @param events must outlive run()
-  void write_events(EventLog& events) noexcept { events_ = &events; }
+  /// Writes the changes there too, except those that its file has already: the same log was watched before.
+  /// @param events must outlive run()
+  void write_events(EventLog& events);
 
   /// Returns at the end of the log, or when `go_on` is false. It is asked after each period, with the recorded time in
   /// seconds, and while waiting.
@@ -49,7 +51,7 @@ class StageWatch {
   /// @throws as WatchSource, ModelTracker and TrackFile
   void run(const std::filesystem::path& log, bool follow, const std::function<bool(double)>& go_on);
 
-  /// Whether anything but a disturbance has changed.
+  /// Whether the stage itself has changed.
   bool stage_changed() const noexcept { return stage_changed_; }
   /// Why nothing was watched; empty if something was.
   std::string too_short() const;
@@ -75,6 +77,7 @@ class StageWatch {
   AdditiveModel model_;
   std::filesystem::path track_file_;
   EventLog* events_ = nullptr;
+  std::set<std::string> told_before_;
   // Since the log has a run.
   std::optional<WatchSource> source_;
   std::optional<ModelTracker> tracker_;
