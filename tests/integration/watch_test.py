@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """`stageid watch` over logs of the simulated small stage: nothing is told without a change, every planted change is
-told with its name and size, also while the log grows, and neither gaps nor damaged or foreign logs are changes.
+told with its name and size, also while the log grows and by `run --watch`, and neither gaps nor damaged or foreign logs are changes.
 
     watch_test.py PROGRAM CONFIGS WORK_DIR
 """
@@ -34,11 +34,15 @@ class WatchTest(ProcessTest):
         assert done.returncode == 0, done.stderr
         cls.record("same")
 
+    @staticmethod
+    def write_stage(fault=None):
+        stage = (CONFIGS / "stage/small_stage.yaml").read_text()
+        (WORK / "configs/stage/small_stage.yaml").write_text(stage + (f"\nfaults:\n  - {{{fault}}}\n" if fault else ""))
+
     @classmethod
     def record(cls, name, fault=None):
         """NAME.slog: 2 + 120 periods of 1 s, with a fault of the stage."""
-        stage = (CONFIGS / "stage/small_stage.yaml").read_text()
-        (WORK / "configs/stage/small_stage.yaml").write_text(stage + (f"\nfaults:\n  - {{{fault}}}\n" if fault else ""))
+        cls.write_stage(fault)
         (WORK / f"{name}.slog").unlink(missing_ok=True)
         done = cls.call("run", "configs/experiment/small_stage_watch.yaml", "-o", f"{name}.slog")
         assert (WORK / f"{name}.slog").exists(), done.stderr
@@ -112,6 +116,74 @@ class WatchTest(ProcessTest):
         self.record("gap", f"kind: missed_cycle, from_cycle: {FROM_CYCLE}, cycles: 5")
         told = self.watch("gap.slog", 0)
         self.assertEqual((told["changes"], told["skipped_periods"]), ([], 1))
+
+    def run_watched(self, fault=None, *flags, model="model/model.json"):
+        for file in WORK.glob("live.*"):
+            file.unlink()
+        self.write_stage(fault)
+        return self.call("run", "configs/experiment/small_stage_watch.yaml", "-o", "live.slog", "--watch", model, *flags, "--json")
+
+    def events(self, name):
+        lines = (WORK / "live.events.jsonl").read_text().splitlines()
+        return [event for event in map(json.loads, lines) if event["event"] == name]
+
+    def test_a_run_without_change(self):
+        done = self.run_watched()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        told = json.loads(done.stdout)["watch"]
+        self.assertEqual((told["changes"], told["periods"], told["learning_periods"]), ([], 120, 32))
+        self.assertEqual(told["tracked"], self.watch("live.slog", 0)["tracked"])
+        self.assertEqual(self.events("change"), [])
+
+    def test_a_run_with_a_change(self):
+        done = self.run_watched(f"kind: mode_frequency, mode: 7, value: 1e-4, from_cycle: {FROM_CYCLE}")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("the stage has changed", done.stderr)
+        told = json.loads(done.stdout)
+        self.assertEqual((told["exit_code"], len(told["watch"]["changes"])), (3, 1))
+        self.assertEqual(told["watch"]["changes"], self.watch("live.slog", 3)["changes"])
+        event, = self.events("change")
+        self.assertEqual(event["text"], told["watch"]["changes"][0]["text"])
+        self.assertEqual(self.events("end")[0]["exit_code"], 3)
+        # The log itself is whole: what the watch found is no property of the measurement.
+        self.assertEqual(self.call("log", "verify", "live.slog").returncode, 0)
+
+    def test_a_run_tells_the_change_at_once(self):
+        self.write_stage(f"kind: sensor_gain, channel: s2, value: 1.01, from_cycle: {FROM_CYCLE}")
+        (WORK / "told.slog").unlink(missing_ok=True)
+        done = self.call("run", "configs/experiment/small_stage_watch.yaml", "-o", "told.slog", "--watch", "model/model.json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        lines = done.stdout.splitlines()
+        self.assertRegex(lines[0], r"^8[2-5] s: gain of sensor 's2' changed by \+(0\.99|1)")
+        self.assertRegex(lines[-1], "^watch: 120 periods, .* 1 event$")
+
+    def test_a_failed_watch_does_not_fail_the_run(self):
+        model = json.loads((WORK / "model/model.json").read_text())
+        model["outputs"][0] = "s9"
+        (WORK / "foreign.json").write_text(json.dumps(model))
+        for flags, model, why in (([], "foreign.json", "s9"), (["--learn", "500"], "model/model.json", "nothing was watched")):
+            done = self.run_watched(None, *flags, model=model)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stderr, f"--watch: .*{why}")
+            self.assertEqual(self.call("log", "verify", "live.slog").returncode, 0)
+
+    def test_a_watch_that_cannot_begin_leaves_no_log(self):
+        for flags, model in (([], "none.json"), (["--false-alarms", "3"], "model/model.json")):
+            done = self.run_watched(None, *flags, model=model)
+            self.assertIn(done.returncode, (1, 2))
+            self.assertFalse((WORK / "live.slog").exists())
+
+    def test_a_resumed_run_is_watched_from_its_start(self):
+        self.write_stage()
+        text = (CONFIGS / "experiment/small_stage_watch.yaml").read_text()
+        (WORK / "configs/experiment/two.yaml").write_text(text.replace("periods: 120", "periods: 30").replace("realizations: 1", "realizations: 2"))
+        (WORK / "two.slog").unlink(missing_ok=True)
+        self.succeed("run", "configs/experiment/two.yaml", "-o", "two.slog")
+        content = (WORK / "two.slog").read_bytes()
+        (WORK / "two.slog").write_bytes(content[: len(content) * 3 // 4])
+        done = self.call("run", "configs/experiment/two.yaml", "-o", "two.slog", "--resume", "--watch", "model/model.json", "--learn", "8", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreaterEqual(json.loads(done.stdout)["watch"]["periods"], 60)
 
     def test_a_growing_log(self):
         self.record("whole", f"kind: mode_frequency, mode: 7, value: 1e-4, from_cycle: {FROM_CYCLE}")

@@ -50,7 +50,7 @@ std::string label(const char* name, const std::string& value) {
 void add_properties(const Json& list, const char* key, Metric metric) {
   for (const Json& property : list) {
     std::string labels;
-    for (const char* name : {"kind", "name", "channel"})
+    for (const char* name : {"kind", "name"})
       if (property.contains(name)) labels += label(name, property[name].get<std::string>());
     metric.add(property.value(key, Json()), labels);
   }

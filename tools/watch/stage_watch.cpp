@@ -157,7 +157,8 @@ nlohmann::ordered_json StageWatch::state_of(const TrackedPeriod& tracked) const 
   json["tracked"] = tracker_ ? tracked_json(*tracker_, model_) : nlohmann::ordered_json::array();
   json["noise"] = nlohmann::ordered_json::array();
   for (Eigen::Index i = 0; i < model_.n_outputs(); ++i)
-    json["noise"].push_back({{"channel", model_.outputs.name(i)}});
+    json["noise"].push_back({{"channel", model_.outputs.name(i)},
+                             {"name", describe({ChangeKind::noise, i, {}}, {}, model_)}});
   if (tracked.statistics.size() == 0) return json;
   const std::size_t properties = json["tracked"].size();
   for (std::size_t p = 0; p < properties; ++p)

@@ -97,6 +97,7 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
   nlohmann::ordered_json json = {
       {"event", "change"},
       {"kind", parameter != nullptr ? to_string(parameter->kind) : to_string(change.what.kind)},
+      {"name", describe(change.what, tracker.parameters(), model)},
       {"time_s", period.time_s},
       {"run", period.run},
       {"period", period.period},

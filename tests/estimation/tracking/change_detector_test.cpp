@@ -60,6 +60,8 @@ TEST(ChangeDetector, HasTheStatisticOfAHandMadeCase) {
   // Windows of three periods are only used to date a change: two and one compete here.
   EXPECT_EQ(detector.add(Eigen::Vector2d(0.0, -1.8)), 0);
   EXPECT_NEAR(detector.largest(), of(1.8, 1.0, 1e9), 1e-9);
+  EXPECT_NEAR(detector.largest_by_hypothesis()[0], of(1.5, 2.0, kFreedom), 1e-12);
+  EXPECT_NEAR(detector.largest_by_hypothesis()[1], detector.largest(), 1e-15);
   EXPECT_NEAR(detector.mean_scores(3)[0], 2.5 / 3.0, 1e-15);
   EXPECT_NEAR(detector.mean_scores(2)[1], -2.3 / 2.0, 1e-15);
   detector.restart();

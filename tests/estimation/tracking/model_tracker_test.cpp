@@ -49,6 +49,8 @@ TEST(ModelTracker, LearnsThenWatches) {
   EXPECT_FALSE(first.learning);
   EXPECT_EQ(first.noise_power.size(), 0) << "there is no difference yet";
   EXPECT_LT(first.largest_statistic, first.threshold);
+  ASSERT_EQ(first.statistics.size(), 14 + 2) << "properties, and the noise of each sensor";
+  EXPECT_LE(first.statistics.maxCoeff(), first.largest_statistic);
   EXPECT_EQ(watch(tracker, loop, 1).noise_power.size(), 2);
 }
 

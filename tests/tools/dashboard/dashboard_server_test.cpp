@@ -119,6 +119,18 @@ TEST_F(DashboardServerTest, ServesThePageAndTheNewestResponse) {
   EXPECT_EQ(client().Get("/other")->status, 404);
 }
 
+TEST_F(DashboardServerTest, ServesMetricsAndTheHistoryOfAWatch) {
+  content_.history = [] { return "{3}"; };
+  serve();
+  EXPECT_EQ(client().Get("/metrics")->body, "");
+  content_.state.publish(R"({"state":"running","health":{"cycles":7}})");
+  const httplib::Result metrics = client().Get("/metrics");
+  EXPECT_THAT(metrics->get_header_value("Content-Type"),
+              testing::StartsWith("text/plain; version=0.0.4"));
+  EXPECT_THAT(metrics->body, testing::HasSubstr("\nstageid_cycles_total 7\n"));
+  EXPECT_EQ(client().Get("/watch.json")->body, "{3}");
+}
+
 TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {
   serve();
   constexpr int kMoreThanThreads = DashboardServer::kWatchers + 16;

@@ -40,6 +40,7 @@ function showEvents(state) {
 const hiddenFields = new Set(['time_utc', 'event', 'measurement_id']);
 
 function eventText(event) {
+  if (event.text) return event.text;
   const place = isNumber(event.realization) ? 'realization ' + (event.realization + 1) + ', experiment ' + (event.experiment + 1) : '';
   const rest = Object.entries(event).filter(([name]) => !hiddenFields.has(name) && name !== 'realization' && name !== 'experiment')
     .map(([name, value]) => name.replace(/_s$/, '').replace(/_/g, ' ') + ' ' + (name.endsWith('_s') ? duration(value) : isNumber(value) ? number(value, 6).replace(/\.0+$/, '') : String(value)));

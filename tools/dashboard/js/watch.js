@@ -1,6 +1,6 @@
 // What a watch of the stage tracks: a card with a light and a ribbon per property, and the changes.
 
-const watched = { body: null, cards: [], periods: -1, loading: false, history: null };
+const watched = { body: null, cards: [], periods: -1, loading: false, history: null, changed: new Set() };
 
 // Of each kind of tracked property.
 const watchGroups = [['frequency', 'Natural frequencies'], ['damping', 'Damping ratios'], ['sensor_gain', 'Gains of sensors'],
@@ -14,9 +14,15 @@ function showWatch(state) {
   if (watched.cards.length !== state.watch.tracked.length + state.watch.noise.length) buildCards(state.watch);
   watched.cards.forEach((card) => showLight(card, state.watch));
   watched.status.replaceChildren(...described([['periods watched', count(state.watch.periods)], ['skipped', count(state.watch.skipped)],
-    ['changes', flagged(state.watch.changes)], ['at present', state.watch.learning ? 'learning noise and reference' : 'watching'],
+    ['changes', flagged(state.watch.changes)], ['shown', shownTime()], ['at present', state.watch.learning ? 'learning noise and reference' : 'watching'],
     ['largest statistic', state.watch.learning ? '\u2013' : number(state.watch.statistic) + ' of ' + number(state.watch.threshold)]]));
   return fetchHistory(state.watch.periods);
+}
+
+// Of the ribbons.
+function shownTime() {
+  const time = watched.history ? watched.history.time_s : [];
+  return time.length ? duration(time[0]) + ' \u2013 ' + duration(time[time.length - 1]) : '\u2013';
 }
 
 function buildWatch() {
@@ -32,7 +38,7 @@ function buildWatch() {
 
 function buildCards(watch) {
   const properties = watch.tracked.map((property, index) => ({ list: 'tracked', index, kind: property.kind, name: property.name }));
-  const noise = watch.noise.map((sensor, index) => ({ list: 'noise', index, kind: 'noise', name: sensor.channel }));
+  const noise = watch.noise.map((sensor, index) => ({ list: 'noise', index, kind: 'noise', name: sensor.name }));
   for (const card of watched.cards) if (card.figure) plots.delete(card.figure);
   watched.cards = [...properties, ...noise];
   watched.groups.replaceChildren(...[...watchGroups, ['noise', 'Noise of sensors']].flatMap(([kind, title]) => {
@@ -46,11 +52,11 @@ function buildCard(card) {
   card.light = element('span', { class: 'verdict none', role: 'img' }, card.sign);
   card.value = element('span', { class: 'watch-value' });
   card.ratio = element('span', { class: 'quiet' });
-  const short = card.name.replace(/^.* at /, '').replace(/^gain of (sensor|actuator) /, '').replace(/'/g, '');
+  const short = card.name.replace(/^.* at /, '').replace(/^\w+ of (sensor|actuator) /, '').replace(/'/g, '');
   const node = element('div', { class: 'watch-card', title: card.name },
     element('div', { class: 'watch-head' }, card.light, element('span', { class: 'watch-name' }, short), card.value), card.ratio);
   if (card.list === 'tracked') {
-    card.figure = canvasFigure('watch-' + card.index, card.name + ' over time', (context, width, height) => drawRibbon(context, width, height, card.index), 'ribbon');
+    card.figure = canvasFigure('watch-' + card.index, card.name + ' over time', (context, width, height) => drawRibbon(context, width, height, card), 'ribbon');
     node.append(card.figure.node);
   }
   return node;
@@ -64,10 +70,11 @@ function changeText(card, value) {
 function showLight(card, watch) {
   const now = watch[card.list][card.index];
   const share = isNumber(now.statistic) && watch.threshold > 0 ? now.statistic / watch.threshold : null;
-  const [level, word] = share === null ? ['none', 'learning'] : share >= 1 ? ['bad', 'changed'] : share > nearThreshold ? ['doubt', 'near the threshold'] : ['good', 'as the model'];
+  const [level, word] = watched.changed.has(card.name) ? ['bad', 'changed'] : share === null ? ['none', 'learning']
+    : share >= 1 ? ['bad', 'above the threshold'] : share > nearThreshold ? ['doubt', 'near the threshold'] : ['good', 'no change'];
   card.light.className = 'verdict ' + level;
   card.light.setAttribute('aria-label', word);
-  card.ratio.textContent = share === null ? word : word + ': ' + number(now.statistic, 2) + ' of ' + number(watch.threshold, 2);
+  card.ratio.textContent = word + (share === null ? '' : ': ' + number(now.statistic, 2) + ' of ' + number(watch.threshold, 2));
   card.value.textContent = card.kind === 'noise' ? (isNumber(now.power) ? number(now.power, 2) + ' \u00d7 power' : '')
     : changeText(card, now.change) + ' \u00b1 ' + changeText(card, bandFactor * now.deviation);
 }
@@ -85,6 +92,7 @@ function fetchHistory(periods) {
 }
 
 function showChanges(changes) {
+  watched.changed = new Set(changes.map((change) => change.name));
   if (changes.length === 0) {
     watched.changes.replaceChildren(tableRow([element('td', { class: 'quiet' }, 'none')]));
     return;
@@ -94,12 +102,12 @@ function showChanges(changes) {
 }
 
 // The value with its band over time, and a line at the model. Scaled to show all of both.
-function drawRibbon(context, width, height, index) {
+function drawRibbon(context, width, height, card) {
   const history = watched.history;
   if (!history || history.time_s.length < 2) return;
-  const time = history.time_s;
-  const low = history.change[index].map((v, k) => v - bandFactor * history.deviation[index][k]);
-  const high = history.change[index].map((v, k) => v + bandFactor * history.deviation[index][k]);
+  const [time, change, deviation] = [history.time_s, history.change[card.index], history.deviation[card.index]];
+  const low = change.map((v, k) => v - bandFactor * deviation[k]);
+  const high = change.map((v, k) => v + bandFactor * deviation[k]);
   const [least, most] = [Math.min(0, ...low), Math.max(0, ...high)];
   const x = (t) => width * (t - time[0]) / (time[time.length - 1] - time[0]);
   const y = (v) => 3 + (height - 6) * (most - v) / (most - least || 1);
@@ -116,6 +124,8 @@ function drawRibbon(context, width, height, index) {
   context.globalAlpha = 1;
   context.lineWidth = 1.3;
   context.beginPath();
-  time.forEach((t, k) => context.lineTo(x(t), y(history.change[index][k])));
+  time.forEach((t, k) => context.lineTo(x(t), y(change[k])));
   context.stroke();
+  drawText(context, changeText(card, most), 2, 2, { base: 'top', pixels: 10 });
+  drawText(context, changeText(card, least), 2, height - 2, { base: 'bottom', pixels: 10 });
 }
