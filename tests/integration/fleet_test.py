@@ -51,7 +51,7 @@ class FleetTest(unittest.TestCase):
 
     @classmethod
     def call(cls, *words, wanted=0, **options):
-        done = subprocess.run([cls.program, *map(str, words)], cwd=cls.work, capture_output=True, text=True,
+        done = subprocess.run([cls.program, "--verbosity", "quiet", *map(str, words)], cwd=cls.work, capture_output=True, text=True,
                               timeout=300, **options)
         if done.returncode != wanted:
             raise AssertionError(f"{words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
@@ -115,7 +115,7 @@ class FleetTest(unittest.TestCase):
         self.assertLess(min(done), LOGS, "every kill came too late")
 
     def test_two_processes_share_the_work(self):
-        both = [subprocess.Popen([self.program, "fleet", "fleet.yaml", "--json"], cwd=self.work,
+        both = [subprocess.Popen([self.program, "--verbosity", "quiet", "fleet", "fleet.yaml", "--json"], cwd=self.work,
                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)]
         errors = [process.communicate()[1] for process in both]
         for process, error in zip(both, errors):
@@ -139,7 +139,7 @@ class FleetTest(unittest.TestCase):
         self.expect_every_job_once()
 
     def test_a_crash_costs_one_job(self):
-        process = subprocess.Popen([self.program, "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
+        process = subprocess.Popen([self.program, "--verbosity", "quiet", "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
         while not children.read_text():
@@ -160,7 +160,7 @@ class FleetTest(unittest.TestCase):
     def test_completes_the_work_after_the_program_was_removed(self):
         copy = self.work / "fleet_program"
         shutil.copy(self.program, copy)
-        process = subprocess.Popen([copy, "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
+        process = subprocess.Popen([copy, "--verbosity", "quiet", "fleet", "fleet.yaml", "--workers", "1"], cwd=self.work,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
         while not children.read_text():
