@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Opens the dashboard of a running measurement in headless Chromium, at 1280 and 390 pixels, light and
 dark; compares what it draws with what `stageid frf` makes of the finished log; stops another measurement
-by its button, with the keyboard.
+by its button, with the keyboard; watches a third one, whose stage changes.
 
     check_dashboard.py PROGRAM CONFIGS WORK
 
@@ -29,9 +29,11 @@ def start(program, configs, work, name, pace, **numbers):
     """A paced run of a stage that may be late: its log, the program, a browser that shows it."""
     folder = work / name
     folder.mkdir(parents=True)
-    config = with_experiment(configs, folder, late=True, **numbers)
-    log = folder / "run.slog"
-    running = RunningProgram(program, config, "-o", log, "--pace", str(pace))
+    return show(program, with_experiment(configs, folder, late=True, **numbers), folder / "run.slog", pace)
+
+
+def show(program, config, log, pace, *flags):
+    running = RunningProgram(program, config, "-o", log, "--pace", str(pace), *flags)
     browser = Browser(find_browser())
     browser.resize(1280, 1600)
     browser.call("Page.navigate", url=running.url)
@@ -154,6 +156,53 @@ def stop_one(program, configs, work):
         running.close()
 
 
+def with_change(configs, folder):
+    """An experiment to watch, of a stage whose mode at 181 Hz changes by 0.1 % after 58 of its 100 periods of 0.1 s."""
+    shutil.copytree(configs, folder)
+    stage = folder / "stage/small_stage.yaml"
+    stage.write_text(stage.read_text() + """
+faults:
+  - {kind: mode_frequency, mode: 7, value: 1e-3, from_cycle: 12000}
+realtime: {policy: try, misses_allowed: 1000000}
+""")
+    experiment = folder / "experiment/small_stage_watch.yaml"
+    experiment.write_text(experiment.read_text().replace("period_s: 1", "period_s: 0.1").replace("periods: 120", "periods: 100"))
+    return experiment
+
+
+WATCH = """({ changes: Array.from(document.querySelectorAll('#watch .events tr'), (e) => e.textContent),
+  cards: document.querySelectorAll('.watch-card').length,
+  ribbons: Array.from(document.querySelectorAll('.ribbon canvas'), (c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)),
+  red: Array.from(document.querySelectorAll('.watch-card'), (e) => e.querySelector('.verdict.bad') ? e.title : '').filter(Boolean),
+  lit: document.querySelectorAll('.watch-card .verdict.good, .watch-card .verdict.doubt').length })"""
+
+
+def watch_a_change(program, configs, work):
+    model = work / "model"
+    subprocess.run([program, "identify", configs / "experiment/small_stage.yaml", "-o", model], capture_output=True, check=True)
+    log = work / "changed.slog"
+    log, running, browser = show(program, with_change(configs, work / "changed"), log, PACE, "--watch", model / "model.json", "--learn", "12")
+    try:
+        expect(browser.wait_for("window.stageidDashboard.state.watch.changes >= 1", 120), "no change was told")
+        metrics = running.get("metrics").decode()
+        expect("\nstageid_watch_changes_total 1\n" in metrics, "no change in the metrics")
+        expect('\nstageid_tracked_change{kind="frequency",name="frequency of the mode at 181.' in metrics, "no tracked value in the metrics")
+        expect(browser.wait_for("window.stageidDashboard.left", 120), "the page did not see the end")
+        code, out = running.wait()
+        expect(code == 3, f"exit code {code}: {out}")
+        seen = browser.evaluate(WATCH)
+        expect(len(seen["changes"]) == 1 and "181." in seen["changes"][0], f"changes: {seen['changes']}")
+        expect(len(seen["red"]) == 1 and "frequency of the mode at 181." in seen["red"][0], f"red lights: {seen['red']}")
+        expect(seen["lit"] == seen["cards"] - 1, f"{seen['lit']} of {seen['cards']} lights are on")
+        expect(len(seen["ribbons"]) == seen["cards"] - 2 and all(seen["ribbons"]), "a ribbon was not drawn")
+        check_widths(browser, work, "watched")
+        expect(browser.problems == [], f"the browser complains: {browser.problems}")
+        expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
+    finally:
+        browser.close()
+        running.close()
+
+
 def main():
     program, configs, work = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
     if find_browser() is None or h5py is None:
@@ -162,6 +211,7 @@ def main():
     work.mkdir(parents=True)
     watch_one(program, configs, work)
     stop_one(program, configs, work)
+    watch_a_change(program, configs, work)
     return verdict()
 
 
