@@ -106,6 +106,8 @@ case("Unsupported picture", "plot cmif frf.h5 -o picture.jpg")
 case("Report that is not a page", "report frf.h5 -o report.pdf")
 case("Rate of alarms without a unit", "watch model.json run.slog --false-alarms 3")
 case("Log that is too short to watch", "watch model.json run.slog")
+case("Run to watch around a missing model", f"{RUN} --watch none.json")
+case("Option of a watch without a watch", f"{RUN} --memory 10")
 
 case = chapter("Files of the wrong kind")
 case("Log instead of a frequency response", "fit run.slog -o new.json")
