@@ -6,6 +6,8 @@
 // kind: none, or a fault of the stage file (mode_frequency, sensor_gain, ...), planted at a random channel after the
 // learning and 8 periods. All actuators of the model are excited at once, on 500 lines, or by the first run of an
 // experiment of `stageid design --watch`; with its FRF, the forecast is compared with the scatter over the runs.
+// A ramp of a natural frequency grows from zero to `size`. Its lag is what the estimate is behind the change at the
+// middle of the newest period, divided by the change per period.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -97,6 +99,52 @@ stageid::test::ExcitedLoop make_loop(const stageid::StageConfig& config,
 struct Planted {
   std::string name;
   int period = 0;
+  double value = 0.0;
+};
+
+/// How far the estimates are behind ramps, in periods.
+class RampLag {
+ public:
+  RampLag(const Request& request, double memory_periods)
+      : ramp_(request.ramp), memory_(memory_periods) {}
+
+  /// @param change of the estimate since the learning   @param periods since the ramp began, at the middle of the last
+  void add(double change, double deviation, double value, double periods) {
+    if (periods > ramp_) return;
+    const double slope = value / ramp_;
+    const double lag = periods - change / slope;
+    lags_.push_back(lag);
+    deviation_ = std::max(deviation_, deviation / std::abs(slope));
+    within_ += lag <= memory_ + 2.0 * deviation / std::abs(slope) ? 1 : 0;
+    const auto block = static_cast<std::size_t>(periods) / kBlock;
+    if (block >= sums_.size()) sums_.resize(block + 1);
+    sums_[block].first += lag;
+    sums_[block].second += 1.0;
+  }
+  void print() {
+    if (lags_.empty()) return;
+    for (std::size_t i = 0; i < sums_.size(); ++i)
+      fmt::print("  periods {:4} to {:4} of the ramp: mean lag {:.1f} periods\n", i * kBlock,
+                 (i + 1) * kBlock, sums_[i].first / sums_[i].second);
+    std::sort(lags_.begin(), lags_.end());
+    const auto part = [&](double share) {
+      return lags_[static_cast<std::size_t>(share * static_cast<double>(lags_.size() - 1))];
+    };
+    fmt::print(
+        "lag median {:.1f}, 95 % {:.1f}, largest {:.1f} periods; largest deviation {:.1f} periods; "
+        "within the memory of {:.0f} and two deviations {:.1f} %\n",
+        part(0.5), part(0.95), part(1.0), deviation_, memory_,
+        100.0 * within_ / static_cast<double>(lags_.size()));
+  }
+
+ private:
+  static constexpr std::size_t kBlock = 50;
+  double ramp_;
+  double memory_;
+  std::vector<double> lags_;
+  std::vector<std::pair<double, double>> sums_;  // of lags, and their number, by block
+  double deviation_ = 0.0;
+  int within_ = 0;
 };
 
 Planted plant_change(const Request& request, int learning, int period_samples,
@@ -166,6 +214,7 @@ Planted plant_change(const Request& request, int learning, int period_samples,
     planted.name = "delay";
     fault.channel = 0;
   }
+  planted.value = fault.value;
   simulation.faults.push_back(fault);
   return planted;
 }
@@ -210,6 +259,8 @@ int main(int argc, char** argv) {
   std::vector<int> delays;
   Eigen::ArrayXd sum, square, inside;
   double counted = 0.0;
+  RampLag lag(request, stageid::TrackerOptions{}.memory_periods);
+  int later_alarms = 0, later_right = 0;
   double tracking_s = 0.0, simulated_s = 0.0, slowest_s = 0.0;
   for (int run = 0; run < request.runs; ++run) {
     const std::uint64_t seed = request.seed + static_cast<std::uint64_t>(run);
@@ -225,6 +276,11 @@ int main(int argc, char** argv) {
     auto loop = make_loop(config, simulation, model, excitation_of(seed), seed);
     stageid::ModelTracker tracker(model, frequency_hz, options);
     bool seen = false;
+    Eigen::Index ramped = -1;
+    if (request.ramp > 0.0 && request.kind == "mode_frequency")
+      for (std::size_t i = 0; i < tracker.parameters().size(); ++i)
+        if (describe(tracker.parameters()[i], model) == planted.name)
+          ramped = static_cast<Eigen::Index>(i);
     Eigen::VectorXd learned_estimate;
     const int n_y = static_cast<int>(config.spec.info.sensors.size());
     const double rate_hz = config.spec.info.sample_rate_hz;
@@ -246,10 +302,19 @@ int main(int argc, char** argv) {
       slowest_s = std::max(slowest_s, spent_s);
       if (!state.learning) ++watched;
       if (p + 1 == options.learning_periods) learned_estimate = tracker.estimate();
+      if (ramped >= 0 && p >= planted.period)
+        lag.add(tracker.estimate()[ramped] - learned_estimate[ramped],
+                std::sqrt(tracker.covariance()(ramped, ramped)), planted.value,
+                p - planted.period + 0.5);
       if (getenv("DBG") && state.noise_power.size() > 0)
         fmt::print("{:.3f}\n", fmt::join(state.noise_power, " "));
       if (state.change) {
         ++alarms;
+        if (!planted.name.empty() && p >= planted.period) {
+          ++later_alarms;
+          if (describe(state.change->what, tracker.parameters(), model) == planted.name)
+            ++later_right;
+        }
         if (!planted.name.empty() && p >= planted.period && !seen) {
           seen = true;
           ++detected;
@@ -301,6 +366,9 @@ int main(int argc, char** argv) {
     fmt::print("{} of {} detected, {} named right; delay median {}, 95 % {} periods\n", detected,
                request.runs, named, delays.empty() ? 0 : delays[delays.size() / 2],
                delays.empty() ? 0 : delays[delays.size() * 95 / 100]);
+    fmt::print("{} alarms after the change began, {} of them with its name\n", later_alarms,
+               later_right);
+    lag.print();
     return 0;
   }
   if (forecast) {

@@ -41,6 +41,9 @@ class ExcitedLoop {
     setpoint_ = std::move(setpoint);
   }
 
+  /// The next periods have another excitation, of as many samples.
+  void excite(Eigen::MatrixXd excitation) { excitation_ = std::move(excitation); }
+
   PeriodSpectra next() {
     const Eigen::Index N = excitation_.rows();
     Eigen::MatrixXd u(N, u_.size());
