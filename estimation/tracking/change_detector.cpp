@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -64,6 +65,9 @@ ChangeDetector::ChangeDetector(const Eigen::MatrixXd& correlation, Eigen::Vector
     : freedom_(std::move(freedom)),
       reference_periods_(reference_periods),
       sums_(Eigen::ArrayXXd::Zero(correlation.rows(), kLongest + 1)) {
+  if (!correlation.allFinite() || !freedom_.allFinite())
+    throw std::invalid_argument(
+        "the scatter of the learned periods is not a number; check the recorded signals");
   calibrate(correlation, false_alarms_per_period);
 }
 

@@ -18,6 +18,7 @@ namespace stageid {
 class ChangeDetector {
  public:
   /// @param correlation of the scores, H x H   @param freedom of their variances, H, at least 2
+  /// @throws std::invalid_argument if a value is not finite
   /// @param false_alarms_per_period above 0, at most 0.1
   ChangeDetector(const Eigen::MatrixXd& correlation, Eigen::VectorXd freedom,
                  double false_alarms_per_period, int reference_periods);

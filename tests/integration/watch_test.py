@@ -245,6 +245,30 @@ class WatchTest(ProcessTest):
         told = self.watch("same.slog", 3, "--learn", "500")
         self.assertEqual((told["changes"], told["learning_periods"]), ([], 120))
 
+    def test_a_model_of_another_stage(self):
+        model = json.loads((WORK / "model/model.json").read_text())
+        model["submodels"] = [model["submodels"][i] for i in range(2)]
+        (WORK / "few.json").write_text(json.dumps(model))
+        done = self.call("watch", "few.json", "same.slog", "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("does not describe the response of sensor", done.stderr)
+
+    def test_a_sensor_that_stuck_before(self):
+        text = (CONFIGS / "stage/small_stage.yaml").read_text()
+        self.record("stuck", "kind: sensor_gain, channel: s2, value: 0, from_cycle: 1")
+        done = self.call("watch", "model/model.json", "stuck.slog")
+        self.assertEqual(done.returncode, 3, done.stdout)
+        self.assertIn("s2", done.stderr)
+        (WORK / "configs/stage/small_stage.yaml").write_text(text)
+
+    def test_inputs_are_not_overwritten(self):
+        before = (WORK / "model/model.json").read_bytes()
+        for flag in ("--events", "-o"):
+            for file in ("model/model.json", "same.slog"):
+                done = self.call("watch", "model/model.json", "same.slog", flag, file)
+                self.assertEqual(done.returncode, 2, (flag, file, done.stderr))
+        self.assertEqual((WORK / "model/model.json").read_bytes(), before)
+
     def test_requests_that_cannot_be_met(self):
         for flags in (["--false-alarms", "3"], ["--false-alarms", "1/minute"], ["--band", "900", "950"], ["--learn", "2"]):
             done = self.call("watch", "model/model.json", "same.slog", *flags)

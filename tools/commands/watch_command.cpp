@@ -12,6 +12,7 @@
 #include "tools/commands/commands.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/output_paths.hpp"
 #include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
@@ -28,6 +29,8 @@ struct WatchFlags {
 
 void watch(const WatchFlags& flags, Console& console) {
   StageWatch watch(flags.options, console);
+  for (const std::filesystem::path& output : {flags.output, flags.events})
+    if (!output.empty()) require_no_input(output, {flags.options.model, flags.log});
   std::optional<EventLog> events;
   if (!flags.output.empty()) watch.write_tracks(flags.output);
   if (!flags.events.empty()) watch.write_events(events.emplace(flags.events));
@@ -40,7 +43,7 @@ void watch(const WatchFlags& flags, Console& console) {
     });
   }
   if (watch.stage_changed()) console.exit_code = kNotTrustworthy;
-  if (const std::string why = watch.too_short(); !why.empty()) {
+  if (const std::string why = watch.doubt(); !why.empty()) {
     console.exit_code = kNotTrustworthy;
     console.warning(fmt::format("{}: {}", flags.log.string(), why));
   }

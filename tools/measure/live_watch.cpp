@@ -20,7 +20,7 @@ LiveWatch::LiveWatch(StageWatch& watch, std::filesystem::path log)
         ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest);
         try {
           watch.run(log, true, [this](double) { return !stop_ && !interrupt_flag(); });
-          failure_ = watch.too_short();
+          failure_ = watch.doubt();
         } catch (const std::exception& error) {  // errors must not affect the measurement
           failure_ = error.what();
         }

@@ -17,6 +17,9 @@
 namespace stageid {
 namespace {
 
+/// A model whose error is a larger share of the response gives sizes of changes that are as wrong.
+constexpr double kDescribes = 0.2;
+
 /// "1/year", "2/day", "0.001/period", as a number per period.
 double false_alarms_per_period(const std::string& text, double period_s) {
   const std::array<std::pair<const char*, double>, 5> units = {{{"period", period_s},
@@ -172,11 +175,19 @@ nlohmann::ordered_json StageWatch::state_of(const TrackedPeriod& tracked) const 
   return json;
 }
 
-std::string StageWatch::too_short() const {
-  if (periods_ >= options_.learn) return "";
-  return fmt::format(
-      "{} of {} periods to learn from; nothing was watched. Record more periods, or use --learn",
-      periods_, options_.learn);
+std::string StageWatch::doubt() const {
+  if (periods_ < options_.learn)
+    return fmt::format(
+        "{} of {} periods to learn from; nothing was watched. Record more periods, or use --learn",
+        periods_, options_.learn);
+  const Eigen::VectorXd& error = tracker_->reference().relative_error;
+  for (Eigen::Index i = 0; i < error.size(); ++i)
+    if (!(error[i] < kDescribes))
+      return fmt::format(
+          "the model {} does not describe the response of sensor '{}' ({:.2g} times the response "
+          "remain); changes are not told reliably. Check this sensor, or identify the stage again",
+          options_.model.string(), model_.outputs.name(i), error[i]);
+  return "";
 }
 
 std::vector<std::string> StageWatch::lines() const {

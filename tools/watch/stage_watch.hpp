@@ -53,8 +53,8 @@ class StageWatch {
 
   /// Whether the stage itself has changed.
   bool stage_changed() const noexcept { return stage_changed_; }
-  /// Why nothing was watched; empty if something was.
-  std::string too_short() const;
+  /// Why the watch says nothing of the stage: too few periods, or another model would be needed; empty if it does.
+  std::string doubt() const;
   /// Changes of all properties as a table; then one line with the counts.
   std::vector<std::string> lines() const;
   std::string summary() const;

@@ -5,6 +5,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 #include <vector>
 
 #include "tests/support/process/random_numbers.hpp"
@@ -151,6 +153,15 @@ TEST(ChangeDetector, ALongWatchKeepsItsWindows) {
   EXPECT_NEAR(detector.largest(), 1.0, 1e-5);
   EXPECT_NEAR(detector.mean_scores(512)[0], 0.0, 1e-12);
   EXPECT_NEAR(detector.mean_scores(511)[0], -1.0 / 511.0, 1e-12);
+}
+
+TEST(ChangeDetector, RefusesScoresWithoutVariance) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
+  EXPECT_THROW(ChangeDetector(one, Eigen::VectorXd::Constant(1, nan), 1e-6, 32),
+               std::invalid_argument);
+  EXPECT_THROW(ChangeDetector(nan * one, Eigen::VectorXd::Constant(1, 30.0), 1e-6, 32),
+               std::invalid_argument);
 }
 
 }  // namespace test_change_detector
