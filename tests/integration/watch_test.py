@@ -8,6 +8,7 @@ told with its name and size, also while the log grows and by `run --watch`, and 
 import json
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -172,6 +173,24 @@ class WatchTest(ProcessTest):
             done = self.run_watched(None, *flags, model=model)
             self.assertIn(done.returncode, (1, 2))
             self.assertFalse((WORK / "live.slog").exists())
+
+    def test_the_watch_yields_to_the_loop_and_ends_with_it(self):
+        self.write_stage()
+        with (WORK / "configs/stage/small_stage.yaml").open("a") as stage:
+            stage.write("\nrealtime: {policy: off, misses_allowed: 1000000}\n")
+        (WORK / "paced.slog").unlink(missing_ok=True)
+        run = self.spawn_run("configs/experiment/small_stage_watch.yaml", "-o", "paced.slog", "--pace", "1", "--watch", "model/model.json")
+        nice = lambda: {int(stat.read_text().rpartition(")")[2].split()[16]) for stat in pathlib.Path(f"/proc/{run.pid}/task").glob("*/stat")}
+        until = time.monotonic() + 20
+        while not (WORK / "paced.slog").exists() or len(nice()) < 2:
+            self.assertLess(time.monotonic(), until, "no thread has another priority")
+            time.sleep(0.05)
+        self.assertEqual(max(nice()), 19)
+        time.sleep(1)
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(timeout=30), 130)
+        self.assertEqual(self.call("log", "verify", "paced.slog").returncode, 0)
+        run.stderr.close()
 
     def test_a_resumed_run_is_watched_from_its_start(self):
         self.write_stage()
