@@ -272,14 +272,6 @@ class WatchTest(ProcessTest):
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertIn("does not describe the response of sensor", done.stderr)
 
-    def test_a_sensor_that_stuck_before(self):
-        text = (CONFIGS / "stage/small_stage.yaml").read_text()
-        self.record("stuck", "kind: sensor_gain, channel: s2, value: 0, from_cycle: 1")
-        done = self.call("watch", "model/model.json", "stuck.slog")
-        self.assertEqual(done.returncode, 3, done.stdout)
-        self.assertIn("s2", done.stderr)
-        (WORK / "configs/stage/small_stage.yaml").write_text(text)
-
     def test_inputs_are_not_overwritten(self):
         before = (WORK / "model/model.json").read_bytes()
         for flag in ("--events", "-o"):
