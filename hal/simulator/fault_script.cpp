@@ -34,6 +34,7 @@ constexpr FaultTraits kTraits[] = {
     {FaultTarget::mode, true, true},        // mode_damping
     {FaultTarget::sensor, true, true},      // sensor_gain
     {FaultTarget::sensor, true, true},      // sensor_noise
+    {FaultTarget::actuator, false, true},   // added_mass
 };
 static_assert(std::size(kTraits) == kWords<Kind>.size());
 
@@ -116,10 +117,52 @@ FaultScript::FaultScript(std::vector<SimulationSpec::Fault> faults, const StageI
     if (target_of(faults_[i]) == FaultTarget::mode && modes_.empty())
       for (const PlantMode& mode : modes)
         modes_.push_back({mode.natural_frequency_hz, mode.damping_ratio});
+    if (faults_[i].kind == Kind::added_mass) load(faults_[i], info, modes);
     if (faults_[i].kind == Kind::extra_delay)
       history_cycles_ = std::max(history_cycles_, static_cast<std::size_t>(faults_[i].value) + 1);
   }
   history_.assign(history_cycles_ * info.actuators.size(), 0.0);
+  tuned_ = modes_;
+}
+
+void FaultScript::load(const Fault& fault, const StageInfo& info,
+                       const std::vector<PlantMode>& modes) {
+  require(loaded_.empty(), "faults: only one entry may be added_mass; add the masses up");
+  const Eigen::Index actuator = fault.channel;
+  Eigen::VectorXd shape(std::ssize(modes));
+  for (Eigen::Index i = 0; i < shape.size(); ++i) {
+    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
+    require(mode.natural_frequency_hz > 0.0,
+            "faults: added_mass needs natural frequencies above 0, but mode {} has 0 Hz; set "
+            "suspension_hz",
+            i);
+    shape[i] =
+        mode.actuator_shape[actuator] / info.actuators[static_cast<std::size_t>(actuator)].gain;
+  }
+  require(1.0 + fault.value * shape.squaredNorm() > 0.0,
+          "faults: added_mass is {} kg; must be above {:.6g} kg, which is all that moves there",
+          fault.value, -1.0 / shape.squaredNorm());
+  const int steps = fault.ramp_s > 0.0 ? kMassSteps : 1;
+  for (int step = 0; step <= steps; ++step)
+    loaded_.push_back(loaded_modes(modes, shape, fault.value * step / steps));
+  // Without the mass, the modes are those given, not only up to rounding.
+  const Eigen::Index n = std::ssize(modes);
+  loaded_.front() = {modes, Eigen::MatrixXd::Identity(n, n), Eigen::MatrixXd::Identity(n, n)};
+}
+
+void FaultScript::carry(std::uint64_t cycle, ModalPlant& plant) noexcept {
+  std::size_t wanted = 0;
+  for (const Fault& fault : faults_)
+    if (fault.kind == Kind::added_mass && active(fault, cycle))
+      wanted = static_cast<std::size_t>(
+          std::lround(growth(fault, cycle) * static_cast<double>(loaded_.size() - 1)));
+  if (wanted == load_) return;
+  plant.reload(loaded_[load_], loaded_[wanted]);
+  load_ = wanted;
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const PlantMode& mode = loaded_[load_].modes[i];
+    modes_[i] = {mode.natural_frequency_hz, mode.damping_ratio};
+  }
   tuned_ = modes_;
 }
 
@@ -157,7 +200,9 @@ void FaultScript::drive(std::uint64_t cycle, std::span<const double> applied,
                         std::span<double> u) noexcept {
   if (!history_.empty()) delay(cycle, u);
   for (const Fault& fault : faults_) {
-    if (target_of(fault) != FaultTarget::actuator || !active(fault, cycle)) continue;
+    if (target_of(fault) != FaultTarget::actuator || fault.kind == Kind::added_mass ||
+        !active(fault, cycle))
+      continue;
     for (std::size_t i = 0; i < u.size(); ++i)
       if (hits(fault, i))
         u[i] = fault.kind == Kind::stuck_actuator ? applied[i] : factor(fault, cycle) * u[i];
@@ -165,6 +210,7 @@ void FaultScript::drive(std::uint64_t cycle, std::span<const double> applied,
 }
 
 void FaultScript::retune(std::uint64_t cycle, ModalPlant& plant) noexcept {
+  if (!loaded_.empty()) carry(cycle, plant);
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     Mode mode = modes_[i];
     for (const Fault& fault : faults_) {

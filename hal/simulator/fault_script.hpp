@@ -34,14 +34,17 @@ FaultTraits fault_traits(SimulationSpec::Fault::Kind kind) noexcept;
 ///   extra_delay     delays all forces by `value` samples
 ///   mode_frequency  multiplies the natural frequency by 1 + `value`; the motion has no step
 ///   mode_damping    multiplies the damping ratio by 1 + `value`
+///   added_mass      `value` kg (kg m^2 at a torque) that moves with an actuator along its direction: loaded_modes()
 ///   interlock       switches the amplifiers off: forces zero, measurements continue: fault
 ///
 /// All last until the end of the run, except missed_cycle, which lasts `cycles`. Those with a `value` may have
 /// channel -1: all channels, or all flexible modes. With `ramp_s` the change grows linearly from zero at t_(from_cycle);
 /// not for sensor_drift. Forces and modes have the value at the middle of a cycle, sensors that at the sample, and
-/// extra_delay whole samples.
+/// extra_delay whole samples. A mass grows in
+/// kMassSteps equal steps.
 class FaultScript {
  public:
+  static constexpr int kMassSteps = 100;
   /// @throws std::invalid_argument if a channel or mode does not exist, a missed_cycle has no cycles, or a value or a
   /// ramp is invalid.
   FaultScript(std::vector<SimulationSpec::Fault> faults, const StageInfo& info,
@@ -65,6 +68,8 @@ class FaultScript {
  private:
   using Fault = SimulationSpec::Fault;
   bool active(const Fault& fault, std::uint64_t cycle) const noexcept;
+  void load(const Fault& fault, const StageInfo& info, const std::vector<PlantMode>& modes);
+  void carry(std::uint64_t cycle, ModalPlant& plant) noexcept;
   double growth(const Fault& fault, std::uint64_t cycle) const noexcept;
   double factor(const Fault& fault, std::uint64_t cycle) const noexcept;
   void delay(std::uint64_t cycle, std::span<double> u) noexcept;
@@ -81,6 +86,9 @@ class FaultScript {
   std::vector<double> history_;  // ring of past forces; empty if no fault adds a delay
   std::vector<Mode> modes_;      // without faults; empty if no fault changes a mode
   std::vector<Mode> tuned_;      // in this cycle
+  std::vector<LoadedModes>
+      loaded_;            // with the share i / (size - 1) of the added mass; empty without
+  std::size_t load_ = 0;  // in this cycle
   int run_ = -1;
 };
 

@@ -62,13 +62,28 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
   held_.setZero(modes_, static_cast<Eigen::Index>(whole) + 2);
   q_.setZero(modes_);
   v_.setZero(modes_);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
-    retune(i, mode.natural_frequency_hz, mode.damping_ratio);
-    actuator_shape_.row(i) = mode.actuator_shape.transpose();
-    sensor_shape_.col(i).head(sensors_) = mode.sensor_shape;
-    if (mode.acceleration_shape.size() > 0) acceleration_shape_.col(i) = mode.acceleration_shape;
+  unloaded_.setZero(count);
+  for (Eigen::Index i = 0; i < count; ++i) take(i, modes[static_cast<std::size_t>(i)]);
+}
+
+void ModalPlant::take(Eigen::Index i, const PlantMode& mode) noexcept {
+  retune(i, mode.natural_frequency_hz, mode.damping_ratio);
+  actuator_shape_.row(i) = mode.actuator_shape.transpose();
+  sensor_shape_.col(i).head(sensors_) = mode.sensor_shape;
+  if (mode.acceleration_shape.size() > 0) acceleration_shape_.col(i) = mode.acceleration_shape;
+}
+
+void ModalPlant::reload(const LoadedModes& from, const LoadedModes& to) noexcept {
+  const Eigen::Index n = unloaded_.size();
+  for (Eigen::ArrayXd* motion : {&q_, &v_}) {
+    unloaded_.noalias() = from.basis * motion->head(n).matrix();
+    motion->head(n).matrix().noalias() = to.inverse * unloaded_;
   }
+  for (Eigen::Index c = 0; c < held_.cols(); ++c) {
+    unloaded_.noalias() = from.inverse.transpose() * held_.col(c).head(n).matrix();
+    held_.col(c).head(n).matrix().noalias() = to.basis.transpose() * unloaded_;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) take(i, to.modes[static_cast<std::size_t>(i)]);
 }
 
 void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "hal/simulator/added_mass.hpp"
 #include "hal/simulator/plant_spec.hpp"
 
 namespace stageid {
@@ -35,6 +36,9 @@ class ModalPlant {
   /// Changes frequency and damping ratio of a mode from this instant on, without a step in its motion. Does not
   /// allocate.
   void retune(Eigen::Index mode, double natural_frequency_hz, double damping_ratio) noexcept;
+  /// Changes all modes from this instant on, without a step in motion or forces. Does not allocate.
+  /// @param from the present modes   @param to as many modes, of the same plant with another mass
+  void reload(const LoadedModes& from, const LoadedModes& to) noexcept;
   /// Adds a modal force that is undelayed and constant during the next step().
   void add_modal_force(Eigen::Index mode, double force) noexcept {
     extra_mode_ = mode;
@@ -43,6 +47,7 @@ class ModalPlant {
 
  private:
   void add_accelerations(double* y) const noexcept;
+  void take(Eigen::Index i, const PlantMode& mode) noexcept;
   void modal_force(const double* u, double* force) const noexcept;
 
   double period_s_ = 0.0;
@@ -60,6 +65,7 @@ class ModalPlant {
   Eigen::Index newest_ = 0;
   Eigen::ArrayXd q_;
   Eigen::ArrayXd v_;
+  Eigen::VectorXd unloaded_;  // scratch of reload()
   Eigen::Index extra_mode_ = -1;
   double extra_force_ = 0.0;
   Eigen::Index last_extra_mode_ = -1;  // of the last step

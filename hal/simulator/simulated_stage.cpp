@@ -129,7 +129,12 @@ struct SimulatedStage::State {
 
 SimulatedStage::SimulatedStage(const StageInfo& info, const PlantSpec& plant,
                                const SimulationSpec& simulation, double pace)
-    : state_(std::make_unique<State>(info, plant, checked(simulation, pace), pace)) {}
+    : state_(std::make_unique<State>(info, plant, checked(simulation, pace), pace)) {
+  for (const SimulationSpec::Fault& fault : simulation.faults)
+    require(
+        fault.kind != SimulationSpec::Fault::Kind::added_mass || plant.cubic_stiffness_n_m3 == 0.0,
+        "faults: added_mass needs a linear plant; remove it, or set cubic_stiffness_n_m3 to 0");
+}
 
 SimulatedStage::~SimulatedStage() = default;
 

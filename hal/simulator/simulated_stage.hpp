@@ -38,14 +38,15 @@ struct SimulationSpec {
       mode_frequency,
       mode_damping,
       sensor_gain,
-      sensor_noise
+      sensor_noise,
+      added_mass
     };
     Kind kind = Kind::none;
     int channel = 0;  ///< or index into plant_modes(); -1: all, where FaultScript allows it
     std::uint64_t from_cycle = 0;
     std::uint64_t cycles = 1;  ///< missed_cycle: number of cycles
     int run = -1;              ///< affected start() of the process, 0-based; -1: all
-    double value = 0.0;        ///< m, m/s, factor, relative change or samples: see FaultScript
+    double value = 0.0;        ///< m, m/s, factor, relative change, samples, kg: see FaultScript
     double ramp_s = 0.0;       ///< the change grows linearly over this time; 0: a step
   };
   std::vector<Fault> faults;
@@ -53,9 +54,10 @@ struct SimulationSpec {
 };
 template <>
 inline constexpr std::array kWords<SimulationSpec::Fault::Kind> = {
-    "none",           "dead_sensor",    "nan_sensor",    "missed_cycle", "interlock",
-    "stuck_actuator", "stuck_sensor",   "sensor_offset", "sensor_drift", "actuator_gain",
-    "extra_delay",    "mode_frequency", "mode_damping",  "sensor_gain",  "sensor_noise"};
+    "none",         "dead_sensor",    "nan_sensor",   "missed_cycle",
+    "interlock",    "stuck_actuator", "stuck_sensor", "sensor_offset",
+    "sensor_drift", "actuator_gain",  "extra_delay",  "mode_frequency",
+    "mode_damping", "sensor_gain",    "sensor_noise", "added_mass"};
 
 /// The simulated stage in modal coordinates, discretized exactly (zero-order hold, non-integer delay).
 ///

@@ -3,7 +3,7 @@
 //   watch_study STAGE.yaml MODEL.json [runs = 20] [periods = 100] [kind = none] [size = 1e-5] [rms of an axis, N = 0.2]
 //               [first seed = 1] [false alarms per period = 1e-3] [ramp in periods = 0] [EXPERIMENT.yaml FRF.h5]
 //
-// kind: none, or a fault of the stage file (mode_frequency, sensor_gain, ...), planted at a random channel after the
+// kind: none, or a fault of the stage file (mode_frequency, sensor_gain, added_mass ...), planted at a random channel after the
 // learning and 8 periods. All actuators of the model are excited at once, on 500 lines, or by the first run of an
 // experiment of `stageid design --watch`; with its FRF, the forecast is compared with the scatter over the runs.
 // A ramp of a natural frequency grows from zero to `size`. Its lag is what the estimate is behind the change at the
@@ -210,6 +210,14 @@ Planted plant_change(const Request& request, int learning, int period_samples,
     const std::string& name = model.inputs.name(p.index);
     planted.name = "gain of actuator '" + name + "'";
     fault.channel = stageid::channel_index(config.spec.info.actuators, name);
+  } else if (kind == "added_mass") {
+    // The tracker has no such name; the study prints what it is called instead.
+    fault.channel = stageid::channel_index(
+        config.spec.info.actuators,
+        model.inputs.name(random.integer(0, static_cast<int>(model.n_inputs()) - 1)));
+    fault.value = request.size;
+    planted.name = "mass at actuator '" +
+                   config.spec.info.actuators[static_cast<std::size_t>(fault.channel)].name + "'";
   } else {
     planted.name = "delay";
     fault.channel = 0;

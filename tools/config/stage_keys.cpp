@@ -275,7 +275,7 @@ void describe_fault(ConfigVisitor& v, std::vector<FaultConfig>& list) {
   v.number("value", f.fault.value, any_number(""), kOptional,
            "sensor_offset: m; sensor_drift: m/s; actuator_gain, sensor_gain: factor, -1 reversed, "
            "0 dead; sensor_noise: factor; mode_frequency, mode_damping: relative change; "
-           "extra_delay: samples");
+           "extra_delay: samples; added_mass: kg");
   v.number("ramp_s", f.fault.ramp_s, not_negative("s"), kOptional,
            "the change grows linearly over this time; 0: a step");
   v.require(f.fault.ramp_s == 0.0 || traits.may_ramp, "ramp_s",

@@ -61,6 +61,14 @@ TEST_F(Allocation, ABrakeHasNone) {
   EXPECT_EQ(seen, 1000);
 }
 
+TEST_F(Allocation, AMassThatGrowsHasNone) {
+  test::SimulatedSpec spec = test::wafer_stage_spec();
+  spec.simulation.faults = {{Kind::added_mass, 2, 500, 1, -1, 0.3, 0.1}};
+  int seen = 0;
+  EXPECT_EQ(cycles(spec, seen), 0U);
+  EXPECT_EQ(seen, 0);
+}
+
 TEST_F(Allocation, ACycleWithEveryOptionHasNone) {
   test::SimulatedSpec spec = test::wafer_stage_spec();
   spec.plant.cubic_stiffness_n_m3 = 1e9;
