@@ -101,13 +101,13 @@ class Bench {
       if (p % (1 + measured) == 0) loop.excite(samples(plan, experiment));
       const PeriodSpectra period = loop.next();
       if (p % (1 + measured) > 0) {
-        Eigen::MatrixXcd both(period.Y.rows() + period.U.rows(), period.Y.cols());
-        both << period.Y, period.U;
-        Z[static_cast<std::size_t>(experiment)].push_back(std::move(both));
+        Z[static_cast<std::size_t>(experiment)].emplace_back(model_.n_outputs() + model_.n_inputs(),
+                                                             period.Y.cols());
+        Z[static_cast<std::size_t>(experiment)].back() << period.Y, period.U;
       }
       trace.emplace_back();
       if (p % block + 1 < block) continue;
-      trace.back() = fitted(plan, Z);
+      trace.back() = fitted(Z);
       for (auto& runs : Z) runs.clear();
     }
     return trace;
@@ -198,8 +198,7 @@ class Bench {
     return model_.submodels[static_cast<std::size_t>(modes_[static_cast<std::size_t>(mode)].index)];
   }
 
-  Eigen::VectorXd fitted(const stageid::ExperimentPlan& plan,
-                         const std::vector<std::vector<Eigen::MatrixXcd>>& Z) const {
+  Eigen::VectorXd fitted(const std::vector<std::vector<Eigen::MatrixXcd>>& Z) const {
     const Eigen::Index n_y = model_.n_outputs(), n_u = model_.n_inputs(), E = std::ssize(Z);
     stageid::FrfEstimate frf;
     frf.frequency_hz = frequency_hz_;
@@ -212,19 +211,18 @@ class Bench {
     const Eigen::VectorXd periods = Eigen::VectorXd::Constant(E, static_cast<double>(Z[0].size()));
     const int dof = static_cast<int>(E * (std::ssize(Z[0]) - 1));
     frf.noise_dof = dof;
-    std::vector<Eigen::MatrixXcd> spectrum;
-    for (int e = 0; e < E; ++e) spectrum.push_back(plan.spectrum({0, e}));
     for (Eigen::Index k = 0; k < frequency_hz_.size(); ++k) {
-      Eigen::MatrixXcd R(n_u, E), mean = Eigen::MatrixXcd::Zero(n_y + n_u, E);
+      Eigen::MatrixXcd mean = Eigen::MatrixXcd::Zero(n_y + n_u, E);
       Eigen::MatrixXcd scatter = Eigen::MatrixXcd::Zero(n_y + n_u, n_y + n_u);
       for (Eigen::Index e = 0; e < E; ++e) {
         const auto& runs = Z[static_cast<std::size_t>(e)];
-        R.col(e) = spectrum[static_cast<std::size_t>(e)].col(k);
         for (const auto& z : runs) mean.col(e) += z.col(k) / periods[e];
         for (const auto& z : runs)
           scatter += (z.col(k) - mean.col(e)) * (z.col(k) - mean.col(e)).adjoint();
       }
-      const stageid::LineEstimate line = stageid::estimate_line(R, mean, n_y);
+      // With as many experiments as inputs, the response does not depend on the excitation's spectrum.
+      const stageid::LineEstimate line =
+          stageid::estimate_line(Eigen::MatrixXcd::Identity(n_u, E), mean, n_y);
       const stageid::LineNoise noise = stageid::line_noise(line, scatter, dof, periods);
       frf.response.col(k) = line.G.reshaped();
       frf.noise_variance.col(k) =

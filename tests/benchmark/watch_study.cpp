@@ -314,8 +314,6 @@ int main(int argc, char** argv) {
         lag.add(tracker.estimate()[ramped] - learned_estimate[ramped],
                 std::sqrt(tracker.covariance()(ramped, ramped)), planted.value,
                 p - planted.period + 0.5);
-      if (getenv("DBG") && state.noise_power.size() > 0)
-        fmt::print("{:.3f}\n", fmt::join(state.noise_power, " "));
       if (state.change) {
         ++alarms;
         if (!planted.name.empty() && p >= planted.period) {
