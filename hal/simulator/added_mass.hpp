@@ -15,8 +15,8 @@ namespace stageid {
 /// M^(-1/2) K M^(-1/2), so frequencies and shapes are exact. Damping ratios are those of the diagonal of B^T C B: the
 /// coupling of modes by damping is neglected, as in a plant with one damping ratio per mode.
 struct LoadedModes {
-  std::vector<PlantMode>
-      modes;  ///< in the order of those without mass: the k-th lowest replaces the k-th lowest
+  /// In the order of those without mass: the k-th lowest replaces the k-th lowest.
+  std::vector<PlantMode> modes;
   Eigen::MatrixXd basis;    ///< B: coordinates without the mass = B coordinates with it
   Eigen::MatrixXd inverse;  ///< B^-1
 };

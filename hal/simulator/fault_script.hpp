@@ -40,8 +40,7 @@ FaultTraits fault_traits(SimulationSpec::Fault::Kind kind) noexcept;
 /// All last until the end of the run, except missed_cycle, which lasts `cycles`. Those with a `value` may have
 /// channel -1: all channels, or all flexible modes. With `ramp_s` the change grows linearly from zero at t_(from_cycle);
 /// not for sensor_drift. Forces and modes have the value at the middle of a cycle, sensors that at the sample, and
-/// extra_delay whole samples. A mass grows in
-/// kMassSteps equal steps.
+/// extra_delay whole samples. A mass grows in kMassSteps equal steps.
 class FaultScript {
  public:
   static constexpr int kMassSteps = 100;
@@ -86,9 +85,9 @@ class FaultScript {
   std::vector<double> history_;  // ring of past forces; empty if no fault adds a delay
   std::vector<Mode> modes_;      // without faults; empty if no fault changes a mode
   std::vector<Mode> tuned_;      // in this cycle
-  std::vector<LoadedModes>
-      loaded_;            // with the share i / (size - 1) of the added mass; empty without
-  std::size_t load_ = 0;  // in this cycle
+  // With the share i / (size - 1) of the added mass; empty without. The index of this cycle.
+  std::vector<LoadedModes> loaded_;
+  std::size_t load_ = 0;
   int run_ = -1;
 };
 

@@ -119,9 +119,9 @@ void run_command(CLI::App& app, Console& console) {
                      "live view in a browser. PORT: on this machine (0: any free port) | "
                      "HOST:PORT: also on other machines. These and the stop button need the "
                      "access token in the printed address");
-  CLI::Option* const watch = command.add_option(
-      "--watch", flags.watch.model,
-      "model.json: watch the stage around this model meanwhile, and tell what changes");
+  CLI::Option* const watch =
+      command.add_option("--watch", flags.watch.model,
+                         "model.json: report how the stage differs from this model during the run");
   for (CLI::Option* const option : add_watch_options(command, flags.watch)) option->needs(watch);
   command.add_flag("--reset-fault", flags.request.reset_fault,
                    "clear a fault of the node or plant before the first run");

@@ -92,8 +92,8 @@ class Database {
   Database& operator=(const Database&) = delete;
 
   const std::filesystem::path& file() const noexcept { return file_; }
-  Statement prepare(
-      const std::string& sql) const;  ///< @throws std::invalid_argument also if there are several
+  /// @throws std::invalid_argument if it is not one statement
+  Statement prepare(const std::string& sql) const;
   void execute(const std::string& sql) const;  ///< one or several statements
   std::int64_t last_id() const;
   [[noreturn]] void fail(int code) const;

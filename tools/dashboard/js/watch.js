@@ -27,7 +27,7 @@ function shownTime() {
 
 function buildWatch() {
   watched.body = section('watch', 'Watch', 'Watch of the stage',
-    'Changes from the model. Line: tracked value; ribbon: 95 % band; light: statistic of a change against the threshold at which it is told.');
+    'Changes from the model. Line: tracked value. Ribbon: its 95 % band. Light: how near the evidence of a change is to the threshold of an alarm.');
   watched.status = element('dl', { class: 'figures' });
   watched.groups = element('div');
   watched.changes = table([], [], '', 'events').querySelector('tbody');
