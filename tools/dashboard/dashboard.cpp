@@ -173,7 +173,10 @@ void Dashboard::watch(EventLog& events) noexcept {
 
 void Dashboard::watch(std::function<PlantSnapshot()> snapshot) { plant_ = std::move(snapshot); }
 
-void Dashboard::watch(const StageWatch& watch) noexcept { watch_ = &watch; }
+void Dashboard::watch(StageWatch& watch) noexcept {
+  watch.show();
+  watch_ = &watch;
+}
 
 void Dashboard::update(const ExperimentProgress& progress) {
   state_ = aborted_ ? "stopping" : "running";

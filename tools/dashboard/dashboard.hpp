@@ -40,8 +40,8 @@ class Dashboard {
   void watch(EventLog& events) noexcept;
   /// Shows the state of the plant around the stage; `snapshot` may be called during the lifetime of *this.
   void watch(std::function<PlantSnapshot()> snapshot);
-  /// Shows what a watch of the stage tracks and finds; `watch` must outlive *this.
-  void watch(const StageWatch& watch) noexcept;
+  /// Shows what a watch of the stage tracks and finds; `watch` has not begun, and must outlive *this.
+  void watch(StageWatch& watch) noexcept;
 
   /// Must be called a few times per second, from one thread.
   void update(const ExperimentProgress& progress);

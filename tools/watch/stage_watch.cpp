@@ -40,6 +40,11 @@ double false_alarms_per_period(const std::string& text, double period_s) {
                   text));
 }
 
+/// As in the event log, without the time of writing.
+std::string line_of(const nlohmann::ordered_json& event) {
+  return event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 std::vector<EventField> fields_of(const nlohmann::ordered_json& event) {
   std::vector<EventField> fields;
   for (const auto& [name, value] : event.items()) {
@@ -81,7 +86,7 @@ void StageWatch::write_events(EventLog& events) {
     auto event = nlohmann::ordered_json::parse(line, nullptr, false);
     if (!event.is_object()) continue;
     event.erase("time_utc");
-    told_before_.insert(event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    told_before_.insert(line_of(event));
   }
 }
 
@@ -131,6 +136,7 @@ void StageWatch::add(const WatchedPeriod& period) {
   if (tracked.learning) ++learned_;
   if (tracks_) tracks_->add(period, tracked, *tracker_);
   if (tracked.change) tell(*tracked.change, period);
+  if (!shown_) return;
   nlohmann::ordered_json state = state_of(tracked);
   const std::lock_guard lock(mutex_);
   state_ = std::move(state);
@@ -143,8 +149,7 @@ void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
   stage_changed_ = stage_changed_ || is_of_stage(change.what.kind);
   nlohmann::ordered_json event = change_json(change, *tracker_, model_, period, period_s_);
   console_.result(fmt::format("{:.6g} s: {}", period.time_s, event["text"].get<std::string>()));
-  const std::string line = event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  if (events_ != nullptr && !told_before_.contains(line))
+  if (events_ != nullptr && !told_before_.contains(line_of(event)))
     events_->write("change", fields_of(event));
   const std::lock_guard lock(mutex_);
   changes_.push_back(std::move(event));

@@ -60,6 +60,8 @@ class StageWatch {
   std::string summary() const;
   nlohmann::ordered_json json() const;
 
+  /// Keeps state() and history_json() up to date. To be called before run().
+  void show() noexcept { shown_ = true; }
   /// For a page that shows the watch, from any thread: the present values; and those since the start, with all changes.
   nlohmann::ordered_json state() const;
   std::string history_json() const;
@@ -86,6 +88,7 @@ class StageWatch {
   int periods_ = 0;
   int learned_ = 0;
   bool stage_changed_ = false;
+  bool shown_ = false;
   mutable std::mutex mutex_;  // of all below; held for a moment only
   nlohmann::ordered_json state_;
   TrackHistory history_;
