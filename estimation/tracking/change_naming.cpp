@@ -118,18 +118,18 @@ std::vector<StageChange> ChangeNaming::changes_of_response(
   return changes;
 }
 
-/// A variance that became `ratio` times as large; of the square root of the latter.
-/// @param freedom half the degrees of freedom, 1 / (mean square of the ratio) without change
+/// A change of the rms, from a mean square that is `ratio` times the learned one.
+/// @param freedom degrees of freedom of that mean square: without change, its variance is 2 / freedom
 StageChange ChangeNaming::change_of_scatter(const PossibleChange& what, int since, double ratio,
                                             double freedom) const {
-  ratio = std::max(1e-6, ratio);
+  ratio = std::max(1e-6, ratio);  // of a signal that does not change at all
   StageChange change;
   change.what = what;
   change.periods = since;
   change.size = std::sqrt(ratio) - 1.0;
   // The scatter of a power is proportional to it.
-  change.deviation = 0.5 * (1.0 + change.size) / std::sqrt(freedom);
-  change.statistic = 2.0 * freedom * (ratio - 1.0 - std::log(ratio));
+  change.deviation = (1.0 + change.size) / std::sqrt(2.0 * freedom);
+  change.statistic = freedom * (ratio - 1.0 - std::log(ratio));
   return change;
 }
 
@@ -154,8 +154,8 @@ std::vector<StageChange> ChangeNaming::changes_of_noise(int since,
     const double deviation = reference_.noise_deviation()[what.index];
     const double ratio = keeps(since) ? power[what.index]
                                       : 1.0 + deviation * mean_scores[static_cast<Eigen::Index>(h)];
-    changes.push_back(
-        change_of_scatter(what, since, ratio, independent(differences) / (deviation * deviation)));
+    changes.push_back(change_of_scatter(what, since, ratio,
+                                        2.0 * independent(differences) / (deviation * deviation)));
   }
   return changes;
 }
@@ -167,7 +167,7 @@ StageChange ChangeNaming::change_of_motion(int since, const Eigen::MatrixXcd& P)
   for (auto period = recent_.end() - kept; period != recent_.end(); ++period)
     power += reference_.motion_power(*period, P) / kept;
   return change_of_scatter({ChangeKind::motion, 0, {}}, since, power,
-                           0.5 * reference_.motion_freedom() * independent(since));
+                           reference_.motion_freedom() * independent(since));
 }
 
 StageChange ChangeNaming::name(int since, const Eigen::VectorXd& mean_scores,

@@ -80,6 +80,10 @@ void TrackingReference::remove_motions(Eigen::MatrixXcd& of) const {
   of.reshaped() -= motions_ * white_motions_.solve(whitened(of));
 }
 
+Eigen::MatrixXd TrackingReference::beside_motions(const Eigen::MatrixXd& white) const {
+  return white - motion_basis_ * (motion_basis_.transpose() * white);
+}
+
 Eigen::MatrixXcd TrackingReference::residual(const PeriodSpectra& period,
                                              const Eigen::MatrixXcd& P) const {
   Eigen::MatrixXcd out = raw_residual(period, P);
@@ -96,17 +100,16 @@ Eigen::VectorXd TrackingReference::noise_power(const Eigen::MatrixXcd& differenc
 }
 
 Eigen::VectorXd TrackingReference::whitened_change(const Eigen::MatrixXcd& of) const {
-  const Eigen::VectorXd white = whitened(of);
-  return white - motion_basis_ * (motion_basis_.transpose() * white);
+  return beside_motions(whitened(of));
 }
 
 Eigen::VectorXd TrackingReference::whitened_change(const PeriodSpectra& mean) const {
   return whitened_change(raw_residual(mean, P_) - residual_);
 }
 
-/// @returns the residuals without these motions; sets the noise beside them
-std::vector<Eigen::MatrixXcd> TrackingReference::without(Eigen::MatrixXcd motions,
-                                                         std::vector<Eigen::MatrixXcd> residuals) {
+/// The noise beside these motions. @returns the residuals without them
+std::vector<Eigen::MatrixXcd> TrackingReference::learn_beside(
+    Eigen::MatrixXcd motions, std::vector<Eigen::MatrixXcd> residuals) {
   motions_ = std::move(motions);
   // The noise beside the motions gives the weights to remove them.
   for (int pass = 0; pass < 2; ++pass) {
@@ -120,25 +123,25 @@ std::vector<Eigen::MatrixXcd> TrackingReference::without(Eigen::MatrixXcd motion
 }
 
 /// Adds those of the modes that move: their lines are correlated with each other, those of noise are not.
-/// @param residuals without motions_
-void TrackingReference::add_motions(const std::vector<Eigen::MatrixXcd>& residuals) {
+/// @param residuals without motions_   @returns those of the other modes
+Eigen::MatrixXcd TrackingReference::add_motions(const std::vector<Eigen::MatrixXcd>& residuals) {
   Eigen::MatrixXd scatter(motion_basis_.rows(), std::ssize(residuals));
   for (Eigen::Index t = 0; t < scatter.cols(); ++t)
     scatter.col(t) = whitened(residuals[static_cast<std::size_t>(t)]);
   scatter.colwise() -= scatter.rowwise().mean().eval();
-  others_.resize(motions_.rows(), 0);
+  Eigen::MatrixXcd others(motions_.rows(), 0);
   for (std::size_t i = 1; i < all_motions_.size(); ++i) {
-    Eigen::MatrixXd white = noise_->whitened(all_motions_[i]);
-    white -= motion_basis_ * (motion_basis_.transpose() * white);
+    const Eigen::MatrixXd white = beside_motions(noise_->whitened(all_motions_[i]));
     const Eigen::MatrixXd basis = basis_of(white.colPivHouseholderQr());
     const Eigen::MatrixXd part = basis.transpose() * scatter;
     const double chance = (periods_ - 1.0) * static_cast<double>(basis.cols());
     const bool moves = part.squaredNorm() > kMoves * chance;
-    append(moves ? motions_ : others_, all_motions_[i]);
+    append(moves ? motions_ : others, all_motions_[i]);
     if (!moves) continue;
     scatter -= basis * part;
     append(motion_basis_, basis);
   }
+  return others;
 }
 
 /// The noise at P. @returns the residuals without free motions
@@ -147,11 +150,9 @@ std::vector<Eigen::MatrixXcd> TrackingReference::learn_noise(
   std::vector<Eigen::MatrixXcd> raw;
   for (const PeriodSpectra& period : periods) raw.push_back(raw_residual(period, P_));
   noise_.emplace(raw);
-  add_motions(without(all_motions_.front(), raw));
-  std::vector<Eigen::MatrixXcd> residuals = without(std::move(motions_), std::move(raw));
-  Eigen::MatrixXd white = noise_->whitened(others_);
-  white -= motion_basis_ * (motion_basis_.transpose() * white);
-  other_basis_ = basis_of(white.colPivHouseholderQr());
+  const Eigen::MatrixXcd others = add_motions(learn_beside(all_motions_.front(), raw));
+  std::vector<Eigen::MatrixXcd> residuals = learn_beside(std::move(motions_), std::move(raw));
+  other_basis_ = basis_of(beside_motions(noise_->whitened(others)).colPivHouseholderQr());
   return residuals;
 }
 
@@ -162,8 +163,7 @@ double TrackingReference::motion_power(const PeriodSpectra& period,
 }
 
 void TrackingReference::linearize(const Eigen::MatrixXcd& U) {
-  J_ = noise_->whitened(response_.derivatives(x_, U));
-  J_ -= motion_basis_ * (motion_basis_.transpose() * J_);
+  J_ = beside_motions(noise_->whitened(response_.derivatives(x_, U)));
   A_ = J_.transpose() * J_;
 }
 

@@ -55,15 +55,16 @@ class TrackingReference {
 
  private:
   std::vector<Eigen::MatrixXcd> learn_noise(const std::deque<PeriodSpectra>& periods);
-  std::vector<Eigen::MatrixXcd> without(Eigen::MatrixXcd motions,
-                                        std::vector<Eigen::MatrixXcd> residuals);
-  void add_motions(const std::vector<Eigen::MatrixXcd>& residuals);
+  std::vector<Eigen::MatrixXcd> learn_beside(Eigen::MatrixXcd motions,
+                                             std::vector<Eigen::MatrixXcd> residuals);
+  Eigen::MatrixXcd add_motions(const std::vector<Eigen::MatrixXcd>& residuals);
   void linearize(const Eigen::MatrixXcd& U);
   void settle(const PeriodSpectra& mean);
   void learn_noise_power(const std::vector<Eigen::MatrixXcd>& residuals);
   void judge(const PeriodSpectra& mean);
   Eigen::MatrixXcd raw_residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;
   void remove_motions(Eigen::MatrixXcd& of) const;
+  Eigen::MatrixXd beside_motions(const Eigen::MatrixXd& white) const;
   Eigen::VectorXd whitened(const Eigen::MatrixXcd& of) const;
 
   const TrackedResponse& response_;
@@ -72,11 +73,10 @@ class TrackingReference {
   Eigen::MatrixXcd P_;
   std::vector<Eigen::MatrixXcd> all_motions_;
   Eigen::MatrixXcd motions_;  // that are removed
-  Eigen::MatrixXcd others_;
   std::optional<LineNoise> noise_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> white_motions_;
   Eigen::MatrixXd motion_basis_;  // orthonormal
-  Eigen::MatrixXd other_basis_;
+  Eigen::MatrixXd other_basis_;   // of the other motions
   double other_power_ = 1.0;
   Eigen::MatrixXd J_;  // whitened derivatives at x, without free motions
   Eigen::MatrixXd A_;
