@@ -20,7 +20,6 @@ namespace {
 constexpr double kGainAtRounding = 0.5;
 constexpr int kTriesAtRounding = 3;
 constexpr int kTriesOfRiv = 3;  // before the Gauss-Newton step
-constexpr int kTries = 40;
 // A trial whose iteration predicts less than this part of what it must gain is given up. On 25 plants of unknown
 // structure, 65 of 73 successful trials stay above it; 24 plants end at the same cost as without it, one at a lower one.
 constexpr double kWorthwhilePart = 1.0 / 3.0;
@@ -99,12 +98,9 @@ class Iteration {
         return end_at_best(options_.limit->status(), options_.limit->message());
       return result_.end(options_.limit->status(), options_.limit->message());
     }
-    if (result_.iterations >= options_.max_iterations)
-      return result_.end(
-          problem_.globals() == 0 ? FitStatus::gradient_small : FitStatus::iteration_limit,
-          fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
-                      "first-order condition; scaled gradient {:.2g}",
-                      result_.iterations, result_.deviations, gradient_));
+    if (problem_.globals() > 0 && result_.iterations >= options_.max_iterations)
+      return result_.end_here(FitStatus::iteration_limit,
+                              fmt::format("stopped after {} iterations", result_.iterations));
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
   }
 
@@ -116,38 +112,31 @@ class Iteration {
 
   void accept(Trial&& trial) {
     take(std::move(trial));
-    result_.cost.push_back(cost_);
-    ++result_.iterations;
-    if (options_.progress) options_.progress(result_.iterations, cost_);
+    result_.accept(cost_, options_);
   }
 
   double squares() const { return 2.0 * static_cast<double>(problem_.size()) * cost_; }
 
   void read_gradient(const auto& system) {
     result_.frozen = bounds_.leaning(beta_, system.schur_gradient());
-    gradient_ = scaled_gradient(system.schur(), system.schur_gradient(), result_.frozen, squares());
+    result_.gradient =
+        scaled_gradient(system.schur(), system.schur_gradient(), result_.frozen, squares());
   }
 
   /// @returns false if the equations show convergence; `result_` is then complete.
   bool may_continue(const auto& system) {
     read_gradient(system);
-    if (problem_.globals() == 0 || gradient_ < options_.gradient_tolerance)
-      return result_.end(
-          FitStatus::gradient_small,
-          fmt::format("converged: the first-order condition is satisfied, scaled gradient {:.2g}",
-                      gradient_));
     // Newton decrement: the distance to the stationary point in standard deviations of the noise estimated from the
     // residual.
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     const double decrement =
-        std::abs(system.solve_globals(0.0, result_.frozen).dot(system.schur_gradient()));
+        problem_.globals() == 0
+            ? 0.0
+            : std::abs(system.solve_globals(0.0, result_.frozen).dot(system.schur_gradient()));
     result_.deviations = std::sqrt(decrement * data / squares());
-    if (result_.deviations < options_.deviation_tolerance)
-      return result_.end(
-          FitStatus::gradient_small,
-          fmt::format("converged: within {:.1g} standard deviations of the first-order condition, "
-                      "scaled gradient {:.2g}",
-                      result_.deviations, gradient_));
+    if (problem_.globals() == 0 || result_.gradient < options_.gradient_tolerance ||
+        result_.deviations < options_.deviation_tolerance)
+      return result_.end_here(FitStatus::gradient_small, "converged");
     if (cost_ < 1e-28 * signal_cost_)
       return result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
     // A quadratic cost falls by the decrement.
@@ -168,13 +157,13 @@ class Iteration {
     if (!system.regular())
       return result_.end(FitStatus::singular, "the numerators are singular: two modes coincide");
     if (!may_continue(system)) return false;
-    if (attempt(system, options_.method == FitMethod::riv ? kTriesOfRiv : kTries))
+    if (attempt(system, options_.method == FitMethod::riv ? kTriesOfRiv : Damping::kTries))
       return still_moving();
     if (options_.method == FitMethod::riv) {
       const ArrowSystem gauss_newton(problem_, beta_, groups, FitMethod::gn, kGlobalsOnly);
-      if (attempt(gauss_newton, kTries)) return still_moving();
+      if (attempt(gauss_newton)) return still_moving();
     }
-    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
+    return result_.end_without_step();
   }
 
   /// By Gauss-Newton: without a residual, the refined-IV equations are the same.
@@ -182,32 +171,28 @@ class Iteration {
     const FactoredEquations system(problem_, beta_, groups);
     if (!may_continue(system)) return false;
     const double before = cost_;
-    if (attempt(system, at_rounding() ? kTriesAtRounding : kTries) &&
+    if (attempt(system, at_rounding() ? kTriesAtRounding : Damping::kTries) &&
         !(at_rounding() && cost_ > kGainAtRounding * before))
       return still_moving();
     if (at_rounding())
       return result_.end(
           FitStatus::step_small,
           "converged: the residual is at rounding level and no step lowers the cost");
-    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
+    return result_.end_without_step();
   }
 
-  /// Tries steps with increasing damping; accepts the first that lowers the cost.
-  bool attempt(const auto& system, int tries) {
-    for (int i = 0; i < tries && levenberg_ <= kLargestLevenberg; ++i) {
-      const Eigen::VectorXd step = system.solve_globals(levenberg_, result_.frozen);
-      step_size_ = relative_step(problem_, beta_, step);
-      std::optional<Trial> trial = try_step(step);
-      if (trial && trial->cost < cost_) {
-        accept(std::move(*trial));
-        levenberg_ = i == 0 ? (levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0) : levenberg_;
-        return true;
-      }
-      if (step_size_ < 1e-15) break;  // at rounding
-      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
-    }
-    if (levenberg_ > kLargestLevenberg) levenberg_ = 1e-4;
-    return false;
+  /// Accepts the first step that lowers the cost.
+  bool attempt(const auto& system, int tries = Damping::kTries) {
+    return damping_.descend(
+        [&](double damping) {
+          const Eigen::VectorXd step = system.solve_globals(damping, result_.frozen);
+          step_size_ = relative_step(problem_, beta_, step);
+          std::optional<Trial> trial = try_step(step);
+          if (!trial || !(trial->cost < cost_)) return false;
+          accept(std::move(*trial));
+          return true;
+        },
+        tries);
   }
 
   bool still_moving() {
@@ -256,14 +241,19 @@ class Iteration {
   double signal_cost_;
   IterationResult result_;
   double cost_ = 0.0;  // at beta_
-  double levenberg_ = 0.0;
+  Damping damping_;
   bool factored_ = false;  // see Trial; then the equations of the step too
-  double gradient_ = 1.0;
   double step_size_ = 0.0;
   Trial best_;
 };
 
 }  // namespace
+
+void IterationResult::accept(double lower, const FitOptions& options) {
+  cost.push_back(lower);
+  ++iterations;
+  if (options.progress) options.progress(iterations, lower);
+}
 
 bool IterationResult::end(FitStatus why, std::string reason) {
   status = why;
@@ -271,16 +261,16 @@ bool IterationResult::end(FitStatus why, std::string reason) {
   return false;
 }
 
-bool IterationResult::end_without_step(const std::string& detail) {
-  if (deviations < kRoundingDeviations)
-    return end(FitStatus::step_small,
-               fmt::format("converged: the cost is at rounding level, within {:.1g} standard "
-                           "deviations of the first-order condition{}",
-                           deviations, detail));
-  return end(FitStatus::cost_stalled,
-             fmt::format("no step lowers the cost, {:.1g} standard deviations from the first-order "
-                         "condition{}",
-                         deviations, detail));
+bool IterationResult::end_here(FitStatus why, const std::string& what) {
+  return end(why, fmt::format("{}, {:.1g} standard deviations from the first-order condition; "
+                              "scaled gradient {:.2g}",
+                              what, deviations, gradient));
+}
+
+bool IterationResult::end_without_step() {
+  return deviations < kRoundingDeviations
+             ? end_here(FitStatus::step_small, "converged: the cost is at rounding level")
+             : end_here(FitStatus::cost_stalled, "no step lowers the cost");
 }
 
 double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -17,13 +18,18 @@ struct IterationResult {
   std::vector<double> cost;  ///< the start (with solved numerators) first
   int iterations = 0;
   double deviations = HUGE_VAL;      ///< FitResult::deviations
+  double gradient = 1.0;             ///< scaled, see FitOptions::gradient_tolerance
   double end_cost = 0.0;             ///< at the returned parameters
   std::vector<Eigen::Index> frozen;  ///< globals that ended at a bound and are not unknowns
 
-  /// @returns false: the iteration does not go on
+  /// Counts a step to a lower cost.
+  void accept(double lower, const FitOptions& options);
+  /// @returns false: the iteration does not go on, here and below
   bool end(FitStatus why, std::string reason);
-  /// The end if no step lowers the cost: at rounding level, or stalled. @param detail end of the message
-  bool end_without_step(const std::string& detail = {});
+  /// With the distance from the first-order condition.
+  bool end_here(FitStatus why, const std::string& what);
+  /// The end if no step lowers the cost: at rounding level, or stalled.
+  bool end_without_step();
 };
 
 /// Improves `beta` in place until the first-order condition holds: solve the numerators, step the denominators and
@@ -63,7 +69,28 @@ double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,
 /// sum W |G|^2 / (2N): the cost without a model.
 double signal_cost(const FitProblem& problem);
 
-/// With larger damping, no step is tried.
-inline constexpr double kLargestLevenberg = 1e8;
+/// Levenberg-Marquardt damping of the steps of an iteration.
+class Damping {
+ public:
+  static constexpr int kTries = 40;
+
+  /// Tries steps with increasing damping until one lowers the cost. @param lowers_cost (damping) -> bool
+  template <typename Step>
+  bool descend(const Step& lowers_cost, int tries = kTries) {
+    for (int i = 0; i < tries && damping_ <= kLargest; ++i) {
+      if (lowers_cost(damping_)) {
+        if (i == 0) damping_ = damping_ > 1e-9 ? 0.1 * damping_ : 0.0;
+        return true;
+      }
+      damping_ = std::max(10.0 * damping_, 1e-4);
+    }
+    if (damping_ > kLargest) damping_ = 1e-4;
+    return false;
+  }
+
+ private:
+  static constexpr double kLargest = 1e8;
+  double damping_ = 0.0;
+};
 
 }  // namespace stageid

@@ -54,12 +54,15 @@ class JointIteration {
     const Eigen::VectorXd step = free_step(equations);
     if (!may_continue(equations.gradient().dot(step))) return false;
     if (result_.iterations >= options_.max_iterations)
-      return result_.end(
-          FitStatus::iteration_limit,
-          fmt::format("stopped after {} iterations, {:.2g} standard deviations from the "
-                      "first-order condition",
-                      result_.iterations, result_.deviations));
-    if (descend(equations, step)) return true;
+      return result_.end_here(FitStatus::iteration_limit,
+                              fmt::format("stopped after {} iterations", result_.iterations));
+    const auto lowers_cost = [&](double damping) {
+      return take(
+          damping == 0.0
+              ? step
+              : equations.solve(equations.gradient(), result_.frozen, kStepTolerance, damping).x);
+    };
+    if (damping_.descend(lowers_cost)) return true;
     if (cost_ < kNothingLeft * signal_cost_)
       return result_.end(
           FitStatus::step_small,
@@ -80,32 +83,15 @@ class JointIteration {
   /// from the residual, and as a part of that residual.
   bool may_continue(double decrement) {
     const double squares = 2.0 * static_cast<double>(problem_.size()) * cost_;
-    const double gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
+    result_.gradient = std::sqrt(std::max(decrement, 0.0) / std::max(squares, 1e-300));
     result_.deviations =
-        gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
+        result_.gradient * std::sqrt(static_cast<double>(problem_.size() * problem_.channels()));
     if (cost_ < 1e-28 * signal_cost_)
       return result_.end(FitStatus::gradient_small, "converged: the residual is at rounding level");
-    if (gradient >= options_.gradient_tolerance &&
+    if (result_.gradient >= options_.gradient_tolerance &&
         result_.deviations >= options_.deviation_tolerance)
       return true;
-    return result_.end(
-        FitStatus::gradient_small,
-        fmt::format("converged: within {:.1g} standard deviations of the first-order condition",
-                    result_.deviations));
-  }
-
-  /// Tries steps with increasing damping, starting with `step`; accepts the first that lowers the cost.
-  bool descend(const JointEquations& equations, Eigen::VectorXd step) {
-    for (bool first = true; levenberg_ <= kLargestLevenberg; first = false) {
-      if (levenberg_ > 0.0)
-        step = equations.solve(equations.gradient(), result_.frozen, kStepTolerance, levenberg_).x;
-      if (take(step)) {
-        if (first) levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
-        return true;
-      }
-      levenberg_ = std::max(10.0 * levenberg_, 1e-4);
-    }
-    return false;
+    return result_.end_here(FitStatus::gradient_small, "converged");
   }
 
   bool take(const Eigen::VectorXd& step) {
@@ -120,9 +106,7 @@ class JointIteration {
     beta_ = std::move(trial);
     E_ = std::move(E);
     cost_ = cost;
-    result_.cost.push_back(cost_);
-    ++result_.iterations;
-    if (options_.progress) options_.progress(result_.iterations, cost_);
+    result_.accept(cost_, options_);
     return true;
   }
 
@@ -135,7 +119,7 @@ class JointIteration {
   double cost_ = 0.0;  // at beta_
   IterationResult result_;
   double signal_cost_ = 0.0;
-  double levenberg_ = 0.0;
+  Damping damping_;
 };
 
 }  // namespace

@@ -29,10 +29,8 @@ class LowRankIteration {
     while (iterate_once() && result_.iterations < options_.max_iterations) {
     }
     if (result_.message.empty())
-      result_.end(FitStatus::iteration_limit,
-                  fmt::format("stopped after {} iterations, {:.1g} standard deviations from the "
-                              "first-order condition; scaled gradient {:.2g}",
-                              result_.iterations, result_.deviations, gradient_));
+      result_.end_here(FitStatus::iteration_limit,
+                       fmt::format("stopped after {} iterations", result_.iterations));
     result_.message.insert(0, "residues of given rank: ");
     return std::move(result_);
   }
@@ -80,41 +78,31 @@ class LowRankIteration {
       return result_.end(FitStatus::singular, "the residue factors are singular");
     result_.frozen = bounds_.leaning(beta_, g_.head(problem_.globals()));
     const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
-    gradient_ = scaled_gradient(N_, g_, result_.frozen, squares);
+    result_.gradient = scaled_gradient(N_, g_, result_.frozen, squares);
     const double data = static_cast<double>(problem_.size() * problem_.channels());
     result_.deviations = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
-    if (gradient_ < options_.gradient_tolerance ||
+    if (result_.gradient < options_.gradient_tolerance ||
         result_.deviations < options_.deviation_tolerance)
-      return result_.end(
-          FitStatus::gradient_small,
-          fmt::format("converged: within {:.1g} standard deviations of the first-order "
-                      "condition, scaled gradient {:.2g}",
-                      result_.deviations, gradient_));
-    if (attempt()) return true;
-    return result_.end_without_step(fmt::format("; scaled gradient {:.2g}", gradient_));
+      return result_.end_here(FitStatus::gradient_small, "converged");
+    if (damping_.descend([&](double damping) { return take(solve(damping)); })) return true;
+    return result_.end_without_step();
   }
 
-  bool attempt() {
-    for (; levenberg_ <= kLargestLevenberg; levenberg_ = std::max(10.0 * levenberg_, 1e-4)) {
-      const Eigen::VectorXd step = solve(levenberg_);
-      if (!step.allFinite()) continue;
-      FitParameters trial = stepped(problem_, beta_, step.head(problem_.globals()));
-      if (!bounds_.stabilize(beta_, trial)) continue;
-      ResidueFactors factors = factors_;
-      factors.step(step);
-      factors.write_numerators(trial);
-      const double cost = residual_cost(problem_, evaluate_groups(problem_, trial, false), trial.B);
-      if (!(cost < result_.end_cost)) continue;
-      beta_ = std::move(trial);
-      factors_ = std::move(factors);
-      result_.end_cost = cost;
-      result_.cost.push_back(cost);
-      ++result_.iterations;
-      if (options_.progress) options_.progress(result_.iterations, cost);
-      levenberg_ = levenberg_ > 1e-9 ? 0.1 * levenberg_ : 0.0;
-      return true;
-    }
-    return false;
+  /// @returns false if the step does not lower the cost
+  bool take(const Eigen::VectorXd& step) {
+    if (!step.allFinite()) return false;
+    FitParameters trial = stepped(problem_, beta_, step.head(problem_.globals()));
+    if (!bounds_.stabilize(beta_, trial)) return false;
+    ResidueFactors factors = factors_;
+    factors.step(step);
+    factors.write_numerators(trial);
+    const double cost = residual_cost(problem_, evaluate_groups(problem_, trial, false), trial.B);
+    if (!(cost < result_.end_cost)) return false;
+    beta_ = std::move(trial);
+    factors_ = std::move(factors);
+    result_.accept(cost, options_);
+    result_.end_cost = cost;
+    return true;
   }
 
   const FitProblem& problem_;
@@ -125,8 +113,7 @@ class LowRankIteration {
   IterationResult result_;
   Eigen::MatrixXd N_;
   Eigen::VectorXd g_;
-  double levenberg_ = 0.0;
-  double gradient_ = 1.0;
+  Damping damping_;
 };
 
 }  // namespace
