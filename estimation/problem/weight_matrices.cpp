@@ -54,9 +54,8 @@ Eigen::MatrixXcd inverse_or_refuse(const FrfEstimate& frf, const Eigen::MatrixXc
 }
 
 void require_factors(const FrfEstimate& frf) {
-  for (const auto& [size, name] :
-       {std::pair{frf.residual_covariance_re.size(), "residual_covariance"},
-        std::pair{frf.input_factor.size(), "input_factor"}})
+  for (const auto& [size, name] : {std::pair{frf.residual_covariance.size(), "residual_covariance"},
+                                   std::pair{frf.input_factor.size(), "input_factor"}})
     if (size == 0)
       refuse(fmt::format(
           "weighting likelihood needs /{0} in the FRF, which is missing. Estimate the FRF again "
@@ -65,7 +64,7 @@ void require_factors(const FrfEstimate& frf) {
   const Eigen::Index n_y = frf.n_outputs();
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index y = 0; y < n_y; ++y)
-      if (!(frf.residual_covariance_re(y * (n_y + 1), k) > 0.0))
+      if (!(frf.residual_covariance(y * (n_y + 1), k).real() > 0.0))
         throw IndefiniteWeights(
             fmt::format("weighting likelihood: residual_covariance of {} on {} is not positive; "
                         "exclude the output",

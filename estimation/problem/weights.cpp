@@ -77,13 +77,14 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
 /// The unbiased inverse of the smoothed variance.
 Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof) {
-  if (frf.residual_covariance_re.size() == 0 || &variance != &frf.noise_variance ||
+  if (frf.residual_covariance.size() == 0 || &variance != &frf.noise_variance ||
       window_reach(dof) == 0)
     return smoothed_power(variance, dof, -1.0);
   // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random, so only that one is smoothed.
   const Eigen::Index n_y = frf.n_outputs();
   Eigen::MatrixXd C_E(n_y, variance.cols());
-  for (Eigen::Index y = 0; y < n_y; ++y) C_E.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+  for (Eigen::Index y = 0; y < n_y; ++y)
+    C_E.row(y) = frf.residual_covariance.row(y * (n_y + 1)).real();
   if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, -1.0);
   const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, -1.0).array() * C_E.array();
   return (ratio.replicate(frf.n_inputs(), 1) / variance.array()).matrix();
@@ -147,9 +148,7 @@ std::optional<LineVariance> weighed_variance(const FrfEstimate& frf, Weighting w
 SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index N = frf.lines();
-  SmoothedCovariance out{Eigen::MatrixXcd(n_y * n_y, N), frf.noise_dof};
-  out.matrices.real() = frf.residual_covariance_re;
-  out.matrices.imag() = frf.residual_covariance_im;
+  SmoothedCovariance out{frf.residual_covariance, frf.noise_dof};
   if (!(frf.noise_dof > 0.0)) return out;
   // The inverse of an n_y x n_y scatter matrix has the scatter of a variance with n_y degrees of freedom less.
   const double wanted = std::ceil((kWantedDof + static_cast<double>(n_y)) / frf.noise_dof);
@@ -159,7 +158,7 @@ SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
 
   Eigen::MatrixXd variance(n_y, N);
   for (Eigen::Index y = 0; y < n_y; ++y)
-    variance.row(y) = frf.residual_covariance_re.row(y * (n_y + 1));
+    variance.row(y) = frf.residual_covariance.row(y * (n_y + 1)).real();
   const Eigen::MatrixXd deviation = smoothed_power(variance, frf.noise_dof, 1.0).cwiseSqrt();
   Eigen::MatrixXd products(n_y * n_y, N);  // of the deviations of two outputs
   for (Eigen::Index k = 0; k < N; ++k)

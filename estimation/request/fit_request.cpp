@@ -207,11 +207,8 @@ class FitDefaults {
     if (frf.noise_variance.size() == 0 || !(frf.total_dof >= 1.0)) return;
     DistortionVariance distorted = distortion_variance(frf);
     setup_.distortion = std::move(distorted.distortion);
-    if (frf.residual_covariance_re.size() > 0) {
-      const Eigen::MatrixXcd C = covariance_with_distortion(frf, distorted.variance);
-      frf.residual_covariance_re = C.real();
-      frf.residual_covariance_im = C.imag();
-    }
+    if (frf.residual_covariance.size() > 0)
+      frf.residual_covariance = covariance_with_distortion(frf, distorted.variance);
     frf.total_variance = std::move(distorted.variance);
     frf.total_dof = distorted.dof;
   }

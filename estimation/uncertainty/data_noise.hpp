@@ -32,7 +32,7 @@ class NoiseCorrelation {
   /// Correlations that the FRF does not contain are taken as zero. `frf` must outlive it.
   explicit NoiseCorrelation(const FrfEstimate& frf) : frf_(&frf) {}
 
-  bool known() const noexcept { return frf_ != nullptr && frf_->residual_covariance_re.size() > 0; }
+  bool known() const noexcept { return frf_ != nullptr && frf_->residual_covariance.size() > 0; }
   bool between_inputs() const noexcept {
     return known() && frf_->input_factor.size() > 0 && frf_->n_inputs() > 1;
   }

@@ -111,9 +111,7 @@ class GramOfTiles {
 
 SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, IndexRange lines) const {
   const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    const Eigen::Index at = a + frf_->n_outputs() * b;
-    return std::complex<double>(frf_->residual_covariance_re(at, k),
-                                frf_->residual_covariance_im(at, k));
+    return frf_->residual_covariance(a + frf_->n_outputs() * b, k);
   };
   return correlation_of(C, y, z, lines);
 }

@@ -84,10 +84,7 @@ void write_optional(Hdf5File& file, const FrfEstimate& frf) {
   write_columns(file, "/total_variance", frf.total_variance, n_y);
   write_confidence(file, frf);
   write_columns(file, "/covariance", frf.covariance, n_y * frf.n_inputs());
-  Eigen::MatrixXcd residual(frf.residual_covariance_re.rows(), frf.residual_covariance_re.cols());
-  residual.real() = frf.residual_covariance_re;
-  residual.imag() = frf.residual_covariance_im;
-  write_columns(file, "/residual_covariance", residual, n_y);
+  write_columns(file, "/residual_covariance", frf.residual_covariance, n_y);
   write_columns(file, "/input_factor", frf.input_factor, frf.n_inputs());
   write_known(file, "/input_condition", frf.input_condition);
   write_known(file, "/interpolation_misfit", frf.interpolation_misfit);
@@ -151,10 +148,7 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
   frf.noise_variance = read_columns(file, "/noise_variance", N, n_y, n_u);
   frf.total_variance = read_columns(file, "/total_variance", N, n_y, n_u);
   frf.covariance = read_columns<Complex>(file, "/covariance", N, n_y * n_u, n_y * n_u);
-  const Eigen::MatrixXcd residual =
-      read_columns<Complex>(file, "/residual_covariance", N, n_y, n_y);
-  frf.residual_covariance_re = residual.real();
-  frf.residual_covariance_im = residual.imag();
+  frf.residual_covariance = read_columns<Complex>(file, "/residual_covariance", N, n_y, n_y);
   frf.input_factor = read_columns<Complex>(file, "/input_factor", N, n_u, n_u);
   frf.input_condition = read_known(file, "/input_condition", N);
   frf.interpolation_misfit = read_known(file, "/interpolation_misfit", N);

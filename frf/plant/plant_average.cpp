@@ -203,8 +203,7 @@ void PlantAverage::finish(FrfEstimate& frf, int workers) const {
   if (experiment_noise_ratio_ > 1.0) frf.noise_dof = effective_dof();
   frf.experiment_noise_ratio = experiment_noise_ratio_;
   frf.noise_variance = noise_sum_ / (M * M);
-  frf.residual_covariance_re = residual_sum_.real() / M;
-  frf.residual_covariance_im = residual_sum_.imag() / M;
+  frf.residual_covariance = residual_sum_ / M;
   frf.input_factor = input_sum_ / (M * M);
   if (covariance_kind_ == CovarianceKind::full) frf.covariance = covariance_sum_ / (M * M);
 }

@@ -242,7 +242,7 @@ void ResponseDrift::add(const RealizationSpectra& spectra, const LineEstimate& l
 std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const MatrixXcd& G_mean,
                                              int run_periods) const {
   if (frf.noise_variance.size() == 0 || frf.input_factor.size() == 0 ||
-      frf.residual_covariance_re.size() == 0 || frf.lines() < kWindow + 2)
+      frf.residual_covariance.size() == 0 || frf.lines() < kWindow + 2)
     return std::nullopt;
   const double M = frf.realizations;
   // The slope over the realizations is more accurate.

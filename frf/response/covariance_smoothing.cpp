@@ -17,7 +17,7 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
   if (lines > frf.lines())
     refuse(fmt::format("{} lines of {} were requested; lower the number of lines", lines,
                        frf.lines()));
-  if (frf.residual_covariance_re.size() == 0 || frf.input_factor.size() == 0)
+  if (frf.residual_covariance.size() == 0 || frf.input_factor.size() == 0)
     refuse("the noise covariance is unknown; measure two periods");
   if (frf.method == FrfMethod::lpm)
     refuse("method 'lpm' already estimates it from neighbouring bins; estimate with 'periodic'");
@@ -33,8 +33,8 @@ void require_smoothable(const FrfEstimate& frf, int lines) {
 }
 
 /// Sums in the same order for every line, so that the rounding of neighbours does not matter.
-Eigen::MatrixXd smoothed(const Eigen::MatrixXd& columns, int lines) {
-  Eigen::MatrixXd result(columns.rows(), columns.cols());
+Eigen::MatrixXcd smoothed(const Eigen::MatrixXcd& columns, int lines) {
+  Eigen::MatrixXcd result(columns.rows(), columns.cols());
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
     const Eigen::Index first = std::clamp<Eigen::Index>(k - lines / 2, 0, columns.cols() - lines);
     result.col(k) = columns.middleCols(first, lines).rowwise().mean();
@@ -65,8 +65,7 @@ void propagate(FrfEstimate& frf) {
 FrfEstimate smooth_covariance(const FrfEstimate& frf, int lines) {
   require_smoothable(frf, lines);
   FrfEstimate result = frf;
-  result.residual_covariance_re = smoothed(frf.residual_covariance_re, lines);
-  result.residual_covariance_im = smoothed(frf.residual_covariance_im, lines);
+  result.residual_covariance = smoothed(frf.residual_covariance, lines);
   result.noise_dof = frf.noise_dof * lines;
   result.covariance_lines = lines;
   propagate(result);

@@ -39,7 +39,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf);
 /// which acts as independent forces of the actuators. Both are scaled so that the diagonal, y, has the means over the
 /// inputs of noise_variance and of variance - noise_variance.
 /// @param variance  (n_y n_u) x N, at least noise_variance
-/// @returns (n_y n_y) x N, Hermitian, in the layout of FrfEstimate::residual_covariance_re
+/// @returns (n_y n_y) x N, Hermitian, in the layout of FrfEstimate::residual_covariance
 Eigen::MatrixXcd covariance_with_distortion(const FrfEstimate& frf,
                                             const Eigen::MatrixXd& variance);
 

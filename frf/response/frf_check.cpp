@@ -160,11 +160,7 @@ void check(const FrfEstimate& frf) {
   check_variance("noise_variance", frf, frf.noise_variance);
   check_variance("total_variance", frf, frf.total_variance);
   const Eigen::Index n_residuals = frf.n_outputs() * frf.n_outputs();
-  check_optional("residual_covariance", frf.residual_covariance_re, n_residuals, frf.lines());
-  check_optional("residual_covariance", frf.residual_covariance_im, n_residuals, frf.lines());
-  if (frf.residual_covariance_re.size() != frf.residual_covariance_im.size()) {
-    refuse("residual_covariance", "the real and imaginary parts differ in size");
-  }
+  check_optional("residual_covariance", frf.residual_covariance, n_residuals, frf.lines());
   check_optional("input_factor", frf.input_factor, frf.n_inputs() * frf.n_inputs(), frf.lines());
   check_optional("covariance", frf.covariance, n_channels * n_channels, frf.lines());
   check_optional("input_condition", frf.input_condition.transpose(), 1, frf.lines());

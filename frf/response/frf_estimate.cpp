@@ -85,11 +85,11 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
         fmt::format("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
                     high_hz, range));
   }
-  for (Eigen::MatrixXcd* const columns : {&frf.response, &frf.input_factor, &frf.covariance})
+  for (Eigen::MatrixXcd* const columns :
+       {&frf.response, &frf.residual_covariance, &frf.input_factor, &frf.covariance})
     keep_columns(*columns, first, kept);
   for (Eigen::MatrixXd* const columns :
-       {&frf.noise_variance, &frf.total_variance, &frf.residual_covariance_re,
-        &frf.residual_covariance_im, &frf.detection.linear_power})
+       {&frf.noise_variance, &frf.total_variance, &frf.detection.linear_power})
     keep_columns(*columns, first, kept);
   for (Eigen::VectorXd* const of_lines :
        {&frf.input_condition, &frf.interpolation_misfit, &frf.frequency_hz}) {
@@ -99,10 +99,7 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
 }
 
 Eigen::MatrixXcd output_covariance(const FrfEstimate& frf, Eigen::Index k) {
-  Eigen::MatrixXcd C(frf.n_outputs(), frf.n_outputs());
-  C.real() = frf.residual_covariance_re.col(k).reshaped(C.rows(), C.cols());
-  C.imag() = frf.residual_covariance_im.col(k).reshaped(C.rows(), C.cols());
-  return C;
+  return frf.residual_covariance.col(k).reshaped(frf.n_outputs(), frf.n_outputs());
 }
 
 FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
@@ -121,8 +118,7 @@ FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::strin
   part.response = rows_or_empty(frf.response, entries);
   part.noise_variance = rows_or_empty(frf.noise_variance, entries);
   part.total_variance = rows_or_empty(frf.total_variance, entries);
-  part.residual_covariance_re = rows_or_empty(frf.residual_covariance_re, residual_rows);
-  part.residual_covariance_im = rows_or_empty(frf.residual_covariance_im, residual_rows);
+  part.residual_covariance = rows_or_empty(frf.residual_covariance, residual_rows);
   // The other inputs are marginalized by taking a part of S, which is an inverse already.
   part.input_factor = rows_or_empty(frf.input_factor, square_rows(input_at, frf.n_inputs()));
   part.covariance =

@@ -83,9 +83,9 @@ struct FrfEstimate {
   int experiments = 0;
   double noise_dof = 0.0;  ///< degrees of freedom of noise_variance: M E (P-1), see plant_frf.hpp
   double total_dof = 0.0;  ///< M - 1
-  Eigen::VectorXd input_condition;         ///< N: cond(U(k)), ideally 1; empty if unknown
-  Eigen::MatrixXd residual_covariance_re;  ///< (n_y n_y) x N: C_E, Hermitian, per experiment and
-  Eigen::MatrixXd residual_covariance_im;  ///<   the mean of periods; empty if unknown
+  Eigen::VectorXd input_condition;  ///< N: cond(U(k)), ideally 1; empty if unknown
+  /// (n_y n_y) x N: C_E, Hermitian, per experiment and the mean of periods; empty if unknown
+  Eigen::MatrixXcd residual_covariance;
   /// (n_u n_u) x N: S, Hermitian, with Cov(vec G) = S kron C_E for the mean over realizations; with one
   /// realization S = [(U U^H)^-1]^T. Empty if unknown.
   Eigen::MatrixXcd input_factor;

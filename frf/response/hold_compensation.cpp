@@ -38,11 +38,10 @@ void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)
     const std::complex<double> value = factor(omega[k]);
     frf.response.col(k) *= value;
     const double power = std::norm(value);
-    for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance,
-                                      &frf.residual_covariance_re, &frf.residual_covariance_im}) {
+    for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance})
       if (variance->size() != 0) variance->col(k) *= power;
-    }
-    if (frf.covariance.size() != 0) frf.covariance.col(k) *= power;
+    for (Eigen::MatrixXcd* covariance : {&frf.residual_covariance, &frf.covariance})
+      if (covariance->size() != 0) covariance->col(k) *= power;
   }
 }
 

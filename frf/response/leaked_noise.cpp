@@ -28,11 +28,9 @@ void scale(FrfEstimate& frf, Index i, Index k, double factor) {
   const Index n_y = frf.n_outputs();
   const double root = std::sqrt(factor);
   for (Index c = i; c < frf.noise_variance.rows(); c += n_y) frf.noise_variance(c, k) *= factor;
-  for (Eigen::MatrixXd* part : {&frf.residual_covariance_re, &frf.residual_covariance_im}) {
-    Eigen::Map<Eigen::MatrixXd> C(part->col(k).data(), n_y, n_y);
-    C.row(i) *= root;
-    C.col(i) *= root;
-  }
+  Eigen::Map<Eigen::MatrixXcd> C(frf.residual_covariance.col(k).data(), n_y, n_y);
+  C.row(i) *= root;
+  C.col(i) *= root;
   if (frf.covariance.size() == 0) return;
   const Index n_c = frf.response.rows();
   Eigen::Map<Eigen::MatrixXcd> covariance(frf.covariance.col(k).data(), n_c, n_c);

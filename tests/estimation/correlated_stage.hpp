@@ -70,8 +70,7 @@ inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& 
   const Eigen::Index n_u = frf.n_inputs();
   frf.noise_dof = dof;
   frf.input_factor.resize(n_u * n_u, frf.lines());
-  frf.residual_covariance_re.resize(n_y * n_y, frf.lines());
-  frf.residual_covariance_im.resize(n_y * n_y, frf.lines());
+  frf.residual_covariance.resize(n_y * n_y, frf.lines());
   frf.noise_variance.resize(n_y * n_u, frf.lines());
   const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
     Eigen::MatrixXcd out(rows, columns);
@@ -89,8 +88,7 @@ inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& 
       const Eigen::MatrixXcd samples = L_C * draw(n_y, dof);
       C = samples * samples.adjoint() / static_cast<double>(dof);
     }
-    frf.residual_covariance_re.col(k) = C.reshaped().real();
-    frf.residual_covariance_im.col(k) = C.reshaped().imag();
+    frf.residual_covariance.col(k) = C.reshaped();
     frf.input_factor.col(k) = noise.S[at].reshaped();
     const Eigen::VectorXd y = C.diagonal().real();
     const Eigen::RowVectorXd u = noise.S[at].diagonal().real().transpose();

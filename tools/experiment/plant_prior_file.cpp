@@ -121,15 +121,16 @@ double period_s_of(const FrfEstimate& frf) {
 /// Outputs x lines of the FRF, smoothed; empty if unknown.
 Eigen::MatrixXd noise_density(const FrfEstimate& frf) {
   const double period_s = period_s_of(frf);
-  if (frf.residual_covariance_re.size() == 0 || !(period_s > 0.0) || frf.periods < 1) return {};
+  if (frf.residual_covariance.size() == 0 || !(period_s > 0.0) || frf.periods < 1) return {};
   const Index n_y = frf.n_outputs();
   Eigen::MatrixXd density(n_y, frf.lines());
   for (Index k = 0; k < frf.lines(); ++k) {
     const Index first = std::max<Index>(0, k - kSmoothedLines);
     const Index count = std::min(frf.lines() - 1, k + kSmoothedLines) - first + 1;
     for (Index i = 0; i < n_y; ++i)
-      density(i, k) = frf.residual_covariance_re.row(i * (n_y + 1)).segment(first, count).mean() *
-                      frf.periods * period_s;
+      density(i, k) =
+          frf.residual_covariance.real().row(i * (n_y + 1)).segment(first, count).mean() *
+          frf.periods * period_s;
   }
   return density;
 }
@@ -185,7 +186,7 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
 std::vector<Eigen::MatrixXcd> output_noise(const FrfEstimate& frf,
                                            const Eigen::VectorXd& frequency_hz, double period_s) {
   const double measured_s = period_s_of(frf);
-  if (frf.residual_covariance_re.size() == 0 || !(measured_s > 0.0) || frf.periods < 1) return {};
+  if (frf.residual_covariance.size() == 0 || !(measured_s > 0.0) || frf.periods < 1) return {};
   const auto n_y = static_cast<double>(frf.n_outputs());
   const double line_freedom = std::max(1.0, frf.noise_dof);
   const auto half =

@@ -121,9 +121,7 @@ FrfEstimate frf_of(const json& problem, const AdditiveModel& model) {
   if (problem.contains("noise_variance"))
     frf.noise_variance = test::columns<double>(problem["noise_variance"]);
   if (problem.contains("residual_covariance")) {
-    const Eigen::MatrixXcd C = test::columns<Complex>(problem["residual_covariance"]);
-    frf.residual_covariance_re = C.real();
-    frf.residual_covariance_im = C.imag();
+    frf.residual_covariance = test::columns<Complex>(problem["residual_covariance"]);
     frf.input_factor = test::columns<Complex>(problem["input_factor"]);
   }
   return frf;

@@ -97,8 +97,7 @@ TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
     frf.response.setOnes(kOutputs, kLines);
     frf.input_factor.setOnes(1, kLines);
     frf.noise_dof = dof;
-    frf.residual_covariance_re.resize(9, kLines);
-    frf.residual_covariance_im.resize(9, kLines);
+    frf.residual_covariance.resize(9, kLines);
     const Eigen::MatrixXcd L = C.llt().matrixL();
     for (Eigen::Index k = 0; k < kLines; ++k) {
       Eigen::MatrixXcd samples(kOutputs, dof);
@@ -106,8 +105,7 @@ TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
       // The level drifts: 1 over the band, little over a window.
       const Eigen::MatrixXcd scaled = std::exp(0.00025 * static_cast<double>(k)) * L * samples;
       const Eigen::MatrixXcd estimate = scaled * scaled.adjoint() / static_cast<double>(dof);
-      frf.residual_covariance_re.col(k) = estimate.reshaped().real();
-      frf.residual_covariance_im.col(k) = estimate.reshaped().imag();
+      frf.residual_covariance.col(k) = estimate.reshaped();
     }
     const WeightMatrices weights = WeightMatrices::likelihood(frf);
     Eigen::MatrixXcd first = Eigen::MatrixXcd::Zero(kOutputs, kOutputs);
@@ -158,17 +156,15 @@ TEST_F(WeightMatrixRefusal, AnFrfWithoutTheInputsFactor) {
   expect_refused("needs /input_factor in the FRF", "stageid frf");
 }
 TEST_F(WeightMatrixRefusal, AnFrfWithoutTheResidualCovariance) {
-  frf_.residual_covariance_re.resize(0, 0);
-  frf_.residual_covariance_im.resize(0, 0);
+  frf_.residual_covariance.resize(0, 0);
   expect_refused("needs /residual_covariance in the FRF", "two periods");
 }
 TEST_F(WeightMatrixRefusal, AnOutputWithoutNoise) {
-  frf_.residual_covariance_re(3, 7) = 0.0;
+  frf_.residual_covariance(3, 7) = 0.0;
   expect_refused("residual_covariance of z2 on line 7");
 }
 TEST_F(WeightMatrixRefusal, OutputsThatDependOnEachOther) {
-  frf_.residual_covariance_re.col(9).setOnes();
-  frf_.residual_covariance_im.col(9).setZero();
+  frf_.residual_covariance.col(9).setOnes();
   expect_refused("residual_covariance of line 9", "exclude one of them");
 }
 TEST_F(WeightMatrixRefusal, InputsThatDependOnEachOtherOrAFactorThatIsNotHermitian) {

@@ -121,14 +121,13 @@ TEST(Weights, OnlyTheRandomFactorIsSmoothed) {
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kLines, 1.0, 300.0);
   frf.noise_dof = 2.0;
   frf.noise_variance.resize(6, kLines);
-  frf.residual_covariance_re = Eigen::MatrixXd::Zero(4, kLines);
-  frf.residual_covariance_im = Eigen::MatrixXd::Zero(4, kLines);
+  frf.residual_covariance = Eigen::MatrixXcd::Zero(4, kLines);
   Eigen::MatrixXd truth(6, kLines);
   for (Eigen::Index k = 0; k < kLines; ++k)
     for (Eigen::Index y = 0; y < 2; ++y) {
       const double noise = 1.0 + static_cast<double>(y);
       const double estimated = noise * random.chi_square_mean(2.0);
-      frf.residual_covariance_re(y * 3, k) = estimated;
+      frf.residual_covariance(y * 3, k) = estimated;
       for (Eigen::Index u = 0; u < 3; ++u) {
         const double inputs = k % 7 == 0 ? 50.0 : 1.0;  // comb-like: smoothing would smear it
         truth(y + 2 * u, k) = noise * inputs;

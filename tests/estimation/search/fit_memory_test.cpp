@@ -38,7 +38,7 @@ class FitMemory : public testing::Test {
   /// Bytes of the data that exist before the fit.
   double given() const {
     const auto real = frf_.noise_variance.size() + frf_.total_variance.size() +
-                      frf_.residual_covariance_re.size() + frf_.residual_covariance_im.size();
+                      2 * frf_.residual_covariance.size();
     return static_cast<double>(real) * sizeof(double) + 2.0 * entry_;
   }
 
@@ -94,9 +94,8 @@ TEST_F(FitMemory, DoesNotGrowWhereFewDegreesOfFreedomAreSmoothed) {
 
 TEST_F(FitMemory, DoesNotGrowWithTheCorrelationOfTheOutputs) {
   const Eigen::Index n_y = frf_.n_outputs();
-  frf_.residual_covariance_re.setConstant(n_y * n_y, frf_.lines(), 0.3);
-  frf_.residual_covariance_im.setZero(n_y * n_y, frf_.lines());
-  for (Eigen::Index y = 0; y < n_y; ++y) frf_.residual_covariance_re.row(y * (n_y + 1)).setOnes();
+  frf_.residual_covariance.setConstant(n_y * n_y, frf_.lines(), 0.3);
+  for (Eigen::Index y = 0; y < n_y; ++y) frf_.residual_covariance.row(y * (n_y + 1)).setOnes();
   expect_little_beside(1.0, [&] { return fit_additive_model(frf_, start_, options_); });
 }
 

@@ -120,10 +120,9 @@ TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
     for (const Eigen::MatrixXcd& G : responses)
       frf.total_variance += (G - frf.response).cwiseAbs2() / (kRealizations * (kRealizations - 1));
     frf.noise_variance.setConstant(frf.response.rows(), frf.response.cols(), noise * noise);
-    frf.residual_covariance_re = (noise * noise * Eigen::MatrixXd::Identity(kOutputs, kOutputs))
-                                     .reshaped()
-                                     .replicate(1, frf.response.cols());
-    frf.residual_covariance_im.setZero(kOutputs * kOutputs, frf.response.cols());
+    frf.residual_covariance = (noise * noise * Eigen::MatrixXcd::Identity(kOutputs, kOutputs))
+                                  .reshaped()
+                                  .replicate(1, frf.response.cols());
     frf.realizations = kRealizations;
     frf.total_dof = kRealizations - 1.0;
     FitSetup setup = make_fit_setup(request, std::move(frf));

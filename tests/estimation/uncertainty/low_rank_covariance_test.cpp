@@ -54,8 +54,7 @@ Repeated repeat(Weighting weighting, int residue_rank = 1) {
     if (run == 0) {
       values.resize(value.size(), kRuns);
       out.reported.setZero(value.size());
-      frf.residual_covariance_re.resize(0, 0);
-      frf.residual_covariance_im.resize(0, 0);
+      frf.residual_covariance.resize(0, 0);
       out.without =
           quantities(fit_additive_model(frf, fit.model, options).model, true).array().square();
     }
@@ -98,8 +97,7 @@ TEST(LowRankCovarianceMonteCarlo, OtherWeightsWithKnownVarianceAreSandwiched) {
 TEST(LowRankCovariance, OfOtherWeightsWithoutCorrelationUsesTheKnownVariance) {
   const RankOneStage stage;
   FrfEstimate frf = stage.measured_with(9);
-  frf.residual_covariance_re.resize(0, 0);
-  frf.residual_covariance_im.resize(0, 0);
+  frf.residual_covariance.resize(0, 0);
   FitOptions options = test::options_with(Weighting::relative);
   options.residue_rank = 1;
   const FitResult once = fit_additive_model(frf, stage.problem.model, options);

@@ -175,14 +175,11 @@ TEST_F(Covariance, CountsTheCorrelationOfTheOutputs) {
     }
   frf_.noise_variance = variance_;
   // Any scale, because only the correlation is used.
-  frf_.residual_covariance_re.resize(4, frf_.lines());
-  frf_.residual_covariance_im.resize(4, frf_.lines());
+  frf_.residual_covariance.resize(4, frf_.lines());
   const double a = 3.0;
   const double b = 0.2;
-  frf_.residual_covariance_re.colwise() =
-      Eigen::Vector4d(a * a, a * b * rho.real(), a * b * rho.real(), b * b);
-  frf_.residual_covariance_im.colwise() =  // (2,1) before (1,2): columns are stacked
-      Eigen::Vector4d(0.0, -a * b * rho.imag(), a * b * rho.imag(), 0.0);
+  frf_.residual_covariance.colwise() =  // (2,1) before (1,2): columns are stacked
+      Eigen::Vector4cd(a * a, a * b * std::conj(rho), a * b * rho, b * b);
   const FitResult found = fit(Weighting::noise_variance);
   ASSERT_TRUE(found.trustworthy()) << found.message();
 

@@ -114,7 +114,7 @@ TEST(ExperimentNoise, TheFactorsComeNearestToIt) {
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     for (Eigen::Index c = 0; c < 6; ++c) {
       of_factors(c, k) =
-          frf.input_factor(4 * (c / 2), k).real() * frf.residual_covariance_re(3 * (c % 2), k);
+          frf.input_factor(4 * (c / 2), k).real() * frf.residual_covariance(3 * (c % 2), k).real();
       diagonal(c, k) = frf.covariance(7 * c, k).real();
     }
   }

@@ -61,8 +61,7 @@ Trials repeat(LoopExperiment x) {
     trials.noise_variance += frf.noise_variance / kSeeds;
     if (frf.total_variance.size() != 0) trials.total_variance += frf.total_variance / kSeeds;
     trials.covariance += frf.covariance / kSeeds;
-    trials.residual.real() += frf.residual_covariance_re / kSeeds;
-    trials.residual.imag() += frf.residual_covariance_im / kSeeds;
+    trials.residual += frf.residual_covariance / kSeeds;
     trials.input_factor += frf.input_factor / kSeeds;
     trials.frequency_hz = frf.frequency_hz;
   }

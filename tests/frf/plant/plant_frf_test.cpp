@@ -314,7 +314,7 @@ TEST(PlantFrf, OnePeriodGivesNoNoiseVariance) {
   const MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2, .periods = 1});
   const FrfEstimate frf = estimate_plant_frf({&log});
   EXPECT_EQ(frf.noise_variance.size(), 0);
-  EXPECT_EQ(frf.residual_covariance_re.size(), 0);
+  EXPECT_EQ(frf.residual_covariance.size(), 0);
   EXPECT_EQ(frf.noise_dof, 0.0);
   EXPECT_EQ(frf.total_variance.cols(), 10);
   EXPECT_NO_THROW(check(frf));

@@ -134,7 +134,7 @@ TEST_P(ZipperedDof, IsThatOfTheScatterOverSeeds) {
   for (const FrfEstimate& frf : estimates(smooth_stage(), x, GetParam().options, kSeeds)) {
     const Eigen::Index n_y = 2;
     const Eigen::ArrayXXd power =
-        frf.residual_covariance_re(std::vector<Eigen::Index>{0, n_y + 1}, Eigen::all).array();
+        frf.residual_covariance(std::vector<Eigen::Index>{0, n_y + 1}, Eigen::all).real().array();
     if (sum.size() == 0) sum = squares = Eigen::ArrayXXd::Zero(power.rows(), power.cols());
     sum += power;
     squares += power.square();

@@ -135,15 +135,13 @@ TEST(DistortionVariance, OfForcesIsCorrelatedBetweenTheOutputsAsTheResponseIs) {
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kFew, 10.0, 50.0);
   frf.response = drawn(kOutputs * kInputs, kFew);
   frf.noise_variance.resize(kOutputs * kInputs, kFew);
-  frf.residual_covariance_re.resize(kOutputs * kOutputs, kFew);
-  frf.residual_covariance_im.resize(kOutputs * kOutputs, kFew);
+  frf.residual_covariance.resize(kOutputs * kOutputs, kFew);
   Eigen::MatrixXd variance(kOutputs * kInputs, kFew);
   Eigen::MatrixXcd expected(kOutputs * kOutputs, kFew);
   for (Eigen::Index k = 0; k < kFew; ++k) {
     const Eigen::MatrixXcd root = drawn(kOutputs, kOutputs);
     const Eigen::MatrixXcd C_E = root * root.adjoint();
-    frf.residual_covariance_re.col(k) = C_E.real().reshaped();
-    frf.residual_covariance_im.col(k) = C_E.imag().reshaped();
+    frf.residual_covariance.col(k) = C_E.reshaped();
     frf.noise_variance.col(k) = C_E.diagonal().real().replicate(kInputs, 1);
     const Eigen::MatrixXcd G = frf.response.col(k).reshaped(kOutputs, kInputs);
     const Eigen::MatrixXcd C = C_E + 0.3 * static_cast<double>(k) * G * G.adjoint();

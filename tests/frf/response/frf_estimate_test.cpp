@@ -47,7 +47,7 @@ TEST(SelectBand, KeepsTheLinesInsideWithBothEnds) {
   EXPECT_EQ(band.total_variance, frf.total_variance.middleCols(1, 2));
   EXPECT_EQ(band.covariance, frf.covariance.middleCols(1, 2));
   EXPECT_EQ(band.input_factor, frf.input_factor.middleCols(1, 2));
-  EXPECT_EQ(band.residual_covariance_im, frf.residual_covariance_im.middleCols(1, 2));
+  EXPECT_EQ(band.residual_covariance, frf.residual_covariance.middleCols(1, 2));
   EXPECT_EQ(band.input_condition, (Eigen::VectorXd{{2.0, 3.0}}));
   EXPECT_EQ(band.inputs, frf.inputs);
   EXPECT_NO_THROW(check(band));
@@ -73,8 +73,8 @@ TEST(SelectChannels, PicksAndOrdersEverythingThatBelongsToThem) {
     EXPECT_EQ(part.at(k)(0, 1), frf.at(k)(1, 0));
     EXPECT_EQ(part.noise_variance(0, k), frf.noise_variance(5, k));
     EXPECT_EQ(part.total_variance(1, k), frf.total_variance(1, k));
-    EXPECT_EQ(part.residual_covariance_re(0, k), frf.residual_covariance_re(3, k));  // (z2, z2)
-    EXPECT_EQ(part.input_factor(1, k), frf.input_factor(0 + 3 * 2, k));  // row a1, column a3
+    EXPECT_EQ(part.residual_covariance(0, k), frf.residual_covariance(3, k));  // (z2, z2)
+    EXPECT_EQ(part.input_factor(1, k), frf.input_factor(0 + 3 * 2, k));        // row a1, column a3
     EXPECT_EQ(part.covariance(1, k),
               frf.covariance(1 + 6 * 5, k));  // row z2 <- a1, column z2 <- a3
     EXPECT_EQ(part.covariance(2, k), frf.covariance(5 + 6 * 1, k));  // and vice versa
@@ -163,10 +163,8 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"rate", [](FrfEstimate& f) { f.sample_rate_hz = -1.0; }, "sample_rate_hz"},
         Fault{"delay", [](FrfEstimate& f) { f.delay_s = kNan; }, "delay_s"},
         Fault{"dof", [](FrfEstimate& f) { f.noise_dof = -1.0; }, "noise_dof"},
-        Fault{"residual", [](FrfEstimate& f) { f.residual_covariance_im(0, 3) = kNan; },
+        Fault{"residual", [](FrfEstimate& f) { f.residual_covariance(0, 3) = kNan; },
               "residual_covariance[line 3]: not finite"},
-        Fault{"residual_part", [](FrfEstimate& f) { f.residual_covariance_im.resize(0, 0); },
-              "residual_covariance: the real and imaginary parts differ"},
         Fault{"input_factor", [](FrfEstimate& f) { f.input_factor(2, 1) = kNan; },
               "input_factor[line 1]: not finite"},
         Fault{"covariance",

@@ -26,8 +26,7 @@ FrfEstimate sampled(const Response& response) {
   for (Eigen::Index k = 0; k < 4; ++k) frf.response(0, k) = response(frf.omega_rad_s()[k]);
   frf.noise_variance = Eigen::MatrixXd::Constant(1, 4, 2.0);
   frf.total_variance = Eigen::MatrixXd::Constant(1, 4, 3.0);
-  frf.residual_covariance_re = Eigen::MatrixXd::Constant(1, 4, 5.0);
-  frf.residual_covariance_im = Eigen::MatrixXd::Zero(1, 4);
+  frf.residual_covariance = Eigen::MatrixXcd::Constant(1, 4, 5.0);
   frf.covariance = Eigen::MatrixXcd::Constant(1, 4, 2.0);
   return frf;
 }
@@ -104,7 +103,7 @@ TEST(HoldCompensation, VariancesFollowTheMagnitude) {
     EXPECT_GT(power, 1.0);
     EXPECT_NEAR(hold.noise_variance(0, k), 2.0 * power, 1e-12);
     EXPECT_NEAR(hold.total_variance(0, k), 3.0 * power, 1e-12);
-    EXPECT_NEAR(hold.residual_covariance_re(0, k), 5.0 * power, 1e-12);
+    EXPECT_NEAR(hold.residual_covariance(0, k).real(), 5.0 * power, 1e-12);
     EXPECT_NEAR(hold.covariance(0, k).real(), 2.0 * power, 1e-12);
   }
 }

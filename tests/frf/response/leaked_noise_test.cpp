@@ -42,13 +42,11 @@ struct Example {
         frf.noise_variance(c, k) = mean_power(kDof, random);
         frf.total_variance(c, k) = total_over_noise[c % 2] * mean_power(2, random);
       }
-    frf.residual_covariance_re.resize(4, kLines);
-    frf.residual_covariance_im.resize(4, kLines);
-    for (Eigen::Index k = 0; k < kLines; ++k) {
-      frf.residual_covariance_re.col(k) << frf.noise_variance(0, k), 0.3, 0.3,
+    frf.residual_covariance.resize(4, kLines);
+    const std::complex<double> between(0.3, 0.2);
+    for (Eigen::Index k = 0; k < kLines; ++k)
+      frf.residual_covariance.col(k) << frf.noise_variance(0, k), between, std::conj(between),
           frf.noise_variance(1, k);
-      frf.residual_covariance_im.col(k) << 0.0, 0.2, -0.2, 0.0;
-    }
     scatter = {frf.total_variance, frf.noise_variance, kDof};
   }
 };
@@ -72,7 +70,8 @@ TEST(LeakedNoise, TheCovarianceKeepsItsCorrelation) {
     return C(0, 1) / std::sqrt(C(0, 0).real() * C(1, 1).real());
   };
   const std::complex<double> before = correlation(7);
-  const double scale = example.frf.residual_covariance_re(0, 7) / example.frf.noise_variance(0, 7);
+  const double scale =
+      example.frf.residual_covariance(0, 7).real() / example.frf.noise_variance(0, 7);
   example.frf.covariance.resize(16, kLines);
   for (Eigen::Index k = 0; k < kLines; ++k) {
     Eigen::MatrixXcd whole = Eigen::MatrixXcd::Zero(4, 4);
@@ -81,8 +80,8 @@ TEST(LeakedNoise, TheCovarianceKeepsItsCorrelation) {
   }
   lower_leaked_noise(example.scatter, example.frf);
   EXPECT_LT(std::abs(correlation(7) - before), 1e-12);
-  EXPECT_NEAR(example.frf.residual_covariance_re(0, 7), scale * example.frf.noise_variance(0, 7),
-              1e-12);
+  EXPECT_NEAR(example.frf.residual_covariance(0, 7).real(),
+              scale * example.frf.noise_variance(0, 7), 1e-12);
   const Eigen::MatrixXcd whole = example.frf.covariance.col(7).reshaped(4, 4);
   EXPECT_LT((whole.topLeftCorner(2, 2) - output_covariance(example.frf, 7)).norm(), 1e-12);
 }

@@ -39,7 +39,7 @@ inline Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_s
     squares += deviation.cwiseAbs2();
     stated += frf.noise_variance;
     for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
-      trials.residual += frf.residual_covariance_re.row(i * (frf.n_outputs() + 1)).mean() /
+      trials.residual += frf.residual_covariance.row(i * (frf.n_outputs() + 1)).real().mean() /
                          static_cast<double>(seeds * frf.n_outputs());
   }
   trials.error = std::sqrt(trials.error / (seeds * static_cast<double>(sum.cols())));

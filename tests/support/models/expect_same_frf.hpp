@@ -17,8 +17,7 @@ inline void expect_same(const FrfEstimate& a, const FrfEstimate& b) {
   same("noise_variance", a.noise_variance, b.noise_variance);
   same("total_variance", a.total_variance, b.total_variance);
   same("covariance", a.covariance, b.covariance);
-  same("residual_covariance_re", a.residual_covariance_re, b.residual_covariance_re);
-  same("residual_covariance_im", a.residual_covariance_im, b.residual_covariance_im);
+  same("residual_covariance", a.residual_covariance, b.residual_covariance);
   same("input_factor", a.input_factor, b.input_factor);
   same("input_condition", a.input_condition, b.input_condition);
   same("interpolation_misfit", a.interpolation_misfit, b.interpolation_misfit);

@@ -26,8 +26,8 @@ inline FrfEstimate numbered_frf() {
   fill(frf.total_variance, 6, [](double c, double line) { return line + c + 0.5; });
   fill(frf.covariance, 36, [](double c, double line) { return Complex(line + c, 0.125 * c); });
   fill(frf.input_factor, 9, [](double c, double line) { return Complex(line + 2.0 * c, 0.5 * c); });
-  fill(frf.residual_covariance_re, 4, [](double c, double line) { return line + c + 0.75; });
-  fill(frf.residual_covariance_im, 4, [](double c, double line) { return -line - c; });
+  fill(frf.residual_covariance, 4,
+       [](double c, double line) { return Complex(line + c + 0.75, -line - c); });
   frf.input_condition = Eigen::VectorXd{{1.0, 2.0, 3.0, 4.0}};
   frf.sample_rate_hz = 100.0;
   frf.hold = Hold::zoh;

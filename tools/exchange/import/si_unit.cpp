@@ -139,7 +139,7 @@ void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes) {
   const std::vector<double> outputs = take_si_units("outputs", frf.outputs, own);
   const std::vector<double> inputs = take_si_units("inputs", frf.inputs, own);
   if (own.empty()) return;
-  if (frf.residual_covariance_re.size() > 0 || frf.covariance.size() > 0 ||
+  if (frf.residual_covariance.size() > 0 || frf.covariance.size() > 0 ||
       frf.input_factor.size() > 0 || frf.detection.frequency_hz.size() > 0 ||
       frf.nonlinearity.band_hz.size() > 0)
     throw std::invalid_argument(
