@@ -92,6 +92,23 @@ class AutomaticFit {
         best_.model.fit.cost);
   }
 
+  /// General damping can stand in for a few missing modes, and is superfluous once they are found. Where a mode may be
+  /// worth as much, the search continues without it, up to as many parameters, and the better of both models is final.
+  static void settle_damping(std::optional<AutomaticFit>& search) {
+    if (!search->structure_.open.general_damping || !search->structure_.general_damping) return;
+    search->structure_.open.general_damping = false;
+    AutomaticFit other = *search;
+    const StructureMove proportional = proportional_damping(other.quick_, other.best_.model);
+    other.say("{} once more", proportional.flag);
+    other.adopt(fit_additive_model(other.frf_, proportional.model, other.quick_));
+    if (!other.mode_may_be_worth_as_much(search->best_)) return;
+    other.most_parameters_ = search->best_.parameters;
+    other.take_structure_of(other.best_.model);
+    other.watch_ = {};
+    other.search(0);
+    if (other.score() < search->score()) search.emplace(std::move(other));
+  }
+
   double score() const { return worth_.criterion(best_); }
   /// Whether the score is lower by what one mode costs.
   bool is_clearly_below(double score_before) const {
@@ -136,6 +153,18 @@ class AutomaticFit {
     const std::vector<ProposedMode> missed =
         proposed_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
     return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
+  }
+
+  /// Whether a further mode may be worth as much per parameter (of the logarithm of the cost) as those of a larger model.
+  bool mode_may_be_worth_as_much(const FitResult& larger) const {
+    const auto room = static_cast<double>(larger.parameters - best_.parameters) /
+                      static_cast<double>(2 + frf_.response.rows());
+    if (best_.status() == FitStatus::singular || !(room > 0.0)) return false;
+    const std::vector<ProposedMode> modes =
+        proposed_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
+    const double share = 1.0 - std::pow(larger.model.fit.cost / cost(), 1.0 / room);
+    return !modes.empty() &&
+           modes.front().gain > share * 2.0 * static_cast<double>(frf_.lines()) * cost();
   }
 
   ModeNumber mode_number() const {
@@ -191,17 +220,20 @@ class AutomaticFit {
     if (part.all) return false;
     ModelStructure structure = structure_;
     structure.given = structure_of(part.model).given;
-    AutomaticFit search(part.frf, structure, selection_, part.options);
-    search.begin_relocated_from(part.model);
-    search.search(0);
-    if (search.best_.status() == FitStatus::singular) return false;
-    for (const std::string& decision : search.decisions_)
+    std::optional<AutomaticFit> search(std::in_place, part.frf, structure, selection_,
+                                       part.options);
+    search->begin_relocated_from(part.model);
+    search->search(0);
+    settle_damping(search);
+    if (search->best_.status() == FitStatus::singular) return false;
+    for (const std::string& decision : search->decisions_)
       say("{} of {} lines: {}", part.frf.lines(), frf_.lines(), decision);
-    quick_.delay = options_.delay = search.options_.delay;
-    quick_.delay_s = options_.delay_s = search.options_.delay_s;
-    take_structure_of(search.best_.model);
-    if (search.watch_.ended()) watch_ = std::move(search.watch_);
-    adopt(fit_additive_model(frf_, with_all_inputs(frf_, search.best_.model), quick_));
+    quick_.delay = options_.delay = search->options_.delay;
+    quick_.delay_s = options_.delay_s = search->options_.delay_s;
+    structure_.open = search->structure_.open;
+    take_structure_of(search->best_.model);
+    if (search->watch_.ended()) watch_ = std::move(search->watch_);
+    adopt(fit_additive_model(frf_, with_all_inputs(frf_, search->best_.model), quick_));
     structured_at_ = history_.size();
     return true;
   }
@@ -271,8 +303,8 @@ class AutomaticFit {
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
-    return modes < affordable_modes() && !worth_.at_rounding(best_) && !watch_.ended() &&
-           !limit_reached();
+    return modes < affordable_modes() && best_.parameters < most_parameters_ &&
+           !worth_.at_rounding(best_) && !watch_.ended() && !limit_reached();
   }
 
   /// Changes the structure as long as that lowers the criterion, each time by the change that lowers it most.
@@ -545,6 +577,7 @@ class AutomaticFit {
   ModeWorth worth_;
   int target_;      ///< number of modes to grow to, if it is requested
   int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
+  Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
   GrowthWatch watch_;
   FitResult best_;
   std::vector<std::string> decisions_;
@@ -582,6 +615,7 @@ FitResult searched_fit(const FrfEstimate& frf, const ModelStructure& structure,
   std::optional<AutomaticFit> best(std::in_place, frf, structure, selection, options);
   best->begin();
   best->search(0);
+  AutomaticFit::settle_damping(best);
   // Misplaced modes are exchanged: more are added at the peaks of the residual, and the least worthy are dropped.
   const int fifth = 1 + selection.exactly / static_cast<int>(kShareAtOnce);
   const int most_surplus = std::max(static_cast<int>(kTried), fifth);

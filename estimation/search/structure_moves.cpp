@@ -118,13 +118,17 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
   return out;
 }
 
+StructureMove proportional_damping(const FitOptions& options, const AdditiveModel& model) {
+  StructureMove move{"--damping proportional", model, options};
+  make_proportional(move.model);
+  return move;
+}
+
 std::vector<StructureMove> simpler_structures(const FitOptions& options, const AdditiveModel& model,
                                               const OpenStructure& open) {
   std::vector<StructureMove> out;
-  if (open.general_damping && has(model, is_general)) {
-    out.push_back({"--damping proportional", model, options});
-    make_proportional(out.back().model);
-  }
+  if (open.general_damping && has(model, is_general))
+    out.push_back(proportional_damping(options, model));
   if (open.delay && options.delay == DelayModel::per_channel) {
     out.push_back({"--delay estimate", model, options});
     out.back().options.delay = DelayModel::estimate;

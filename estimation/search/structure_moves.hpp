@@ -21,6 +21,9 @@ struct StructureMove {
 std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOptions& options,
                                              const AdditiveModel& model, const OpenStructure& open);
 
+/// Numerators B_0 instead of B_0 + B_1 s.
+StructureMove proportional_damping(const FitOptions& options, const AdditiveModel& model);
+
 /// One part less, of those that are open: numerators B_0, one delay, no direct term, no rigid body.
 std::vector<StructureMove> simpler_structures(const FitOptions& options, const AdditiveModel& model,
                                               const OpenStructure& open);
