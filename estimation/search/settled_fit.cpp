@@ -131,6 +131,11 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
                                 models[chosen].reason, fit.model.fit.cost, next.model.fit.cost));
     fit = std::move(next);
   }
+  if (fit.status() == FitStatus::iteration_limit && simpler(fit).empty()) {
+    FitOptions longer = options;
+    longer.max_iterations *= kFartherAway;
+    fit = fit_additive_model(frf, fit.model, longer);
+  }
   if (!fit.trustworthy() && simpler(fit).empty() &&
       fit.deviations < kNearly * options.deviation_tolerance)
     fit.model.fit.status = FitStatus::gradient_small;

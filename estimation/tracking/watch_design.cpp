@@ -1,6 +1,7 @@
 #include "estimation/tracking/watch_design.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -9,6 +10,7 @@
 
 #include "estimation/tracking/change_detector.hpp"
 #include "estimation/tracking/change_naming.hpp"
+#include "estimation/tracking/free_motion.hpp"
 
 namespace stageid {
 namespace {
@@ -26,6 +28,23 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& M) {
   return d.asDiagonal() *
          Eigen::LDLT<Eigen::MatrixXd>(scaled).solve(Eigen::MatrixXd::Identity(M.rows(), M.cols())) *
          d.asDiagonal();
+}
+
+/// The lines below each other, real above imaginary parts.
+Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXcd>& lines) {
+  const Index n_y = lines.front().rows();
+  Eigen::MatrixXd out(2 * n_y * std::ssize(lines), lines.front().cols());
+  Index row = 0;
+  for (const Eigen::MatrixXcd& line : lines) {
+    out.middleRows(row, 2 * n_y) << line.real(), line.imag();
+    row += 2 * n_y;
+  }
+  return out;
+}
+
+/// Of `columns` onto the space of B.
+Eigen::MatrixXd projection(const Eigen::MatrixXd& B, const Eigen::MatrixXd& columns) {
+  return B * B.colPivHouseholderQr().solve(columns);
 }
 
 /// Periods until the expected statistic of ChangeDetector, with windows of 1, 2, 4, ... periods, reaches the threshold.
@@ -60,11 +79,25 @@ std::vector<LineSensitivity> line_sensitivities(const TrackedResponse& response,
   return out;
 }
 
-Eigen::MatrixXd information(const LineSensitivity& line, const Eigen::VectorXcd& r) {
+std::vector<Eigen::MatrixXcd> line_motions(const TrackedResponse& response,
+                                           const std::vector<Eigen::MatrixXcd>& C) {
+  const Eigen::MatrixXcd motions = free_motions(response).front();
+  std::vector<Eigen::MatrixXcd> out;
+  for (const Eigen::MatrixXcd& of_line : C) {
+    const Index n_y = of_line.rows();
+    out.emplace_back(Eigen::LLT<Eigen::MatrixXcd>(of_line).matrixL().solve(
+        motions.middleRows(std::ssize(out) * n_y, n_y)));
+  }
+  return out;
+}
+
+Eigen::MatrixXcd sensitivity(const LineSensitivity& line, const Eigen::VectorXcd& r) {
   Eigen::MatrixXcd J = r[0] * line[0];
   for (std::size_t j = 1; j < line.size(); ++j) J += r[static_cast<Index>(j)] * line[j];
-  return 2.0 * (J.real().transpose() * J.real() + J.imag().transpose() * J.imag());
+  return J;
 }
+
+Eigen::MatrixXd information(const Eigen::MatrixXcd& J) { return 2.0 * (J.adjoint() * J).real(); }
 
 InformativePower most_informative_power(const std::vector<Eigen::MatrixXd>& information,
                                         const Eigen::MatrixXd& prior, const Eigen::VectorXd& scale,
@@ -125,20 +158,22 @@ Eigen::VectorXcd most_informative_phases(const LineSensitivity& line, const Eige
   return r;
 }
 
-WatchForecast watch_forecast(const std::vector<Eigen::MatrixXd>& information,
-                             const Eigen::MatrixXd& prior, Index outputs,
-                             const Eigen::VectorXd& change, const TrackerOptions& options) {
+WatchForecast watch_forecast(const std::vector<Eigen::MatrixXcd>& J,
+                             const std::vector<Eigen::MatrixXcd>& motions,
+                             const Eigen::MatrixXd& prior, const Eigen::VectorXd& change,
+                             const TrackerOptions& options) {
   const double n = options.learning_periods;
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(prior.rows(), prior.cols());
+  const Eigen::MatrixXd beside = stacked(J) - projection(stacked(motions), stacked(J));
+  Eigen::MatrixXd M = 2.0 * beside.transpose() * beside;
   Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(prior.rows());
-  for (const Eigen::MatrixXd& line : information) {
-    M += line;
-    squares += line.diagonal().array().square();
-  }
+  const Index rows = 2 * J.front().rows();
+  for (Index row = 0; row < beside.rows(); row += rows)
+    squares +=
+        (2.0 * beside.middleRows(row, rows).colwise().squaredNorm().transpose().array()).square();
   // As many degrees of freedom as LineNoise::covariance() finds.
   const Eigen::VectorXd freedom = (n * M.diagonal().array().square() / squares.max(kTiny)).max(n);
   // Weights from the noise of n periods instead of the true one.
-  M *= 1.0 - std::min(0.5, static_cast<double>(outputs) / n);
+  M *= 1.0 - std::min(0.5, static_cast<double>(J.front().rows()) / n);
   WatchForecast out;
   out.deviation = inverse_of(M + prior).diagonal().cwiseSqrt();
   const Eigen::VectorXd per_score = M.diagonal().array().max(kTiny).rsqrt();

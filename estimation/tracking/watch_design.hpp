@@ -18,8 +18,15 @@ std::vector<LineSensitivity> line_sensitivities(const TrackedResponse& response,
                                                 const std::vector<Eigen::MatrixXcd>& U,
                                                 const std::vector<Eigen::MatrixXcd>& C);
 
-/// Fisher information of one period on the tracked parameters, 2 Re J^H J with J = sum_j r_j J_j.
-Eigen::MatrixXd information(const LineSensitivity& line, const Eigen::VectorXcd& r);
+/// The free motions of a body that no spring holds, divided by the noise like the sensitivities: by line, n_y x any.
+std::vector<Eigen::MatrixXcd> line_motions(const TrackedResponse& response,
+                                           const std::vector<Eigen::MatrixXcd>& C);
+
+/// J = sum_j r_j J_j, n_y x parameters.
+Eigen::MatrixXcd sensitivity(const LineSensitivity& line, const Eigen::VectorXcd& r);
+
+/// Fisher information of one period on the tracked parameters, 2 Re J^H J.
+Eigen::MatrixXd information(const Eigen::MatrixXcd& J);
 
 /// Power of the lines for the smallest variances.
 struct InformativePower {
@@ -54,10 +61,12 @@ struct WatchForecast {
   Eigen::VectorXd periods;
 };
 
-/// @param information  M_k of the excitation, by line   @param outputs  n_y
-/// @param change  size of the change of each parameter
-WatchForecast watch_forecast(const std::vector<Eigen::MatrixXd>& information,
-                             const Eigen::MatrixXd& prior, Eigen::Index outputs,
-                             const Eigen::VectorXd& change, const TrackerOptions& options);
+/// @param J        sensitivity() of the excitation, by line
+/// @param motions  line_motions(); the tracker removes them
+/// @param change   size of the change of each parameter
+WatchForecast watch_forecast(const std::vector<Eigen::MatrixXcd>& J,
+                             const std::vector<Eigen::MatrixXcd>& motions,
+                             const Eigen::MatrixXd& prior, const Eigen::VectorXd& change,
+                             const TrackerOptions& options);
 
 }  // namespace stageid

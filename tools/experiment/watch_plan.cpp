@@ -115,15 +115,21 @@ class WatchedStage {
       motion_.emplace_back(std::numbers::sqrt2 * G(outputs, Eigen::all) * u);
     }
     sensitivity_ = line_sensitivities(response_, U, noise);
+    free_motion_ = line_motions(response_, noise);
   }
 
   const TrackedResponse& response() const noexcept { return response_; }
   const LineSensitivity& at(Index k) const { return sensitivity_[static_cast<std::size_t>(k)]; }
 
   /// @param r  axes x lines, |r|^2 the share of the power
+  std::vector<Eigen::MatrixXcd> sensitivity(const Eigen::MatrixXcd& r) const {
+    std::vector<Eigen::MatrixXcd> out;
+    for (Index k = 0; k < r.cols(); ++k) out.push_back(stageid::sensitivity(at(k), r.col(k)));
+    return out;
+  }
   std::vector<Eigen::MatrixXd> information(const Eigen::MatrixXcd& r) const {
     std::vector<Eigen::MatrixXd> out;
-    for (Index k = 0; k < r.cols(); ++k) out.push_back(stageid::information(at(k), r.col(k)));
+    for (const Eigen::MatrixXcd& J : sensitivity(r)) out.push_back(stageid::information(J));
     return out;
   }
   /// Mean squares over their limits: of every axis its own level or, with `rms_m`, of every sensor this rms.
@@ -148,13 +154,13 @@ class WatchedStage {
   WatchForecast forecast(const Eigen::MatrixXcd& r, double drift, double period) const {
     TrackerOptions options;
     options.false_alarms_per_period = std::min(0.1, period / kYear_s);
-    return watch_forecast(information(r), prior(), response_.model().n_outputs(), change(drift),
-                          options);
+    return watch_forecast(sensitivity(r), free_motion_, prior(), change(drift), options);
   }
 
  private:
   TrackedResponse response_;
   std::vector<LineSensitivity> sensitivity_;
+  std::vector<Eigen::MatrixXcd> free_motion_;
   std::vector<Eigen::MatrixXcd> motion_;
 };
 

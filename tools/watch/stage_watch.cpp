@@ -200,9 +200,12 @@ std::vector<std::string> StageWatch::lines() const {
 }
 
 std::string StageWatch::summary() const {
-  return fmt::format("{} periods, {} of them to learn from, {} skipped for marked samples: {}",
+  return fmt::format("{} periods, {} of them to learn from, {} skipped for marked samples: {}{}",
                      periods_, learned_, source_ ? source_->skipped() : 0,
-                     changes_.empty() ? "no change" : counted(changes_.size(), "event"));
+                     changes_.empty() ? "no change" : counted(changes_.size(), "event"),
+                     source_ && source_->was_stopped_early()
+                         ? "; the measurement was stopped before its end"
+                         : "");
 }
 
 nlohmann::ordered_json StageWatch::json() const {

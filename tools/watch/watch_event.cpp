@@ -76,13 +76,12 @@ std::string what_happened(const StageChange& change, const ModelTracker& tracker
   return fmt::format("{} changed by {}", name, size_text(parameter, change.size, change.deviation));
 }
 
-}  // namespace
-
+/// One sentence and a remedy. @param since_s in recorded time
 std::string change_text(const StageChange& change, const ModelTracker& tracker,
-                        const AdditiveModel& model, double period_s) {
+                        const AdditiveModel& model, double since_s) {
   std::string text =
-      fmt::format("{}, since {:.4g} s, probability {:.3g}", what_happened(change, tracker, model),
-                  (change.periods + 1) * period_s, change.probability);
+      fmt::format("{}, since {:.6g} s, probability {:.3g}", what_happened(change, tracker, model),
+                  since_s, change.probability);
   if (change.probability < kSure && change.otherwise)
     text +=
         fmt::format("; else {} ({:.2g})", describe(*change.otherwise, tracker.parameters(), model),
@@ -90,10 +89,13 @@ std::string change_text(const StageChange& change, const ModelTracker& tracker,
   return text + ". " + remedy_of(change, parameter_of(change.what, tracker));
 }
 
+}  // namespace
+
 nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker& tracker,
                                    const AdditiveModel& model, const WatchedPeriod& period,
                                    double period_s) {
   const TrackedParameter* parameter = parameter_of(change.what, tracker);
+  const double since_s = period.time_s - (change.periods + 1) * period_s;
   nlohmann::ordered_json json = {
       {"event", "change"},
       {"kind", parameter != nullptr ? to_string(parameter->kind) : to_string(change.what.kind)},
@@ -101,7 +103,7 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
       {"time_s", period.time_s},
       {"run", period.run},
       {"period", period.period},
-      {"since_s", period.time_s - (change.periods + 1) * period_s},
+      {"since_s", since_s},
       {"size", change.size},
       {"deviation", change.deviation},
       {"probability", change.probability},
@@ -120,7 +122,7 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
     json["otherwise"] = describe(*change.otherwise, tracker.parameters(), model);
     json["other_probability"] = change.other_probability;
   }
-  json["text"] = change_text(change, tracker, model, period_s);
+  json["text"] = change_text(change, tracker, model, since_s);
   return json;
 }
 

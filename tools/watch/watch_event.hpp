@@ -2,16 +2,14 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "estimation/tracking/model_tracker.hpp"
 #include "tools/watch/watch_source.hpp"
 
 namespace stageid {
 
-/// One sentence: what changed, since when, how much, how probable; and one with the remedy.
-std::string change_text(const StageChange& change, const ModelTracker& tracker,
-                        const AdditiveModel& model, double period_s);
-/// The same for programs, as in docs/formats.md.
+/// As in docs/formats.md, with one sentence: what changed, how much, since when, how probable; and one with the remedy.
 nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker& tracker,
                                    const AdditiveModel& model, const WatchedPeriod& period,
                                    double period_s);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -67,6 +68,10 @@ bool WatchSource::refresh() {
   if (ended_) return false;
   open();
   return true;
+}
+
+bool WatchSource::was_stopped_early() const {
+  return ended_ && !std::ranges::all_of(log_->runs(), &LogRun::complete);
 }
 
 std::optional<WatchedPeriod> WatchSource::next() {

@@ -40,6 +40,8 @@ class WatchSource {
   /// Reads what was written since. @returns false if the log has ended and next() has returned all of it
   bool refresh();
   std::uint64_t skipped() const noexcept { return skipped_; }  ///< periods with marked samples
+  /// Whether the log has ended, but not all of its runs were completed.
+  bool was_stopped_early() const;
 
  private:
   void open();
