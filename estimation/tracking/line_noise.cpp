@@ -19,7 +19,7 @@ Eigen::MatrixXcd LineNoise::inverse_factor(const Eigen::MatrixXcd& scatter, Eige
     around += scatter_[static_cast<std::size_t>(l)];
     freedom += static_cast<double>(deviations_.front().cols() - 1);
   }
-  const auto prior = static_cast<double>(n_y_);
+  const double prior = std::max(0.0, 2.0 * static_cast<double>(n_y_) - (periods - 1.0));
   if (freedom > 0.0) around *= prior / freedom;
   Eigen::MatrixXcd C = (scatter + around) / (periods - 1.0 + prior);
   C.diagonal().array() += 1e-12 * C.diagonal().real().maxCoeff() + 1e-300;  // noise-free outputs

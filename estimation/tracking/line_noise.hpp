@@ -13,8 +13,9 @@ struct SumCovariance {
 
 /// The noise of the outputs on every line, learned from the scatter of a stage's residuals over periods without change.
 ///
-/// The scatter of few periods is regularized by that of the neighbouring lines, with as many degrees of freedom as
-/// outputs. The covariance of weighted sums over lines is computed by leaving out one period after the other: weights
+/// If its degrees of freedom are fewer than twice the outputs, the scatter of the neighbouring lines makes up for them.
+/// With more, that would hide the directions in which the noise is small: a loop's force noise is far above that of the
+/// sensors, but moves them together. The covariance of weighted sums over lines is computed by leaving out one period after the other: weights
 /// from the same period would lower it.
 class LineNoise {
  public:
@@ -31,7 +32,7 @@ class LineNoise {
 
  private:
   Eigen::Index n_y_;
-  /// (scatter + prior) / (periods - 1 + n_y), half of it, as a factor of its inverse.
+  /// Covariance of real and of imaginary parts, as a factor of its inverse.
   Eigen::MatrixXcd inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
                                   double periods) const;
 
