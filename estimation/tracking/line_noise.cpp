@@ -9,22 +9,47 @@
 
 namespace stageid {
 
+namespace {
+
+/// Passes of the scaling, which converges to 1 % even if the neighbours have a thousand times the noise in a direction.
+constexpr int kPasses = 10;
+
+Eigen::MatrixXcd inverse_root(Eigen::MatrixXcd C) {
+  C.diagonal().array() += 1e-12 * C.diagonal().real().maxCoeff() + 1e-300;  // noise-free outputs
+  return Eigen::LLT<Eigen::MatrixXcd>(C).matrixL().solve(
+      Eigen::MatrixXcd::Identity(C.rows(), C.cols()));
+}
+
+}  // namespace
+
 Eigen::MatrixXcd LineNoise::inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
                                            double periods) const {
+  return inverse_root(0.5 * (scatter + neighbours_[static_cast<std::size_t>(k)]) /
+                      (periods - 1.0 + static_cast<double>(n_y_)));
+}
+
+/// The scatter around a line, of n_y degrees of freedom, each neighbour scaled to the power of the line's own noise.
+Eigen::MatrixXcd LineNoise::scatter_around(Eigen::Index k) const {
   const auto N = std::ssize(scatter_);
+  const auto freedom = static_cast<double>(deviations_.front().cols() - 1);
+  const auto n_y = static_cast<double>(n_y_);
+  const Eigen::Index first = std::max<Eigen::Index>(0, k - n_y_);
+  const Eigen::Index last = std::min(N - 1, k + n_y_);
   Eigen::MatrixXcd around = Eigen::MatrixXcd::Zero(n_y_, n_y_);
-  double freedom = 0.0;
-  for (Eigen::Index l = std::max<Eigen::Index>(0, k - n_y_); l <= std::min(N - 1, k + n_y_); ++l) {
-    if (l == k) continue;
-    around += scatter_[static_cast<std::size_t>(l)];
-    freedom += static_cast<double>(deviations_.front().cols() - 1);
+  if (first == last) return around;
+  const double share = n_y / (freedom * static_cast<double>(last - first));
+  Eigen::MatrixXcd root = Eigen::MatrixXcd::Zero(n_y_, n_y_);
+  for (int pass = 0; pass <= kPasses; ++pass) {
+    around.setZero();
+    for (Eigen::Index l = first; l <= last; ++l) {
+      if (l == k) continue;
+      const Eigen::MatrixXcd& other = scatter_[static_cast<std::size_t>(l)];
+      const double power = (root * other * root.adjoint()).trace().real();
+      around += (pass == 0 ? share : share * n_y * freedom / std::max(power, 1e-300)) * other;
+    }
+    root = inverse_root((scatter_[static_cast<std::size_t>(k)] + around) / (freedom + n_y));
   }
-  const double prior = std::max(0.0, 2.0 * static_cast<double>(n_y_) - (periods - 1.0));
-  if (freedom > 0.0) around *= prior / freedom;
-  Eigen::MatrixXcd C = (scatter + around) / (periods - 1.0 + prior);
-  C.diagonal().array() += 1e-12 * C.diagonal().real().maxCoeff() + 1e-300;  // noise-free outputs
-  return Eigen::LLT<Eigen::MatrixXcd>(0.5 * C).matrixL().solve(
-      Eigen::MatrixXcd::Identity(n_y_, n_y_));
+  return around;
 }
 
 LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
@@ -44,9 +69,11 @@ LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
     scatter_.emplace_back(deviation * deviation.adjoint());
     deviations_.push_back(std::move(deviation));
   }
-  for (Eigen::Index k = 0; k < N; ++k)
+  for (Eigen::Index k = 0; k < N; ++k) {
+    neighbours_.push_back(scatter_around(k));
     inverse_factor_.push_back(
         inverse_factor(scatter_[static_cast<std::size_t>(k)], k, static_cast<double>(periods)));
+  }
 }
 
 Eigen::MatrixXd LineNoise::whitened(const Eigen::Ref<const Eigen::MatrixXcd>& columns) const {

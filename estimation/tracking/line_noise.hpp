@@ -13,10 +13,11 @@ struct SumCovariance {
 
 /// The noise of the outputs on every line, learned from the scatter of a stage's residuals over periods without change.
 ///
-/// If its degrees of freedom are fewer than twice the outputs, the scatter of the neighbouring lines makes up for them.
-/// With more, that would hide the directions in which the noise is small: a loop's force noise is far above that of the
-/// sensors, but moves them together. The covariance of weighted sums over lines is computed by leaving out one period after the other: weights
-/// from the same period would lower it.
+/// The scatter of few periods is regularized by that of the neighbouring lines, with as many degrees of freedom as
+/// outputs. Each neighbour is scaled to the power of the line's own noise, by the trace of the whitened scatter. In a
+/// loop, the noise of the forces moves the sensors together, differently from line to line; unscaled, it would hide the
+/// directions in which the noise of a line is small. The covariance of weighted sums over lines is computed by leaving
+/// out one period after the other: weights from the same period would lower it.
 class LineNoise {
  public:
   /// @param residuals of at least 4 periods, n_y x N each
@@ -31,11 +32,14 @@ class LineNoise {
   Eigen::VectorXd relative_power(const Eigen::MatrixXcd& difference) const;
 
  private:
-  Eigen::Index n_y_;
-  /// Covariance of real and of imaginary parts, as a factor of its inverse.
+  /// Of the covariance of real and imaginary parts.
   Eigen::MatrixXcd inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
                                   double periods) const;
+  Eigen::MatrixXcd scatter_around(Eigen::Index k) const;
 
+  Eigen::Index n_y_;
+
+  std::vector<Eigen::MatrixXcd> neighbours_;      // scatter_around() each line
   std::vector<Eigen::MatrixXcd> inverse_factor_;  // L^-1 of each line, L L^H = C / 2
   std::vector<Eigen::MatrixXcd> deviations_;      // of the periods, by line: n_y x periods
   std::vector<Eigen::MatrixXcd> scatter_;         // sum of their squares, by line

@@ -122,14 +122,10 @@ class WatchedStage {
   const LineSensitivity& at(Index k) const { return sensitivity_[static_cast<std::size_t>(k)]; }
 
   /// @param r  axes x lines, |r|^2 the share of the power
-  std::vector<Eigen::MatrixXcd> sensitivity(const Eigen::MatrixXcd& r) const {
-    std::vector<Eigen::MatrixXcd> out;
-    for (Index k = 0; k < r.cols(); ++k) out.push_back(stageid::sensitivity(at(k), r.col(k)));
-    return out;
-  }
   std::vector<Eigen::MatrixXd> information(const Eigen::MatrixXcd& r) const {
     std::vector<Eigen::MatrixXd> out;
-    for (const Eigen::MatrixXcd& J : sensitivity(r)) out.push_back(stageid::information(J));
+    for (Index k = 0; k < r.cols(); ++k)
+      out.push_back(stageid::information(sensitivity(at(k), r.col(k))));
     return out;
   }
   /// Mean squares over their limits: of every axis its own level or, with `rms_m`, of every sensor this rms.
@@ -151,10 +147,17 @@ class WatchedStage {
         change[p] = drift;
     return change;
   }
+  /// By the lines of which r is not zero: only these are watched.
   WatchForecast forecast(const Eigen::MatrixXcd& r, double drift, double period) const {
     TrackerOptions options;
     options.false_alarms_per_period = std::min(0.1, period / kYear_s);
-    return watch_forecast(sensitivity(r), free_motion_, prior(), change(drift), options);
+    std::vector<Eigen::MatrixXcd> J, free_motion;
+    for (Index k = 0; k < r.cols(); ++k) {
+      if (r.col(k).isZero(0.0)) continue;
+      J.push_back(sensitivity(at(k), r.col(k)));
+      free_motion.push_back(free_motion_[static_cast<std::size_t>(k)]);
+    }
+    return watch_forecast(J, free_motion, prior(), change(drift), options);
   }
 
  private:

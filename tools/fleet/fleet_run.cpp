@@ -29,11 +29,17 @@ namespace {
 class Claims {
  public:
   explicit Claims(const std::filesystem::path& store)
-      : file_(::open((store.string() + "-claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (file_.get() < 0)
-      throw FileError(fmt::format("{}-claims: {}", store.string(), system_reason(errno)));
+      : path_(store.string() + "-claims"),
+        file_(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    if (file_.get() < 0) throw FileError(fmt::format("{}: {}", path_, system_reason(errno)));
   }
-  bool claim(const std::string& job) { return set(job, F_WRLCK); }
+  /// @returns false if another process has it   @throws FileError if the file system cannot lock
+  bool claim(const std::string& job) {
+    if (set(job, F_WRLCK)) return true;
+    if (errno == EAGAIN || errno == EACCES) return false;
+    throw FileError(fmt::format("{}: cannot be locked: {}; put the store on a local disk", path_,
+                                system_reason(errno)));
+  }
   void release(const std::string& job) { static_cast<void>(set(job, F_UNLCK)); }
 
  private:
@@ -45,6 +51,7 @@ class Claims {
     lock.l_len = 1;
     return ::fcntl(file_.get(), F_OFD_SETLK, &lock) == 0;
   }
+  std::string path_;
   FileDescriptor file_;
 };
 
