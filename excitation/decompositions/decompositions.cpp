@@ -1,6 +1,7 @@
 #include "excitation/decompositions/decompositions.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 #include <limits>
 
 namespace stageid {
@@ -18,7 +19,29 @@ Eigen::MatrixXd leading(const Decomposition& qr, Eigen::Index columns) {
   return qr.householderQ() * Eigen::MatrixXd::Identity(qr.rows(), columns);
 }
 
+void balance(Eigen::MatrixXd& a) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (Eigen::Index i = 0; i < a.rows(); ++i) {
+      const double diagonal = std::abs(a(i, i));
+      const double column = a.col(i).lpNorm<1>() - diagonal;
+      const double row = a.row(i).lpNorm<1>() - diagonal;
+      if (!(column > 0.0) || !(row > 0.0)) continue;
+      const double factor = std::exp2(std::round(0.5 * std::log2(row / column)));
+      if (!(column * factor + row / factor < 0.95 * (column + row))) continue;
+      a.col(i) *= factor;
+      a.row(i) /= factor;
+      changed = true;
+    }
+  }
+}
+
 }  // namespace
+
+Eigen::VectorXcd balanced_eigenvalues(Eigen::MatrixXd m) {
+  balance(m);
+  return eigenvalues(m);
+}
 
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& m) {
   return converged_eigenvalues<Eigen::EigenSolver<Eigen::MatrixXd>>(m);

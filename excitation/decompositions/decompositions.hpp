@@ -12,6 +12,13 @@ namespace stageid {
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& m);
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXcd& m);
 
+/// The same of a system, whose states may have different units: with metres and newtons, eigenvalues() would lose half
+/// their digits. States are scaled by powers of two until rows and columns have similar norms.
+/// Source: B. N. Parlett and C. Reinsch, Numer. Math. 13 (1969) 293.
+Eigen::VectorXcd balanced_eigenvalues(Eigen::MatrixXd m);
+/// Far above their rounding errors for some hundred rows.
+inline constexpr double kEigenvalueRounding = 1e-8;
+
 /// Eigenvalues and eigenvectors of a square matrix, unordered.
 Eigen::EigenSolver<Eigen::MatrixXd> general_eigen(const Eigen::MatrixXd& m);
 

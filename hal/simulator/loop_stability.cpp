@@ -17,8 +17,6 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Far above the rounding errors of eigenvalues of a balanced matrix of some hundred rows.
-constexpr double kRounding = 1e-8;
 /// Limits the computation to some seconds.
 constexpr Index kMostStates = 1000;
 
@@ -155,25 +153,6 @@ class SampledLoop {
   std::vector<LoopMode> modes_;
 };
 
-/// Scales states by powers of two until rows and columns have similar norms (Parlett and Reinsch 1969). With
-/// metres and newtons, the eigenvalues would lose half their digits.
-void balance(MatrixXd& a) {
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (Index i = 0; i < a.rows(); ++i) {
-      const double diagonal = std::abs(a(i, i));
-      const double column = a.col(i).lpNorm<1>() - diagonal;
-      const double row = a.row(i).lpNorm<1>() - diagonal;
-      if (!(column > 0.0) || !(row > 0.0)) continue;
-      const double factor = std::exp2(std::round(0.5 * std::log2(row / column)));
-      if (!(column * factor + row / factor < 0.95 * (column + row))) continue;
-      a.col(i) *= factor;
-      a.row(i) /= factor;
-      changed = true;
-    }
-  }
-}
-
 /// Frequencies for the search of the largest sensitivity: a logarithmic grid, refined around the modes.
 std::vector<double> test_frequencies(const std::vector<PlantMode>& modes, double highest) {
   constexpr int kPerDecade = 200;
@@ -196,7 +175,9 @@ double largest_sensitivity(const MatrixXcd& loop_gain) {
   return 1.0 / (eigenvalues(loop_gain).array() + 1.0).abs().minCoeff();
 }
 
-bool LoopStability::stable() const noexcept { return !tested || largest_pole <= 1.0 + kRounding; }
+bool LoopStability::stable() const noexcept {
+  return !tested || largest_pole <= 1.0 + kEigenvalueRounding;
+}
 
 LoopStability loop_stability(const StageSpec& stage, const PlantSpec& plant) {
   const StageInfo& info = stage.info;
@@ -206,10 +187,9 @@ LoopStability loop_stability(const StageSpec& stage, const PlantSpec& plant) {
   const std::vector<PlantMode> modes = plant_modes(info, plant);
   const SampledLoop loop(info, modes, controller.realization());
   if (loop.states() > kMostStates) return out;
-  MatrixXd a = loop.matrix();
-  balance(a);
+  const MatrixXd a = loop.matrix();
   if (!a.allFinite()) return out;
-  const Eigen::VectorXcd poles = eigenvalues(a);
+  const Eigen::VectorXcd poles = balanced_eigenvalues(a);
   if (!poles.allFinite()) return out;
   out.tested = true;
   Index outermost = 0;

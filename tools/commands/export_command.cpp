@@ -14,8 +14,12 @@
 #include "acquisition/files/file_kind.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/config/stage_config.hpp"
+#include "tools/control/controller_view.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
+#include "tools/exchange/model/covariance_file.hpp"
 #include "tools/exchange/model/model_export.hpp"
+#include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -40,28 +44,62 @@ Eigen::Index place_of(const std::string& name, const ChannelList& channels, cons
   return found - channels.names.begin();
 }
 
-/// stageid export MODEL|FRF -o FILE.{json,h5,csv,mat,npz,unv,uff,py,m}
+/// stageid export MODEL|FRF -o FILE.{json,h5,csv,mat,npz,unv,uff,py,m,h}
 struct ExportFlags {
   std::filesystem::path input;
   std::filesystem::path output;
   std::filesystem::path frf;
+  std::filesystem::path stage;  ///< of --controller-view; empty: none
+  std::filesystem::path covariance;
   std::vector<std::string> driving_point;
   MatVersion mat_version = MatVersion::v5;
 };
+
+/// Of the FRF within the band of the fit, or default_lines().
+Eigen::VectorXd lines_of(const ExportFlags& flags, const AdditiveModel& model) {
+  if (flags.frf.empty()) return default_lines(model);
+  const FrfEstimate frf = read_frf(flags.frf);
+  const bool fitted_band = model.fit.band_hz[1] > model.fit.band_hz[0];
+  return fitted_band ? select_band(frf, model.fit.band_hz[0], model.fit.band_hz[1]).frequency_hz
+                     : frf.frequency_hz;
+}
+
+/// The loop of the model with the controller of a stage file.
+void export_controller_view(const ExportFlags& flags, Console& console) {
+  if (!flags.driving_point.empty())
+    throw std::invalid_argument("--driving-point: not with --controller-view; remove one");
+  require_ending(flags.output, "a controller view", {".json", ".csv"});
+  require_no_input(flags.output, {flags.input, flags.frf, flags.stage, flags.covariance});
+  const AdditiveModel model = read_model(flags.input);
+  const Eigen::VectorXd frequency_hz = lines_of(flags, model);
+  if (frequency_hz.size() == 0)
+    throw std::invalid_argument(
+        fmt::format("{}: the model does not contain its band; define the lines with --frf FRF",
+                    flags.input.string()));
+  const StageConfig stage = load_stage_config(flags.stage);
+  Eigen::MatrixXd covariance;
+  if (!flags.covariance.empty()) covariance = read_covariance(flags.covariance, model);
+  const ControllerView view = controller_view(stage, model, covariance, frequency_hz);
+  write_controller_view(flags.output, view);
+  for (const std::string& line : controller_view_lines(view)) console.result(line);
+  console.result(fmt::format("wrote {}", flags.output.string()));
+  nlohmann::ordered_json json = {{"output", flags.output.string()}};
+  json.update(controller_view_json(view, false));
+  console.result(json);
+  if (view.view.poles.stable()) return;
+  console.exit_code = kNotTrustworthy;
+  console.warning(
+      fmt::format("{}: the closed loop of the model is unstable, so it has no margins. Use the "
+                  "stage file of the measurement, or correct its controller",
+                  flags.stage.string()));
+}
 
 void export_from_model(const ExportFlags& flags) {
   require_export_format(flags.output);
   require_no_input(flags.output, {flags.input, flags.frf});
   const AdditiveModel model = read_model(flags.input);
   ExportedResponse exported;
-  exported.frequency_hz = default_lines(model);
-  if (!flags.frf.empty()) {
-    const FrfEstimate frf = read_frf(flags.frf);
-    const bool fitted_band = model.fit.band_hz[1] > model.fit.band_hz[0];
-    exported.frequency_hz =
-        fitted_band ? select_band(frf, model.fit.band_hz[0], model.fit.band_hz[1]).frequency_hz
-                    : frf.frequency_hz;
-  }
+  exported.frequency_hz = lines_of(flags, model);
   std::optional<DrivingPoint> driving_point;
   if (!flags.driving_point.empty())
     driving_point = {place_of(flags.driving_point[0], model.outputs, "output"),
@@ -70,9 +108,10 @@ void export_from_model(const ExportFlags& flags) {
 }
 
 void export_from_frf(const ExportFlags& flags) {
-  if (!flags.frf.empty() || !flags.driving_point.empty())
+  if (!flags.frf.empty() || !flags.driving_point.empty() || !flags.stage.empty())
     throw std::invalid_argument(
-        fmt::format("{}: is an HDF5 file, not a model; --frf and --driving-point need a model.json",
+        fmt::format("{}: is an HDF5 file, not a model; --frf, --driving-point and "
+                    "--controller-view need a model.json",
                     flags.input.string()));
   require_no_input(flags.output, {flags.input});
   const FrfEstimate frf = read_frf(flags.input);
@@ -82,8 +121,12 @@ void export_from_frf(const ExportFlags& flags) {
 }
 
 void export_file(const ExportFlags& flags, Console& console) {
+  if (!flags.covariance.empty() && flags.stage.empty())
+    throw std::invalid_argument("--covariance: needs --controller-view STAGE; add it");
   if (is_hdf5(flags.input))
     export_from_frf(flags);
+  else if (!flags.stage.empty())
+    return export_controller_view(flags, console);
   else
     export_from_model(flags);
   console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
@@ -104,7 +147,7 @@ void export_command(CLI::App& app, Console& console) {
   command
       .add_option("-o,--output", flags.output,
                   "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
-                  "a model also .json, .py, .m")
+                  "a model also .json, .py, .m, .h (C99)")
       ->required();
   command.add_option(
       "--frf", flags.frf,
@@ -114,6 +157,12 @@ void export_command(CLI::App& app, Console& console) {
                   "OUTPUT INPUT at the same point and in the same direction: add the modal mass of "
                   "each mode at this point to .h5, .mat or .npz")
       ->expected(2);
+  command.add_option(
+      "--controller-view", flags.stage,
+      "STAGE, stage file: write the loop of the model with its controller to .json or .csv: "
+      "Nyquist curves, sensitivity and margins");
+  command.add_option("--covariance", flags.covariance,
+                     "of 'fit --covariance', for --controller-view: 95 % discs and radii");
   add_mat_version(command, flags.mat_version);
 }
 

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
 
@@ -26,7 +30,9 @@ void add_delays(const AdditiveModel& model, Eigen::Index delays, NamedParameters
   const Eigen::VectorXd inputs = model.input_delays_s();
   if (delays == 1 && model.n_inputs() + model.n_outputs() > 2)
     return out.add("input_delay_s", "s", inputs[0]);
-  for (Eigen::Index p = 0; p < delays; ++p) {
+  // Another number is that of another model.
+  const Eigen::Index most = model.n_inputs() + model.n_outputs() - 1;
+  for (Eigen::Index p = 0; p < std::min(delays, most); ++p) {
     const Eigen::Index y = p - model.n_inputs();
     if (y < 0)
       out.add(fmt::format("input_delay_s[{}]", p), "s", inputs[p]);
@@ -43,8 +49,7 @@ void NamedParameters::add(const std::string& name, const std::string& unit, doub
   values.push_back(value);
 }
 
-NamedParameters named_parameters(const FitResult& result) {
-  const AdditiveModel& model = result.model;
+NamedParameters named_parameters(const AdditiveModel& model, Eigen::Index parameters) {
   NamedParameters out;
   Eigen::Index numerators = 0;
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
@@ -55,7 +60,7 @@ NamedParameters named_parameters(const FitResult& result) {
     numerators += std::ssize(s.numerator) * model.n_inputs() * model.n_outputs();
   }
   // The remaining rows are the free delays.
-  add_delays(model, result.covariance.sandwich.rows() - std::ssize(out.names) - numerators, out);
+  add_delays(model, parameters - std::ssize(out.names) - numerators, out);
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
     const Submodel& s = model.submodels[i];
     for (std::size_t m = 0; m < s.numerator.size(); ++m)
@@ -72,7 +77,7 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
                       const Eigen::VectorXd& frequency_hz) {
   const AdditiveModel& model = result.model;
   const FitCovariance& covariance = result.covariance;
-  const NamedParameters parameters = named_parameters(result);
+  const NamedParameters parameters = named_parameters(model, covariance.sandwich.rows());
   OutputFile output(target);
   Hdf5File file = Hdf5File::create(output.path(), target);
   file.write_attribute("/", "format", std::string("stageid-covariance"));
@@ -93,6 +98,24 @@ void write_covariance(const std::filesystem::path& target, const FitResult& resu
   file.write_attribute("/confidence_radius", "level", 0.95);
   file.close();
   output.commit();
+}
+
+Eigen::MatrixXd read_covariance(const std::filesystem::path& path, const AdditiveModel& model) {
+  const Hdf5File file = Hdf5File::open(path);
+  require_format(file, "stageid-covariance", "a covariance",
+                 "write one with 'stageid fit --covariance'");
+  const std::vector<double> values = file.read_reals("/parameters/value");
+  const std::vector<double> sandwich = file.read_reals("/covariance/sandwich");
+  if (sandwich.size() != values.size() * values.size())
+    throw FormatError(path, "/covariance/sandwich",
+                      fmt::format("has {} values for {} parameters; write it again",
+                                  sandwich.size(), values.size()));
+  const auto n = static_cast<Eigen::Index>(values.size());
+  if (named_parameters(model, n).values != values)
+    throw FormatError(path, "/parameters/value",
+                      "differs from the model; use the covariance that 'stageid fit' wrote "
+                      "together with this model");
+  return Eigen::Map<const Eigen::MatrixXd>(sandwich.data(), n, n);  // symmetric
 }
 
 }  // namespace stageid

@@ -16,12 +16,15 @@ struct NamedParameters {
 
   void add(const std::string& name, const std::string& unit, double value);
 };
-/// @pre result.covariance is not empty
-NamedParameters named_parameters(const FitResult& result);
+/// @param parameters rows of the covariance; the number of free delays follows from it
+NamedParameters named_parameters(const AdditiveModel& model, Eigen::Index parameters);
 
 /// Writes the covariance of a fit as in docs/formats.md, atomically.
 /// @pre result.covariance is not empty   @throws FileError
 void write_covariance(const std::filesystem::path& file, const FitResult& result,
                       const Eigen::VectorXd& frequency_hz);
+
+/// FitCovariance::sandwich of the file. @throws FileError, FormatError also if it belongs to another model
+Eigen::MatrixXd read_covariance(const std::filesystem::path& file, const AdditiveModel& model);
 
 }  // namespace stageid

@@ -15,6 +15,7 @@
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/arrays/frf_csv.hpp"
 #include "tools/exchange/arrays/npz_file.hpp"
+#include "tools/exchange/model/model_code.hpp"
 #include "tools/exchange/model/model_script.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -139,8 +140,9 @@ UffContent uff_of_model(const std::filesystem::path& file, const AdditiveModel& 
 }  // namespace
 
 void require_export_format(const std::filesystem::path& file) {
-  require_ending(file, "a model",
-                 {".json", ".h5", ".hdf5", ".csv", ".mat", ".npz", ".unv", ".uff", ".py", ".m"});
+  require_ending(
+      file, "a model",
+      {".json", ".h5", ".hdf5", ".csv", ".mat", ".npz", ".unv", ".uff", ".py", ".m", ".h"});
 }
 
 void export_model(const std::filesystem::path& file, const AdditiveModel& model,
@@ -156,6 +158,8 @@ void export_model(const std::filesystem::path& file, const AdditiveModel& model,
     write_text_file(
         file, model_script(model, ending == ".m" ? ScriptLanguage::matlab : ScriptLanguage::python,
                            file.stem().string()));
+  else if (ending == ".h")
+    write_text_file(file, model_code(model, file.stem().string()));
   else if (is_uff_name(file))
     write_uff(file, uff_of_model(file, model, response.frequency_hz));
   else if (ending == ".mat" || ending == ".npz")

@@ -5,7 +5,7 @@
 //   .json        the model                        .h5, .hdf5   tools/exchange/model/model_hdf5.hpp
 //   .csv         a table, frf_csv.hpp             .npz, .mat   the content of .h5 for numpy and MATLAB
 //   .unv, .uff   tools/exchange/uff/uff_frf.hpp, text and binary: response and modes
-//   .py, .m      tools/exchange/model/model_script.hpp
+//   .py, .m      tools/exchange/model/model_script.hpp          .h    model_code.hpp, C99
 
 #include <filesystem>
 #include <optional>
