@@ -50,7 +50,7 @@ void report_command(CLI::App& app, Console& console) {
   command
       .add_option("inputs", flags.inputs,
                   "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
-                  "modes, log, stage file (channel positions)")
+                  "modes, log, controller view, stage file (channel positions)")
       ->required();
   command.add_option("--compare", flags.compare,
                      "results to compare with: another output directory of 'stageid identify', or "

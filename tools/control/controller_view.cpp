@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/output_file.hpp"
+#include "estimation/file/json_file.hpp"
 #include "tools/control/stage_loop.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -157,6 +158,25 @@ std::vector<std::string> controller_view_lines(const ControllerView& of) {
   out.push_back(
       fmt::format("least |det(I + L)|: {}", margin_text(of.view.margins->distance, 1.0, "")));
   return out;
+}
+
+std::string read_controller_view(const std::filesystem::path& path) {
+  const JsonFile file(path, "stageid-controller-view");
+  const JsonNode root = file.root();
+  const std::size_t lines = root.member("frequency_hz").numbers().size();
+  const auto check_curve = [&](const JsonNode& curve) {
+    std::vector<JsonNode> parts = {curve.member("re"), curve.member("im")};
+    if (curve.has("radius_95")) parts.push_back(curve.member("radius_95"));
+    for (const JsonNode& part : parts)
+      if (part.numbers_or_null().size() != lines)
+        part.fail(fmt::format("needs {} numbers, one per frequency", lines));
+  };
+  check_curve(root.member("determinant"));
+  for (const JsonNode& loop : root.elements_of("loops")) {
+    static_cast<void>(loop.member("name").text());
+    check_curve(loop);
+  }
+  return root.raw().dump();
 }
 
 void write_controller_view(const std::filesystem::path& file, const ControllerView& view) {

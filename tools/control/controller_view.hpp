@@ -30,6 +30,9 @@ std::string controller_view_csv(const ControllerView& view);
 /// For people: one line per loop, one on the multivariable loop.
 std::vector<std::string> controller_view_lines(const ControllerView& view);
 
+/// The text of such a .json file with its curves, checked. @throws FileError, FormatError
+std::string read_controller_view(const std::filesystem::path& file);
+
 /// Writes the view by the ending of the file, .json or .csv, atomically. @throws FileError
 void write_controller_view(const std::filesystem::path& file, const ControllerView& view);
 

@@ -18,6 +18,7 @@
 #include "estimation/file/json_file.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/stage_config.hpp"
+#include "tools/control/controller_view.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
 #include "tools/experiment/run_metadata.hpp"
 #include "tools/report/report_comparison.hpp"
@@ -67,14 +68,16 @@ struct ReportPart {
   std::filesystem::path ReportInput::*place;
   const char* name;  ///< null: not in a directory
 };
-constexpr ReportPart kParts[] = {{"stageid-frf", &ReportInput::frf, "frf.h5"},
-                                 {"stageid-frf", &ReportInput::validation_frf, "frf_validation.h5"},
-                                 {"stageid-model", &ReportInput::model, "model.json"},
-                                 {"stageid-model-h5", &ReportInput::model_h5, "model.h5"},
-                                 {"stageid-modes", &ReportInput::modes, "modes.json"},
-                                 {"stageid-log", &ReportInput::log, "run.slog"},
-                                 {"stageid-summary", &ReportInput::summary, "summary.json"},
-                                 {"stageid-stage", &ReportInput::stage, nullptr}};
+constexpr ReportPart kParts[] = {
+    {"stageid-frf", &ReportInput::frf, "frf.h5"},
+    {"stageid-frf", &ReportInput::validation_frf, "frf_validation.h5"},
+    {"stageid-model", &ReportInput::model, "model.json"},
+    {"stageid-model-h5", &ReportInput::model_h5, "model.h5"},
+    {"stageid-modes", &ReportInput::modes, "modes.json"},
+    {"stageid-log", &ReportInput::log, "run.slog"},
+    {"stageid-summary", &ReportInput::summary, "summary.json"},
+    {"stageid-controller-view", &ReportInput::controller_view, "controller_view.json"},
+    {"stageid-stage", &ReportInput::stage, nullptr}};
 
 void add_directory(ReportInput& input, const std::filesystem::path& directory) {
   for (const ReportPart& part : kParts)
@@ -96,7 +99,7 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
   if (part == std::end(kParts))
     throw std::invalid_argument(
         fmt::format("{}: cannot be shown in a report; remove it, or use a log, FRF, model, modes, "
-                    "summary or stage file of stageid",
+                    "summary, controller view or stage file of stageid",
                     file.string()));
   put(input.*part->place, file);
 }
@@ -244,6 +247,8 @@ void complete_report(ReportData& data, const ReportInput& input,
   }
   if (!input.log.empty()) add_log(data, input.log);
   if (!input.stage.empty()) data.geometry = stage_info(input.stage, read_whole_file(input.stage));
+  if (!input.controller_view.empty())
+    data.controller_view = read_controller_view(input.controller_view);
   if (!data.geometry.name.empty()) data.title = data.geometry.name;
   if (!summary.is_null()) add_summary(data, input.summary, summary);
 }

@@ -17,6 +17,7 @@ struct ReportInput {
   std::filesystem::path modes;
   std::filesystem::path log;
   std::filesystem::path summary;
+  std::filesystem::path controller_view;
   std::filesystem::path stage;  ///< for the positions; default: the one in the log
 };
 

@@ -287,6 +287,7 @@ PageContent page_content(const ReportData& data) {
   json["findings"] = health_json(data.findings);
   if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
   if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
+  if (!data.controller_view.empty()) json["loop"] = parse_json<Json>(data.controller_view);
   if (data.comparison) json["comparison"] = comparison_json(data);
   if (data.validation) json["validation"] = validation_json(*data.validation);
   json["arrays"] = std::move(arrays.description);

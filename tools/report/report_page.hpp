@@ -72,6 +72,9 @@ struct ReportData {
   std::vector<StabilizationPole> stabilization;  ///< empty: no diagram
   std::optional<NonlinearityTest> nonlinearity;  ///< of frf's channels
 
+  std::string
+      controller_view;  ///< JSON of tools/control/controller_view.hpp with its curves; empty: none
+
   std::optional<ReportComparison> comparison;
 
   std::optional<Validation> validation;

@@ -13,6 +13,7 @@ function buildPage() {
   if (content.stabilization) buildStabilization();
   if (content.modes) buildModes();
   if (content.shapes && content.shapes.modes.length) buildShapes();
+  if (content.loop) buildLoop();
   if (content.comparison) buildComparison();
   if (content.validation) buildValidation();
   if (content.frf && content.nonlinearity) buildNonlinearity();

@@ -75,7 +75,7 @@ function drawNyquist(context, width, height) {
   if (!data || data.points.length === 0) return;
   const frame = planeFrame(data, width, height);
   const colours = palette();
-  drawPlane(context, frame, height);
+  drawPlane(context, frame, height, entryUnit(data.channel));
   context.save();
   clipTo(context, frame.area.x, frame.area.y, frame.area.w, frame.area.h);
   drawCircles(context, frame, data.points, colours.measured);
@@ -119,7 +119,7 @@ function drawCircles(context, frame, points, colour) {
   }
 }
 
-function drawPlane(context, frame, height) {
+function drawPlane(context, frame, height, quantity) {
   const { area } = frame;
   const largest = Math.max(...frame.re.map(Math.abs), ...frame.im.map(Math.abs));
   const power = 3 * Math.floor(Math.log10(largest) / 3);
@@ -143,8 +143,8 @@ function drawPlane(context, frame, height) {
     line(area.x, y, area.x + area.w, y, Math.abs(v) < frame.unit);
     drawText(context, text, area.x - 5, y, { align: 'right', base: 'middle' });
   }
-  const unit = (power ? powerOfTen(power) + '\u00a0' : '') + entryUnit(nyquist.shown.channel);
-  drawText(context, 'Re, Im [' + unit + ']', area.x + area.w / 2, height - 6, { align: 'center' });
+  const unit = [power ? powerOfTen(power) : '', quantity].filter(Boolean).join('\u00a0');
+  drawText(context, 'Re, Im' + (unit ? ' [' + unit + ']' : ''), area.x + area.w / 2, height - 6, { align: 'center' });
 }
 
 function nearestText(event) {
