@@ -50,6 +50,27 @@ class Octave(Case):
                     "e = max(abs(P(:) - response(:)) ./ abs(response(:))); assert(e < 3e-10);"
                     "assert(isequal(model.Ad, state_space.discrete.A)); assert(isequal(model.outputs{2}, 'z''2'));")
 
+    def test_builds_what_the_toolboxes_of_matlab_take(self):
+        """Stand-ins keep their arguments: sizes, delays, sample times, and A as umat and ureal make it."""
+        uncertain = json.loads(json.dumps(MODEL))
+        uncertain["submodels"][1].update(natural_frequency_std_hz=0.02, damping_ratio_std=1e-4)
+        (WORK / "model.json").write_text(json.dumps(uncertain))
+        self.exports("model.json", "m.m")
+        stubs = WORK / "stubs"
+        stubs.mkdir(exist_ok=True)
+        for name, body in (("ss", "s.args = varargin;"), ("idss", "s.from = varargin{1};"), ("absorbDelay", "s = varargin{1}; s.absorbed = true;"),
+                           ("idfrd", "s.args = varargin;"), ("uss", "s = [];"), ("umat", "s = varargin{1};"),
+                           ("ureal", "global radius; radius.(varargin{1}) = varargin{4}; s = varargin{2};")):
+            (stubs / f"{name}.m").write_text(f"function s = {name}(varargin)\n{body}\nend\n")
+        self.octave("addpath('stubs'); global radius; radius = struct(); model = m(); a = model.continuous.args;"
+                    "assert(isequal(a(1:4), {model.A, model.B, model.C, model.D})); assert(isequal(a{6}, model.input_delay_s));"
+                    "u = model.uncertain.args{1}; assert(max(abs(u(:) - model.A(:))) < 1e-9 * max(abs(model.A(:))));"
+                    "assert(abs(radius.f1 - 1.96 * 0.02) < 1e-12); assert(abs(radius.zeta1 - 1.96e-4) < 1e-12);"
+                    "s = model.sampled.args; assert(s{5} == 1 / model.sample_rate_hz); assert(isequal(s{7}, model.input_delay_samples));"
+                    "assert(model.identified.from.absorbed);"
+                    "g = model.frd.args; assert(isequal(size(g{1}), [size(model.C, 1), size(model.B, 2), 1000]));"
+                    "assert(abs(g{2}(end) - 2 * pi * model.band_hz(2)) < 1e-9); assert(g{3} == 1 / model.sample_rate_hz);")
+
     def test_loads_models_to_the_bit(self):
         self.export_model("m.mat", "m73.mat", "m.h5")
         self.same("m.h5", ("m.mat", "m73.mat"),

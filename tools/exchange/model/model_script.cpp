@@ -90,6 +90,29 @@ void add_system(const Syntax& syntax, const StateSpace& system, const std::strin
   text += syntax.assign("D" + suffix, syntax.matrix(system.D));
 }
 
+/// For the uncertain model: deviations of the modes (NaN: unknown), and rows [mode, first state of a pair], from 1.
+std::string uncertain_modes(const AdditiveModel& model, const Syntax& syntax) {
+  std::vector<double> frequency_std_hz, damping_std;
+  std::vector<Eigen::RowVector2d> pairs;
+  const StateSpace system = state_space(model);
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
+    const Submodel& s = model.submodels[i];
+    if (!s.is_mode()) continue;
+    frequency_std_hz.push_back(s.natural_frequency_std_hz.value_or(std::nan("")));
+    damping_std.push_back(s.damping_ratio_std.value_or(std::nan("")));
+    for (const StateBlock& block : system.blocks)
+      if (block.submodel == static_cast<long long>(i) && block.size == 2)
+        pairs.emplace_back(static_cast<double>(damping_std.size()),
+                           static_cast<double>(block.first) + 1.0);
+  }
+  Eigen::MatrixXd states(std::ssize(pairs), 2);
+  for (Eigen::Index row = 0; row < states.rows(); ++row)
+    states.row(row) = pairs[static_cast<std::size_t>(row)];
+  return syntax.assign("NATURAL_FREQUENCY_STD_HZ", syntax.vector(frequency_std_hz)) +
+         syntax.assign("DAMPING_RATIO_STD", syntax.vector(damping_std)) +
+         syntax.assign("MODE_STATES", syntax.matrix(states));
+}
+
 std::string model_data(const AdditiveModel& model, const Syntax& syntax) {
   std::string text;
   text += syntax.assign("INPUTS", syntax.texts(model.inputs.names));
@@ -195,19 +218,64 @@ constexpr const char* kMatlabHead = R"(function model = {3}()
 % Continuous: x' = A x + B u, y = C x + D u, input j delayed by input_delay_s(j) and output i by
 % output_delay_s(i). Sampled, if the sample rate is known: Ad, Bd, Cd, Dd behind a zero-order hold,
 % with whole samples of delay. model.response(f) is outputs x inputs x length(f) as the model's hold
-% has it. SI units. Without an output argument it is plotted.
+% has it. SI units. Without an output argument it is plotted. With the toolboxes of MATLAB:
+%   Control System         model.continuous and model.sampled, ss with delays
+%   System Identification  model.identified, idss, and model.frd, idfrd on 1000 lines of the band
+%   Robust Control         model.uncertain, uss: natural frequencies and damping ratios +- 1.96 standard deviations
 )";
 
 constexpr const char* kMatlabTail = R"(
 model.continuous_response = @(f) continuous_response(model, f);
 model.response = @(f) held_response(model, f);
-if exist('ss', 'file') && ~exist('OCTAVE_VERSION', 'builtin')
-  model.continuous = ss(model.A, model.B, model.C, model.D, 'InputDelay', model.input_delay_s, ...
-    'OutputDelay', model.output_delay_s, 'InputName', model.inputs, 'OutputName', model.outputs);
+if exist('absorbDelay', 'file') % not in Octave
+  model = add_toolbox_models(model);
 end
 if nargout == 0
   plot_model(model);
   clear model
+end
+end
+
+function model = add_toolbox_models(model)
+names = {'InputName', model.inputs, 'OutputName', model.outputs};
+delays = {'InputDelay', model.input_delay_s, 'OutputDelay', model.output_delay_s};
+model.continuous = ss(model.A, model.B, model.C, model.D, delays{:}, names{:});
+if exist('uss', 'file')
+  model.uncertain = ss(uncertain_transition(model), model.B, model.C, model.D, delays{:}, names{:});
+end
+if model.sample_rate_hz > 0
+  Ts = 1 / model.sample_rate_hz;
+  model.sampled = ss(model.Ad, model.Bd, model.Cd, model.Dd, Ts, 'InputDelay', ...
+    model.input_delay_samples, 'OutputDelay', model.output_delay_samples, names{:});
+  if exist('idss', 'file')
+    model.identified = idss(absorbDelay(model.sampled)); % its outputs cannot have delays
+  end
+end
+if exist('idfrd', 'file') && model.band_hz(2) > model.band_hz(1)
+  f = linspace(model.band_hz(1), model.band_hz(2), 1000).';
+  Ts = 0;
+  if ~strcmp(model.hold, 'none')
+    Ts = 1 / model.sample_rate_hz;
+  end
+  model.frd = idfrd(model.response(f), 2 * pi * f, Ts, names{:});
+end
+end
+
+function A = uncertain_transition(model)
+% A with the pair of poles of every mode whose deviations are known as w [-zeta, -c; c, -zeta], c = sqrt(1 - zeta^2).
+A = umat(model.A);
+for k = 1:numel(model.natural_frequency_hz)
+  df = 1.96 * model.natural_frequency_std_hz(k);
+  dz = 1.96 * model.damping_ratio_std(k);
+  if ~(df > 0 && dz > 0)
+    continue
+  end
+  w = 2 * pi * ureal(sprintf('f%d', k), model.natural_frequency_hz(k), 'PlusMinus', df);
+  z = ureal(sprintf('zeta%d', k), model.damping_ratio(k), 'PlusMinus', dz);
+  c = sqrt(1 - model.damping_ratio(k)^2);
+  for i = model.mode_states(model.mode_states(:, 1) == k, 2).'
+    A(i:i+1, i:i+1) = w * [-z, -c; c, -z];
+  end
 end
 end
 
@@ -271,7 +339,8 @@ std::string model_script(const AdditiveModel& model, ScriptLanguage language,
   const bool python = language == ScriptLanguage::python;
   const std::string head = fmt::format(fmt::runtime(python ? kPythonHead : kMatlabHead),
                                        model.n_outputs(), model.n_inputs(), version(), function);
-  return head + model_data(model, syntax) + (python ? kPythonTail : kMatlabTail);
+  return head + model_data(model, syntax) +
+         (python ? kPythonTail : uncertain_modes(model, syntax) + kMatlabTail);
 }
 
 }  // namespace stageid
