@@ -8,6 +8,7 @@
 //   beyond      with one or two modes above the band too
 //   coloured    as contained, with white, flicker, drift or resonant noise
 //   suspended   as contained, on a suspension of 0.02 Hz, far below the band
+//   known       the same, and the fit is given that frequency (--rigid-body suspension:0.02)
 // The true margins follow from the plant and the controller of the simulator by a search on a dense grid, with every
 // axis opened explicitly. Prints every stage, and the shares with their 95 % intervals from the scatter of the stages.
 #include <fmt/format.h>
@@ -210,10 +211,10 @@ struct Study {
   }
 };
 
-std::string study(const JudgementStage& stage, Study& study) {
+std::string study(const JudgementStage& stage, const stageid::FitRequest& request, Study& study) {
   const stageid::test::MemoryLog log = stageid::test::measure_with_trouble(stage, {});
   stageid::FitSetup setup =
-      stageid::make_fit_setup({.threads = 2}, stageid::estimate_plant_frf({&log}, {}));
+      stageid::make_fit_setup(request, stageid::estimate_plant_frf({&log}, {}));
   setup.options.covariance = true;
   const stageid::FitResult fit = stageid::fit_model(setup, setup.options);
   if (!fit.trustworthy() || fit.covariance.sandwich.size() == 0)
@@ -263,7 +264,7 @@ std::string study(const JudgementStage& stage, Study& study) {
 }
 
 void become(const std::string& plant, JudgementStage& stage) {
-  if (plant != "suspended")
+  if (plant != "suspended" && plant != "known")
     for (double& hz : stage.spec.plant.suspension_hz) hz = 0.0;
   if (plant != "beyond")
     stage.spec.plant.in_plane_modes.resize(static_cast<std::size_t>(stage.modes_in_band));
@@ -279,12 +280,18 @@ int main(int argc, char** argv) {
   auto seed = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 770001);
   const std::string plant = argc > 3 ? argv[3] : "contained";
   const auto most = static_cast<std::size_t>(argc > 4 ? std::atoi(argv[4]) : 20);
+  stageid::FitRequest request;
+  request.threads = 2;
+  if (plant == "known") {
+    request.rigid_body.kind = stageid::RigidBodyRequest::Kind::suspension;
+    request.rigid_body.suspension_hz = {0.02};
+  }
   Study all;
   for (int done = 0; done < stages; ++seed) {
     JudgementStage stage = stageid::test::draw_judgement_stage(seed);
     if (stage.spec.info.sensors.size() * stage.spec.info.actuators.size() > most) continue;
     become(plant, stage);
-    const std::string told = study(stage, all);
+    const std::string told = study(stage, request, all);
     fmt::print("{}: {}; {}\n", seed, stage.description(), told);
     std::fflush(stdout);
     if (told.rfind("left out", 0) != 0) ++done;

@@ -41,7 +41,7 @@ function loopFacts() {
 function marginText(margin, scale, unit) {
   if (!margin || !isNumber(margin.value)) return '\u2013';
   return number(scale * margin.value, 4) + (isNumber(margin.radius_95) ? ' \u00b1 ' + number(scale * margin.radius_95, 2) : '') +
-    (unit ? '\u00a0' + unit : '') + ' at ' + hertz(margin.frequency_hz) + (margin.extrapolated ? ' (outside the fitted band)' : '');
+    (unit ? '\u00a0' + unit : '') + ' at ' + hertz(margin.frequency_hz) + (margin.extrapolated ? ' (extrapolated)' : '');
 }
 
 function marginColumns() {
