@@ -1,7 +1,8 @@
 #pragma once
 
-/// Modal models from frequency responses: fit, validation, mode shapes, state space.
+/// Modal models from frequency responses: fit, validation, mode shapes, state space, loop with a controller.
 
+#include "estimation/loop/loop_view.hpp"
 #include "estimation/modal/modal_assurance.hpp"
 #include "estimation/modal/mode_shapes.hpp"
 #include "estimation/modal/prediction_error.hpp"

@@ -141,7 +141,9 @@ void require_identifier(const std::string& name) {
             static_cast<unsigned char>(c) < 128;
   if (!valid)
     throw std::invalid_argument(fmt::format(
-        "'{}' is not a C identifier; use a file name of letters, digits and '_'", name));
+        "{0}.h: '{0}' is not a C identifier, as the names in the code need; use letters, "
+        "digits and '_'",
+        name));
 }
 
 }  // namespace
