@@ -55,11 +55,11 @@ class LoopBuilder {
     return std::abs(entries[i]) > kRounding * entries.cwiseAbs().maxCoeff();
   }
 
-  bool in_model(const Usage& loop) const {
-    for (std::size_t i = 0; i < sensors_.size(); ++i)
-      if (sensors_[i] && used(loop.sensors, static_cast<Eigen::Index>(i))) return true;
-    for (std::size_t i = 0; i < actuators_.size(); ++i)
-      if (actuators_[i] && used(loop.actuators, static_cast<Eigen::Index>(i))) return true;
+  /// Whether any of the channels that a loop uses is in the model.
+  static bool any_in_model(const std::vector<std::optional<Eigen::Index>>& places,
+                           const Eigen::VectorXd& entries) {
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (places[i] && used(entries, static_cast<Eigen::Index>(i))) return true;
     return false;
   }
 
@@ -95,7 +95,9 @@ class LoopBuilder {
       const auto i = static_cast<Eigen::Index>(a);
       const Usage loop{kRigidAxisNames.at(a), spec.sensor_decoupling.row(i).transpose(),
                        spec.actuator_decoupling.col(i)};
-      if (spec.axes[a].crossover_hz == 0.0 || !in_model(loop)) continue;
+      if (spec.axes[a].crossover_hz == 0.0 || !any_in_model(sensors_, loop.sensors) ||
+          !any_in_model(actuators_, loop.actuators))
+        continue;
       require_channels(loop);
       kept.push_back(i);
       names.push_back(loop.name);
