@@ -185,6 +185,10 @@ def check_diagrams(found, expected):
                f"pole {got} instead of {want}")
     stable = sum(pole[3] == 2 for pole in poles)
     expect(found["stabilization"]["drawn"] == stable, f"{found['stabilization']['drawn']} stable poles drawn instead of {stable}")
+    expect(found["loops"] == expected["loops"], f"{found['loops']} loops instead of {expected['loops']}")
+    if expected["loops"]:
+        expect(found["loop_margin"] == "11.60 \u00b1 0.20\u00a0dB at 62.13\u00a0Hz (extrapolated)", found["loop_margin"])
+        expect(found["loop_discs"] > 10, f"only {found['loop_discs']} discs are drawn")
     expect(found["distorted"] == expected["distorted"], f"{found['distorted']} coloured bars instead of {expected['distorted']}")
     if expected["distorted"]:
         expect(found["distortion_text"].startswith(f"1 of {2 * expected['panels']} pairs and bands scatter by more than noise")

@@ -8,6 +8,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/frf_file.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/steps/health_step.hpp"
@@ -50,6 +51,26 @@ TEST_F(ReportInputTest, FindingsComeFromTheProvenanceOfTheResponse) {
   const Finding& fault = data.findings[0];
   EXPECT_THAT((std::vector{fault.channel, fault.what, fault.figure, fault.remedy}),
               ElementsAre("a1 a2", "wired crosswise", "0.99", "exchange them"));
+}
+
+TEST_F(ReportInputTest, AControllerViewIsCheckedBeforeItIsShown) {
+  const auto read = [&](const std::string& text) {
+    std::ofstream(directory_ / "controller_view.json") << text;
+    return read_back(response()).controller_view;
+  };
+  const std::string sound =
+      R"({"format": "stageid-controller-view", "frequency_hz": [1, 2], "determinant": {"re": [1, 2], "im": [null, 4]},)"
+      R"( "loops": [{"name": "z", "re": [1, 2], "im": [3, 4], "radius_95": [0, 1]}]})";
+  EXPECT_EQ(nlohmann::json::parse(read(sound)), nlohmann::json::parse(sound));
+  const auto refused = [&](const std::string& from, const std::string& to, const char* place) {
+    std::string text = sound;
+    text.replace(text.find(from), from.size(), to);
+    EXPECT_THAT(test::error_message<FormatError>([&] { read(text); }), testing::HasSubstr(place));
+  };
+  refused("\"radius_95\": [0, 1]", "\"radius_95\": [0]", "needs 2 numbers, one per frequency");
+  refused("\"im\": [3, 4]", "\"imag\": [3, 4]", "im");
+  refused("\"name\": \"z\"", "\"name\": 3", "name");
+  refused("\"frequency_hz\": [1, 2], ", "", "frequency_hz");
 }
 
 TEST_F(ReportInputTest, AFigureOfTheSummaryThatIsAbsentIsLeftOut) {

@@ -150,6 +150,7 @@ Json expected(const ReportData& data) {
         {pole.order, pole.frequency_hz, pole.damping_ratio,
          pole.stable_damping ? 2 : static_cast<int>(pole.stable_frequency)});
   out["findings"] = data.findings.size();
+  out["loops"] = data.controller_view.empty() ? 0 : 2;
   out["distorted"] = data.nonlinearity ? 1 : 0;
   out["panels"] = frf.response.rows();
   out["lines"] = frf.lines();
@@ -202,6 +203,9 @@ void make_hostile(ReportData& data) {
   data.model->provenance_json = Json({{"decisions", Json::array({attack})}}).dump();
   data.documents.push_back({attack, attack});
   data.frf->provenance_json = attack;
+  Json view = Json::parse(data.controller_view);
+  view["loops"][0]["name"] = attack;
+  data.controller_view = view.dump();
   data.figures.push_back({attack, attack});
   data.doubts.push_back(attack);
   data.notes.push_back(attack);

@@ -168,6 +168,8 @@ function diagramCheck() {
   return {
     stabilization: { poles: content.stabilization || [], drawn: symbols('stabilization diagram', palette().curves[0]) },
     distorted: symbols('nonlinear distortions', palette().marker), distortion_text: content.nonlinearity ? distortionSummary() : '',
+    loops: document.querySelectorAll('#loop tbody tr').length, loop_margin: (document.querySelector('#loop tbody td:nth-child(2)') || {}).textContent,
+    loop_discs: savable.has('loop Nyquist') ? svgOf('loop Nyquist').text.split('opacity="0.12"').length - 1 : 0,
     findings: document.querySelectorAll('.findings tbody tr').length,
     first_finding: severity && severity.textContent,
   };

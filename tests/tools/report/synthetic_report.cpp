@@ -1,6 +1,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -238,6 +239,33 @@ void add_runs(ReportData& data, const SyntheticSize& size) {
                 {"modes", 0.2, ""},  {"fit", 21.4, "34 iterations"},      {"validate", 0.4, ""}};
 }
 
+/// A controller view of two loops: circles around the critical point, one with a 95 % disc of half its distance.
+void add_loops(ReportData& data) {
+  nlohmann::json view = {{"stable", true},
+                         {"largest_pole", 0.9962},
+                         {"largest_pole_hz", 3.826},
+                         {"encirclements", 0},
+                         {"unstable_poles", {{"closed_loop", 0}, {"open_loop", 0}}}};
+  const nlohmann::json margin = {
+      {"value", 11.6}, {"radius_95", 0.2}, {"frequency_hz", 62.13}, {"extrapolated", true}};
+  std::vector<double> f, re, im;
+  for (int k = 0; k < 50; ++k) {
+    f.push_back(10.0 * (k + 1));
+    re.push_back(-1.0 + 0.6 * std::cos(0.12 * k));
+    im.push_back(0.6 * std::sin(0.12 * k));
+  }
+  view["frequency_hz"] = f;
+  view["determinant"] = {{"re", re}, {"im", im}, {"distance", margin}};
+  for (const char* name : {"z", "Ry"})
+    view["loops"].push_back({{"name", name},
+                             {"re", re},
+                             {"im", im},
+                             {"radius_95", std::vector<double>(f.size(), 0.3)},
+                             {"gain_margin_db", margin},
+                             {"phase_margin_deg", nullptr}});
+  data.controller_view = view.dump();
+}
+
 /// More than noise in one pair and band only, the highest band not settled; one finding of each severity.
 void add_checks(ReportData& data) {
   const Eigen::Index channels = data.frf->response.rows();
@@ -273,6 +301,7 @@ ReportData synthetic_report(const SyntheticSize& size) {
   data.validation = compare(data);
   add_cmif(data);
   add_runs(data, size);
+  add_loops(data);
   add_checks(data);
 
   // The truth differs from the model by about the stated deviations.
