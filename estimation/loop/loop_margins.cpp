@@ -135,6 +135,11 @@ class MarginSearch {
     return out;
   }
 
+  /// Not at an end of the frequencies, where a crossing stays.
+  bool is_inside(double frequency_hz) const {
+    return frequency_hz > 0.0 && frequency_hz * (1.0 + kStep) < 0.5 * model_.sample_rate_hz;
+  }
+
   /// Error of the curve and its frequency at a crossing, by the parameters.
   struct Slope {
     Complex value;
@@ -143,9 +148,10 @@ class MarginSearch {
   };
   Slope slope(Eigen::Index k, double frequency_hz) const {
     Slope out;
-    out.by_omega =
-        (curve_at(k, frequency_hz * (1.0 + kStep)) - curve_at(k, frequency_hz * (1.0 - kStep))) /
-        (2.0 * kStep * kTwoPi * frequency_hz);
+    if (is_inside(frequency_hz))
+      out.by_omega =
+          (curve_at(k, frequency_hz * (1.0 + kStep)) - curve_at(k, frequency_hz * (1.0 - kStep))) /
+          (2.0 * kStep * kTwoPi * frequency_hz);
     const Eigen::VectorXd at = Eigen::VectorXd::Constant(1, frequency_hz);
     const LoopPoint point = loop_points(model_, controller_, at, true).front();
     out.value = curve(point, k);
@@ -174,7 +180,8 @@ class MarginSearch {
 
   Margin gain_margin(Eigen::Index k, double frequency_hz) const {
     const Slope s = slope(k, frequency_hz);
-    const Eigen::VectorXd omega = -s.by_parameters.imag() / s.by_omega.imag();
+    Eigen::VectorXd omega = Eigen::VectorXd::Zero(s.by_parameters.size());
+    if (is_inside(frequency_hz)) omega = -s.by_parameters.imag() / s.by_omega.imag();
     const Eigen::VectorXd real = s.by_parameters.real() + s.by_omega.real() * omega;
     return margin(-kDecibels * std::log(std::abs(s.value)), frequency_hz,
                   kDecibels / s.value.real() * real, omega);
@@ -212,13 +219,22 @@ class MarginSearch {
                   (std::conj(at) * s.by_parameters).real() / std::abs(at));
   }
 
+  /// Where L_k crosses the real axis. At 0 and at half the sample rate it is real, and crosses to negative frequencies,
+  /// unless it is infinite.
+  std::vector<double> real_axis_crossings(Eigen::Index k) const {
+    std::vector<double> out = crossings(k, [](Complex L) { return L.imag(); });
+    for (const double f : {0.0, 0.5 * model_.sample_rate_hz})
+      if (std::isfinite(std::abs(curve_at(k, f)))) out.push_back(f);
+    return out;
+  }
+
   LoopMargins of_loop(Eigen::Index k) const {
     LoopMargins out;
     double gain = 0.0;  // the largest below 1, and the smallest above
     double reduction = HUGE_VAL;
     double gain_hz = 0.0;
     double reduction_hz = 0.0;
-    for (const double f : crossings(k, [](Complex L) { return L.imag(); })) {
+    for (const double f : real_axis_crossings(k)) {
       const double real = -curve_at(k, f).real();
       if (real > gain && real < 1.0) {
         gain = real;
@@ -229,8 +245,8 @@ class MarginSearch {
         reduction_hz = f;
       }
     }
-    if (gain_hz > 0.0) out.gain_db = gain_margin(k, gain_hz);
-    if (reduction_hz > 0.0) {
+    if (gain > 0.0) out.gain_db = gain_margin(k, gain_hz);
+    if (std::isfinite(reduction)) {
       out.gain_reduction_db = gain_margin(k, reduction_hz);
       out.gain_reduction_db->value *= -1.0;
     }

@@ -86,6 +86,7 @@ class TrueLoop {
         if (f > 1e-4 * highest && f < highest) out.push_back(f);
       }
     std::sort(out.begin(), out.end());
+    out.push_back(highest);
     return out;
   }
 
@@ -134,8 +135,11 @@ TrueMargins margins_of(const std::vector<double>& hz, const std::vector<Complex>
   for (std::size_t i = 0; i < hz.size(); ++i) {
     if (std::abs(offset + curve[i]) < std::abs(offset + curve[least])) least = i;
     if (i == 0) continue;
-    if ((curve[i - 1].imag() < 0.0) != (curve[i].imag() < 0.0)) {
-      const double f = bisected(hz[i - 1], hz[i], [&](double x) { return at(x).imag(); });
+    // The curve is real at half the sample rate, the last point.
+    const bool last = i + 1 == hz.size();
+    if (last || (curve[i - 1].imag() < 0.0) != (curve[i].imag() < 0.0)) {
+      const double f =
+          last ? hz[i] : bisected(hz[i - 1], hz[i], [&](double x) { return at(x).imag(); });
       const double real = at(f).real();
       const double db = -20.0 * std::log10(std::abs(real));
       if (real < 0.0 && db > 0.0) out.gain_db = std::min(out.gain_db, db);

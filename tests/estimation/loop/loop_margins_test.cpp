@@ -78,6 +78,34 @@ TEST(LoopMargins, ALowerLimitOfTheGainIsFound) {
   EXPECT_FALSE(scaled(0.999 * gain).stable());
 }
 
+TEST(LoopMargins, ACrossingAtHalfTheSampleRateIsFound) {
+  // P = (1 - p) / (z - p), p = e^(-T / tau), and K = k: the pole leaves the unit circle at -1, for k = (1 + p) / (1 - p).
+  const FreeMass stage;
+  AdditiveModel model = stage.model();
+  Submodel lag;
+  lag.denominator = {1.0, 2e-3};
+  lag.numerator = {Eigen::MatrixXd::Ones(1, 1)};
+  model.submodels = {lag};
+  LoopController controller = stage.controller();
+  controller.system = {Eigen::MatrixXd(0, 0),
+                       Eigen::MatrixXd(0, 1),
+                       Eigen::MatrixXd(1, 0),
+                       Eigen::MatrixXd::Constant(1, 1, 0.7),
+                       {}};
+  const double p = std::exp(-stage.period_s / 2e-3);
+  const Eigen::MatrixXd covariance =
+      1e-8 * Eigen::MatrixXd::Identity(2, 2);  // of tau and of the gain
+  const LoopMargins m = loop_margins(model, controller, covariance).loops[0];
+  ASSERT_TRUE(m.gain_db);
+  EXPECT_NEAR(m.gain_db->value, 20.0 * std::log10((1.0 + p) / ((1.0 - p) * 0.7)), 1e-9);
+  EXPECT_EQ(m.gain_db->frequency_hz, 0.5 / stage.period_s);
+  EXPECT_EQ(m.gain_db->frequency_deviation_hz, 0.0);
+  // d ln g = (1/(1 + p) + 1/(1 - p)) p T / tau^2 dtau - dgain
+  const double by_tau = 2.0 / (1.0 - p * p) * p * stage.period_s / 4e-6;
+  EXPECT_NEAR(*m.gain_db->deviation, 20.0 / std::log(10.0) * 1e-4 * std::hypot(by_tau, 1.0), 1e-7);
+  EXPECT_FALSE(m.phase_deg);  // |L| < 1 everywhere
+}
+
 TEST(LoopMargins, ACrossingOutsideTheFittedBandIsExtrapolated) {
   const FreeMass stage;
   AdditiveModel model = stage.model();
