@@ -35,6 +35,15 @@ TEST(Decompositions, EigenvaluesAreTheRootsOfTheCompanionMatrix) {
   expect_roots(eigenvalues(MatrixXcd(companion().cast<Complex>())));
 }
 
+TEST(Decompositions, BalancedEigenvaluesDoNotDependOnTheUnitsOfTheStates) {
+  const Eigen::Vector4d units(1e-9, 3.0, 2e7, 1e-4);
+  const MatrixXd m = units.asDiagonal() * companion() * units.cwiseInverse().asDiagonal();
+  expect_roots(balanced_eigenvalues(m));
+  MatrixXd broken = companion();
+  broken(1, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(balanced_eigenvalues(broken).array().isNaN().all());
+}
+
 TEST(Decompositions, EigenvaluesThatDoNotConvergeAreNaN) {
   MatrixXd m = companion();
   m(1, 1) = std::numeric_limits<double>::quiet_NaN();
