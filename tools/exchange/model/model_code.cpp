@@ -72,7 +72,7 @@ constexpr const char* kHead =
     R"(/* A sampled model of {outputs} outputs and {inputs} inputs, written by stageid {version}.
  *
  * x[n+1] = A x[n] + B v[n],  y_i[n + output_delay_i] = C_i x[n] + D_i v[n],  v_j[n] = u_j[n - input_delay_j],
- * at {rate} Hz, behind a zero-order hold. SI units. C99; allocates nothing.
+ * at {rate} Hz, behind a zero-order hold. SI units. C99 and C++17; allocates nothing.
  * Inputs u:
 {input_list} * Outputs y:
 {output_list} */
@@ -94,7 +94,7 @@ typedef struct {{
 
 constexpr const char* kTail = R"(
 static inline void {name}_reset({name}_state *state) {{
-  static const {name}_state zero;
+  static const {name}_state zero = {{{{0.0}}, {{{{0.0}}}}, {{{{0.0}}}}, 0, 0}};
   *state = zero;
 }}
 

@@ -6,7 +6,7 @@
 
 namespace stageid {
 
-/// The sampled state space with its delays as a C99 header: constants, a state, a reset and a step. It allocates nothing
+/// The sampled state space with its delays as a header for C99 and C++17: constants, a state, a reset and a step. It allocates nothing
 /// and includes no other header. Numbers read back to the same double.
 ///   NAME_reset(&state);   NAME_step(&state, u, y);   // y[n] of u[n], the sums of sampled_state_space.hpp in order
 /// @param name of the types and functions, a C identifier

@@ -78,7 +78,8 @@ int main(void) {
   const std::string command = "cd '" + directory.path().string() +
                               "' && cc -std=c99 -pedantic -Wall -Wextra -Wconversion -Werror -O2 "
                               "-o plant main.c > log 2>&1 "
-                              "&& ./plant < u.txt > y.txt";
+                              "&& c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only -x c++ main.c "
+                              ">> log 2>&1 && ./plant < u.txt > y.txt";
   const int status = std::system(command.c_str());
   EXPECT_EQ(status, 0) << read_whole_file(directory / "log");
   Eigen::MatrixXd y(u.rows(), model.n_outputs());
