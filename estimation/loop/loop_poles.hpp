@@ -10,7 +10,8 @@ struct LoopPoles {
   double pole_hz = 0.0;          ///< its frequency
   int unstable_closed_loop = 0;  ///< poles outside the unit circle, Z
   int unstable_open_loop = 0;    ///< those of model and controller, P
-  /// Clockwise encirclements of 0 by det(I + L), with the contour around the poles on the unit circle: Z - P.
+  /// Clockwise encirclements of 0 by det(I + L) while z runs counter-clockwise along the unit circle, outside of the
+  /// poles on it: Z - P.
   int encirclements() const noexcept { return unstable_closed_loop - unstable_open_loop; }
   bool stable() const noexcept { return unstable_closed_loop == 0; }
 };

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "hal/simulator/loop_stability.hpp"
 #include "hal/simulator/plant_spec.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "tests/tools/program_fixture.hpp"
@@ -81,6 +82,25 @@ TEST_F(ControllerViewTest, CurvesAndSensitivityAreThoseOfTheSimulatedLoop) {
     EXPECT_TRUE(loop["gain_reduction_db"]["extrapolated"]);
     EXPECT_NEAR(loop["phase_margin_deg"]["value"], 40.0, 3.0);
     EXPECT_NEAR(loop["phase_margin_deg"]["frequency_hz"], 20.0, 0.5);  // crossover_hz
+  }
+}
+
+TEST_F(ControllerViewTest, TheSimulatedStageBecomesUnstableAtTheGainMargin) {
+  make_model_with_covariance();
+  const json told = view({"--covariance", "covariance.h5"});
+  const StageConfig stage = load_stage_config(at("small_stage.yaml"));
+  const std::size_t axes[] = {2, 4};  // z and Ry of x, y, z, Rx, Ry, Rz
+  for (std::size_t k = 0; k < 2; ++k) {
+    const json& margin = told["loops"][k]["gain_margin_db"];
+    const double db = margin["value"];
+    EXPECT_LT(margin["radius_95"], 0.005);
+    const auto stable_at = [&](double gain_db) {
+      StageSpec changed = stage.spec;
+      changed.controller.axes[axes[k]].gain *= std::pow(10.0, gain_db / 20.0);
+      return loop_stability(changed, *stage.plant).stable();
+    };
+    EXPECT_TRUE(stable_at(db - 0.01)) << told["loops"][k]["name"];
+    EXPECT_FALSE(stable_at(db + 0.01)) << told["loops"][k]["name"];
   }
 }
 
