@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "acquisition/files/file_kind.hpp"
+#include "acquisition/files/fingerprint.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/config/stage_config.hpp"
@@ -79,7 +80,8 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   const StageConfig stage = load_stage_config(flags.stage);
   Eigen::MatrixXd covariance;
   if (!flags.covariance.empty()) covariance = read_covariance(flags.covariance, model);
-  const ControllerView view = controller_view(stage, model, covariance, frequency_hz);
+  ControllerView view = controller_view(stage, model, covariance, frequency_hz);
+  view.model_fingerprint = fingerprint_of_file(flags.input);
   write_controller_view(flags.output, view);
   for (const std::string& line : controller_view_lines(view)) console.result(line);
   console.result(fmt::format("wrote {}", flags.output.string()));

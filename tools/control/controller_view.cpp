@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "estimation/file/json_file.hpp"
 #include "tools/control/stage_loop.hpp"
@@ -77,7 +78,7 @@ ControllerView controller_view(const StageConfig& stage, const AdditiveModel& mo
                                const Eigen::VectorXd& frequency_hz) {
   try {
     const LoopController controller = stage_loop(stage.spec, model);
-    return {controller.loops, model.sample_rate_hz,
+    return {controller.loops, model.sample_rate_hz, "",
             loop_view(model, controller, covariance, frequency_hz)};
   } catch (const std::invalid_argument& problem) {
     throw std::invalid_argument(named(stage.file, problem.what()));
@@ -89,6 +90,7 @@ nlohmann::ordered_json controller_view_json(const ControllerView& of, bool curve
   Json out = {{"format", "stageid-controller-view"},
               {"format_version", 1},
               {"sample_rate_hz", of.sample_rate_hz},
+              {"model_fingerprint", of.model_fingerprint},
               {"stable", view.poles.stable()},
               {"largest_pole", view.poles.largest_pole},
               {"largest_pole_hz", view.poles.pole_hz},
@@ -160,9 +162,16 @@ std::vector<std::string> controller_view_lines(const ControllerView& of) {
   return out;
 }
 
-std::string read_controller_view(const std::filesystem::path& path) {
+std::string read_controller_view(const std::filesystem::path& path,
+                                 const std::filesystem::path& model) {
   const JsonFile file(path, "stageid-controller-view");
   const JsonNode root = file.root();
+  const std::string fingerprint = root.text_or_empty("model_fingerprint");
+  if (!model.empty() && !fingerprint.empty() && fingerprint != fingerprint_of_file(model))
+    root.member("model_fingerprint")
+        .fail(fmt::format("is that of another model than {}; write the view again with 'stageid "
+                          "export --controller-view'",
+                          model.string()));
   const std::size_t lines = root.member("frequency_hz").numbers().size();
   const auto check_curve = [&](const JsonNode& curve) {
     std::vector<JsonNode> parts = {curve.member("re"), curve.member("im")};

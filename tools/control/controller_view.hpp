@@ -14,6 +14,7 @@ namespace stageid {
 struct ControllerView {
   std::vector<std::string> loops;
   double sample_rate_hz = 0.0;
+  std::string model_fingerprint = {};  ///< of its file; empty: unknown
   LoopView view;
 };
 
@@ -30,8 +31,11 @@ std::string controller_view_csv(const ControllerView& view);
 /// For people: one line per loop, one on the multivariable loop.
 std::vector<std::string> controller_view_lines(const ControllerView& view);
 
-/// The text of such a .json file with its curves, checked. @throws FileError, FormatError
-std::string read_controller_view(const std::filesystem::path& file);
+/// The text of such a .json file with its curves, checked.
+/// @param model file that the view must belong to; empty: any
+/// @throws FileError, FormatError
+std::string read_controller_view(const std::filesystem::path& file,
+                                 const std::filesystem::path& model);
 
 /// Writes the view by the ending of the file, .json or .csv, atomically. @throws FileError
 void write_controller_view(const std::filesystem::path& file, const ControllerView& view);

@@ -248,7 +248,7 @@ void complete_report(ReportData& data, const ReportInput& input,
   if (!input.log.empty()) add_log(data, input.log);
   if (!input.stage.empty()) data.geometry = stage_info(input.stage, read_whole_file(input.stage));
   if (!input.controller_view.empty())
-    data.controller_view = read_controller_view(input.controller_view);
+    data.controller_view = read_controller_view(input.controller_view, input.model);
   if (!data.geometry.name.empty()) data.title = data.geometry.name;
   if (!summary.is_null()) add_summary(data, input.summary, summary);
 }

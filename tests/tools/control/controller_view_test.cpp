@@ -156,6 +156,17 @@ TEST_F(ControllerViewTest, AnUnstableLoopIsToldAndHasNoMargins) {
   EXPECT_TRUE(told["determinant"]["distance"].is_null());
 }
 
+TEST_F(ControllerViewTest, TheReportShowsTheViewOfItsModelOnly) {
+  make_model_with_covariance();
+  view();
+  succeed({"report", "frf.h5", "model.json", "view.json", "-o", "report.html"});
+  EXPECT_THAT(read_bytes(at("report.html")), HasSubstr("\"encirclements\":0"));
+  succeed(
+      {"fit", "frf.h5", "-o", "model.json", "--rigid-body", "suspension", "--direct-term", "full"});
+  fail({"report", "frf.h5", "model.json", "view.json", "-o", "new.html"}, 2,
+       "view.json:/model_fingerprint: is that of another model than model.json");
+}
+
 TEST_F(ControllerViewTest, WhatDoesNotBelongTogetherIsRefused) {
   make_model_with_covariance();
   const auto refuse = [&](const std::vector<std::string>& more, const std::string& text) {
