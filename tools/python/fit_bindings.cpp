@@ -128,7 +128,7 @@ FitResult fit(const py::object& given, std::optional<std::array<double, 2>> band
 py::object covariance_of(const py::object& self) {
   const auto& r = self.cast<const FitResult&>();
   if (r.covariance.sandwich.size() == 0) return py::none();
-  const NamedParameters parameters = named_parameters(r);
+  const NamedParameters parameters = named_parameters(r.model, r.covariance.sandwich.rows());
   const Eigen::Index n_y = r.model.n_outputs();
   const auto lines = [&](const Eigen::MatrixXd& columns) {
     return lines_view<double>(columns, n_y, self);
