@@ -228,7 +228,11 @@ constexpr const char* kMatlabTail = R"(
 model.continuous_response = @(f) continuous_response(model, f);
 model.response = @(f) held_response(model, f);
 if exist('absorbDelay', 'file') % not in Octave
-  model = add_toolbox_models(model);
+  try
+    model = add_toolbox_models(model);
+  catch problem % the numbers are there without it
+    warning('stageid:toolbox', 'no models of the toolboxes: %s', problem.message);
+  end
 end
 if nargout == 0
   plot_model(model);
