@@ -5,7 +5,6 @@
 #include <array>
 #include <fstream>
 #include <regex>
-#include <string_view>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <new>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"

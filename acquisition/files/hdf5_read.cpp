@@ -1,5 +1,4 @@
 #include <complex>
-#include <limits>
 #include <new>
 
 #include "acquisition/files/file_error.hpp"

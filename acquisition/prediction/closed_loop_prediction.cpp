@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <stdexcept>
 
 #include "acquisition/loop/excited_actuators.hpp"
 #include "excitation/decompositions/decompositions.hpp"

@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <stdexcept>
-#include <string_view>
 
 #include "acquisition/files/file_error.hpp"
 

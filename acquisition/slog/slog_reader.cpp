@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include <stdexcept>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/record/log_checks.hpp"

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -14,7 +13,6 @@
 #include "acquisition/slog/slog_appender.hpp"
 #include "acquisition/slog/slog_index.hpp"
 #include "acquisition/slog/slog_json.hpp"
-#include "acquisition/slog/slog_scan.hpp"
 
 namespace stageid {
 

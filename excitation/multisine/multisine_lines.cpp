@@ -1,7 +1,6 @@
 #include "excitation/multisine/multisine_lines.hpp"
 
 #include <cmath>
-#include <numbers>
 
 #include "excitation/multisine/crest_reduction.hpp"
 #include "excitation/multisine/random_stream.hpp"

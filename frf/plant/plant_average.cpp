@@ -8,7 +8,6 @@
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
-#include "frf/plant/experiment_noise.hpp"
 
 namespace stageid {
 namespace {

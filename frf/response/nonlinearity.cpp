@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <vector>
 
 #include "frf/response/frf_estimate.hpp"
 #include "frf/statistics/distributions.hpp"

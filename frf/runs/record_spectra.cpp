@@ -8,7 +8,6 @@
 
 #include "frf/periods/record_glitches.hpp"
 #include "frf/runs/health_gathering.hpp"
-#include "frf/runs/run_steps.hpp"
 #include "frf/runs/transient_model.hpp"
 
 namespace stageid {

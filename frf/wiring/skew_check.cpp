@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "frf/statistics/order_statistic.hpp"

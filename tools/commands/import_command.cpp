@@ -12,7 +12,6 @@
 #include "acquisition/files/version.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/commands/command_line.hpp"
-#include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/exchange/import/foreign_formats.hpp"
 #include "tools/exchange/import/import_summary.hpp"
 #include "tools/exchange/import/mapped_frf.hpp"

@@ -16,7 +16,6 @@
 #include "excitation/words/words.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tools/config/config_reader.hpp"
-#include "tools/config/controller_keys.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/stage_expectation.hpp"
 

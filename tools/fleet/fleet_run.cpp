@@ -9,14 +9,12 @@
 #include <map>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "tools/fleet/child_pool.hpp"
-#include "tools/fleet/fleet_jobs.hpp"
 #include "tools/fleet/fleet_store.hpp"
 #include "tools/fleet/identify_log.hpp"
 #include "tools/terminal/exit_code.hpp"

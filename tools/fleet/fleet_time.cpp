@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <regex>
-#include <string>
 
 namespace stageid {
 

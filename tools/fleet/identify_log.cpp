@@ -27,7 +27,6 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 #include "tools/terminal/exit_code.hpp"
-#include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {

@@ -7,8 +7,6 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/formats/open_log.hpp"
-#include "acquisition/loop/event_recorder.hpp"
-#include "acquisition/record/log_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/modbus/modbus_supervisor.hpp"
 #include "hal/stage/plant_watch.hpp"

@@ -14,7 +14,6 @@
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
-#include "frf/health/data_health.hpp"
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/interrupt.hpp"

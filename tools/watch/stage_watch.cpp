@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <fstream>
 #include <stdexcept>
 #include <thread>
-#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "tools/watch/watch_event.hpp"

@@ -1,6 +1,5 @@
 #include "tools/exchange/arrays/named_array.hpp"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>

@@ -1,7 +1,5 @@
 #include "tools/exchange/import/import_map.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <iterator>
 #include <set>
