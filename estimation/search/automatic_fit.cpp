@@ -101,6 +101,8 @@ class AutomaticFit {
     const StructureMove proportional = proportional_damping(other.quick_, other.best_.model);
     other.say("{} once more", proportional.flag);
     other.adopt(fit_additive_model(other.frf_, proportional.model, other.quick_));
+    if (other.proportional_.model.fit.cost < other.cost())
+      other.adopt(FitResult(other.proportional_));
     if (!other.mode_may_be_worth_as_much(search->best_)) return;
     other.most_parameters_ = search->best_.parameters;
     other.take_structure_of(other.best_.model);
@@ -330,9 +332,12 @@ class AutomaticFit {
     const auto costly = std::stable_partition(
         moves.begin(), moves.end(),
         [](const StructureMove& move) { return move.options.delay != DelayModel::per_channel; });
+    FitResult before = best_;
     if (!take_best(sample, {moves.begin(), costly}) && !take_best(sample, {costly, moves.end()}))
       return false;
+    const bool was_proportional = !structure_.general_damping;
     take_structure_of(best_.model);
+    if (was_proportional && structure_.general_damping) proportional_ = std::move(before);
     watch_ = {};  // it compares models of one structure
     return true;
   }
@@ -580,6 +585,7 @@ class AutomaticFit {
   Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
   GrowthWatch watch_;
   FitResult best_;
+  FitResult proportional_;  ///< the last one before general damping
   std::vector<std::string> decisions_;
   std::vector<double> history_;
   // Size of the history when no such move was left; with the same model, none is tried again.
