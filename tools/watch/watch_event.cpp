@@ -64,7 +64,7 @@ const char* remedy_of(const StageChange& change, const TrackedParameter* paramet
 std::string what_happened(const StageChange& change, const ModelTracker& tracker,
                           const AdditiveModel& model) {
   const TrackedParameter* parameter = parameter_of(change.what, tracker);
-  const std::string name = describe(change.what, tracker.parameters(), model);
+  std::string name = describe(change.what, tracker.parameters(), model);
   if (!is_of_stage(change.what.kind)) return name;
   // Gains near 0 or below are faults of their own.
   if (is_channel_gain(parameter)) {
