@@ -35,19 +35,24 @@ Eigen::MatrixXcd LineNoise::scatter_around(Eigen::Index k) const {
   const auto n_y = static_cast<double>(n_y_);
   const Eigen::Index first = std::max<Eigen::Index>(0, k - n_y_);
   const Eigen::Index last = std::min(N - 1, k + n_y_);
-  Eigen::MatrixXcd around = Eigen::MatrixXcd::Zero(n_y_, n_y_);
-  if (first == last) return around;
+  if (first == last) return Eigen::MatrixXcd::Zero(n_y_, n_y_);
   const double share = n_y / (freedom * static_cast<double>(last - first));
-  Eigen::MatrixXcd root = Eigen::MatrixXcd::Zero(n_y_, n_y_);
-  for (int pass = 0; pass <= kPasses; ++pass) {
-    around.setZero();
+  const auto sum_of = [&](const auto& weight) {
+    Eigen::MatrixXcd sum = Eigen::MatrixXcd::Zero(n_y_, n_y_);
     for (Eigen::Index l = first; l <= last; ++l) {
-      if (l == k) continue;
       const Eigen::MatrixXcd& other = scatter_[static_cast<std::size_t>(l)];
-      const double power = (root * other * root.adjoint()).trace().real();
-      around += (pass == 0 ? share : share * n_y * freedom / std::max(power, 1e-300)) * other;
+      if (l != k) sum += weight(other) * other;
     }
-    root = inverse_root((scatter_[static_cast<std::size_t>(k)] + around) / (freedom + n_y));
+    return sum;
+  };
+  Eigen::MatrixXcd around = sum_of([&](const Eigen::MatrixXcd&) { return share; });
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const Eigen::MatrixXcd root =
+        inverse_root((scatter_[static_cast<std::size_t>(k)] + around) / (freedom + n_y));
+    around = sum_of([&](const Eigen::MatrixXcd& other) {
+      const double power = (root * other * root.adjoint()).trace().real();
+      return share * n_y * freedom / std::max(power, 1e-300);
+    });
   }
   return around;
 }
