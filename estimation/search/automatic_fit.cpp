@@ -92,8 +92,9 @@ class AutomaticFit {
         best_.model.fit.cost);
   }
 
-  /// General damping can stand in for a few missing modes, and is superfluous once they are found. Where a mode may be
-  /// worth as much, the search continues without it, up to as many parameters, and the better of both models is final.
+  /// Decides between general and proportional damping. A model with general damping can describe what a few missing
+  /// modes cause, and then these modes are not found. So the search continues with proportional damping, up to as many
+  /// parameters, if a further mode may be worth as much. The better of both models is final.
   static void settle_damping(std::optional<AutomaticFit>& search) {
     if (!search->structure_.open.general_damping || !search->structure_.general_damping) return;
     search->structure_.open.general_damping = false;
