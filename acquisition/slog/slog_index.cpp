@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 #include "acquisition/files/file_error.hpp"
 
@@ -12,18 +13,49 @@ namespace stageid {
 
 namespace {
 
-/// Assigns the blocks, in order, to their runs.
-class Indexer {
+bool has_its_bytes(const SlogBlockHeader& header) noexcept {
+  return header.payload_bytes == std::uint64_t{8} * header.rows * header.cols;
+}
+
+}  // namespace
+
+bool SlogStretch::is_continued_by(const SlogBlock& block) const noexcept {
+  return block.header.rows == first.header.rows &&
+         block.header.payload_bytes == first.header.payload_bytes &&
+         block.header.sequence == first.header.sequence + blocks &&
+         block.offset == first.offset + blocks * slog_block_bytes(first.header);
+}
+
+SlogBlock SlogStretch::read_block(const SlogSource& source, std::uint64_t row) const {
+  const std::uint64_t n = (row - first.header.first_row) / first.header.rows;
+  SlogBlock block{first.offset + n * slog_block_bytes(first.header), {}};
+  source.read(block.offset, &block.header, sizeof block.header);
+  if (!slog_header_intact(block.header) ||
+      block.header.first_row != first.header.first_row + n * first.header.rows ||
+      block.header.rows != first.header.rows || block.header.cols != first.header.cols)
+    throw FormatError(source.path(), "",
+                      fmt::format("the block at byte {} was changed while the log was read; use "
+                                  "'stageid log recover' to copy the intact parts",
+                                  block.offset));
+  return block;
+}
+
+/// Assigns the blocks of one scan, in order, to their runs.
+class SlogIndexer::Step {
  public:
-  Indexer(const SlogSource& source, const SlogScan& scan) : source_(source), scan_(scan) {
-    index_.damage = scan.damage;
+  Step(SlogIndexer& indexer, const SlogSource& source, const SlogScan& scan)
+      : source_(source),
+        scan_(scan),
+        indexer_(indexer),
+        index_(indexer.index_),
+        next_damage_(scan.damage.begin()) {
+    index_.damage.insert(index_.damage.end(), scan.damage.begin(), scan.damage.end());
     index_.log_id = scan.log_id;
-    index_.blocks = scan.blocks.size();
-    next_damage_ = scan.damage.begin();
+    index_.blocks += scan.blocks.size();
   }
 
-  SlogIndex run() {
-    read_info();
+  void run() {
+    if (!std::exchange(indexer_.has_info_, true)) read_info();
     for (const SlogBlock& block : scan_.blocks) {
       if (passes_damage(block)) close_run();
       try {
@@ -34,11 +66,9 @@ class Indexer {
         book_damage(block, "its payload is damaged");
       }
     }
-    close_run();
-    index_.next_sequence = scan_.blocks.back().header.sequence + 1;
+    if (!scan_.blocks.empty()) index_.next_sequence = scan_.blocks.back().header.sequence + 1;
     std::stable_sort(index_.damage.begin(), index_.damage.end(),
                      [](const LogDamage& a, const LogDamage& b) { return a.offset < b.offset; });
-    return std::move(index_);
   }
 
  private:
@@ -77,7 +107,7 @@ class Indexer {
     const bool within_run = block.header.is(SlogBlockType::excitation) ||
                             block.header.is(SlogBlockType::samples) ||
                             block.header.is(SlogBlockType::run_end);
-    if (within_run && !open_ && !index_.damage.empty()) return;  // reported already
+    if (within_run && !indexer_.open_ && !index_.damage.empty()) return;  // reported already
     switch (static_cast<SlogBlockType>(block.header.type)) {
       case SlogBlockType::log:
         if (!same_measurement(parse_log_info(read_text(source_, block)), index_.info))
@@ -114,12 +144,12 @@ class Indexer {
     run.run.complete = false;
     run.excitation_columns = std::move(begin.excitation_columns);
     index_.runs.push_back(std::move(run));
-    number_ = block.header.run;
-    open_ = true;
+    indexer_.number_ = block.header.run;
+    indexer_.open_ = true;
   }
 
   SlogRunIndex& open_run(const SlogBlock& block) {
-    if (!open_ || block.header.run != number_) {
+    if (!indexer_.open_ || block.header.run != indexer_.number_) {
       throw std::invalid_argument(
           fmt::format("belongs to run {}, which is not open", slog_run_name(block.header.run)));
     }
@@ -148,7 +178,10 @@ class Indexer {
           fmt::format("starts with row {}; expected row {}", header.first_row, run.run.samples));
     }
     run.run.samples += header.rows;
-    run.samples.push_back(block);
+    if (!run.samples.empty() && run.samples.back().is_continued_by(block))
+      ++run.samples.back().blocks;
+    else
+      run.samples.push_back({block});
   }
 
   void end_run(const SlogBlock& block) {
@@ -166,24 +199,17 @@ class Indexer {
     run.run.health = end.health;
     run.run.timing = end.timing;
     run.ended = true;
-    open_ = false;
+    close_run();
   }
 
-  void close_run() noexcept { open_ = false; }
+  void close_run() noexcept { indexer_.open_ = false; }
 
   const SlogSource& source_;
   const SlogScan& scan_;
-  SlogIndex index_;
+  SlogIndexer& indexer_;
+  SlogIndex& index_;
   std::vector<LogDamage>::const_iterator next_damage_;
-  std::uint32_t number_ = 0;
-  bool open_ = false;
 };
-
-bool has_its_bytes(const SlogBlockHeader& header) noexcept {
-  return header.payload_bytes == std::uint64_t{8} * header.rows * header.cols;
-}
-
-}  // namespace
 
 void check_run_begin(const SlogRunBegin& begin, const LogInfo& info) {
   const std::vector<int>& columns = begin.excitation_columns;
@@ -205,8 +231,14 @@ bool are_slog_samples(const SlogBlockHeader& header, const LogInfo& info) noexce
   return header.cols == slog_row_words(info) && header.rows > 0 && has_its_bytes(header);
 }
 
+void SlogIndexer::take(const SlogSource& source, const SlogScan& scan) {
+  Step(*this, source, scan).run();
+}
+
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan) {
-  return Indexer(source, scan).run();
+  SlogIndexer indexer;
+  indexer.take(source, scan);
+  return indexer.index();
 }
 
 std::uint32_t slog_row_words(const LogInfo& info) noexcept {

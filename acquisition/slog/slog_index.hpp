@@ -12,13 +12,28 @@
 
 namespace stageid {
 
+/// Blocks of samples that follow each other in the file, with as many rows each. Of all but the first, only the place and
+/// the rows are known: a log of a day has as many blocks as one wants, but few stretches.
+struct SlogStretch {
+  SlogBlock first;
+  std::uint64_t blocks = 1;
+
+  std::uint64_t end_row() const noexcept {
+    return first.header.first_row + blocks * first.header.rows;
+  }
+  /// Whether a block of samples of the same run is the next one.
+  bool is_continued_by(const SlogBlock& block) const noexcept;
+  /// The header of the block with a row. @throws FileError; FormatError if it is not what it was
+  SlogBlock read_block(const SlogSource& source, std::uint64_t row) const;
+};
+
 /// One run of a native log and the positions of its blocks.
 struct SlogRunIndex {
   LogRun run;
   bool ended = false;  ///< has a run_end block
   std::vector<int> excitation_columns;
   std::optional<SlogBlock> excitation;
-  std::vector<SlogBlock> samples;  ///< contiguous: no rows between two blocks
+  std::vector<SlogStretch> samples;  ///< contiguous: no rows between two stretches
 };
 
 /// The intact part of a native log.
@@ -32,8 +47,23 @@ struct SlogIndex {
   std::uint32_t log_id = 0;
 };
 
-/// Assembles the blocks of a scan. A run with missing blocks is truncated at the gap and incomplete.
-/// @throws FormatError if no description of the log is left, or one is invalid.
+/// Assembles the blocks of a scan, or of its steps. A run with missing blocks is truncated at the gap and incomplete.
+class SlogIndexer {
+ public:
+  /// @param scan that follows the ones before
+  /// @throws FormatError if the first scan has no description of the log, or an invalid one.
+  void take(const SlogSource& source, const SlogScan& scan);
+  const SlogIndex& index() const noexcept { return index_; }
+
+ private:
+  class Step;
+  SlogIndex index_;
+  bool has_info_ = false;
+  bool open_ = false;         // a run
+  std::uint32_t number_ = 0;  // of the run
+};
+
+/// The index of a whole scan. @throws the same as SlogIndexer
 SlogIndex index_slog(const SlogSource& source, const SlogScan& scan);
 
 /// @throws std::invalid_argument unless a run of this log can start like this

@@ -18,6 +18,9 @@ namespace {
 // Size of the pieces that are read, checked and transposed within the second-level cache.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
 
+/// Blocks whose headers are in memory at the same time: 0.3 MB.
+constexpr std::size_t kScanBlocks = 4096;
+
 }  // namespace
 
 /// The requested rows and their destination.
@@ -29,54 +32,75 @@ struct SlogReader::Target {
 
 SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
                        SlogScanDepth depth)
-    : source_(file) {
-  index_ = index_slog(source_, scan_slog(source_, depth));
-  if (damaged_is_error && !index_.damage.empty()) {
-    const LogDamage& first = index_.damage.front();
+    : source_(file), scanner_(depth) {
+  scan();
+  if (damaged_is_error && !damage().empty()) {
+    const LogDamage first = damage().front();
     throw FormatError(
         file, "",
         fmt::format("damaged at byte {}: {}; use 'stageid log recover' to copy the intact parts",
                     first.offset, first.what));
   }
-  if (damaged_is_error && !index_.end) {
+  if (damaged_is_error && !end()) {
     throw FormatError(file, "",
                       "was not closed because its writer crashed or is still running; continue it "
                       "with --resume, or use 'stageid log recover'");
   }
-  for (const SlogRunIndex& run : index_.runs) runs_.push_back(run.run);
-  check_runs(file, index_.info, runs_);
+}
+
+void SlogReader::scan() {
+  do {
+    indexer_.take(source_, scanner_.next(source_, kScanBlocks));
+  } while (!scanner_.is_at_end(source_));
+  // All but the last run known before are as they were.
+  if (!runs_.empty()) runs_.pop_back();
+  const std::vector<SlogRunIndex>& indexed = indexer_.index().runs;
+  for (std::size_t i = runs_.size(); i < indexed.size(); ++i) runs_.push_back(indexed[i].run);
+  check_runs(path(), info(), runs_);
+}
+
+void SlogReader::update() {
+  source_.update_bytes();
+  scan();
+}
+
+std::vector<LogDamage> SlogReader::damage() const {
+  std::vector<LogDamage> all = indexer_.index().damage;
+  if (scanner_.tail()) all.push_back(*scanner_.tail());
+  return all;
 }
 
 const SlogRunIndex& SlogReader::run_index(std::size_t run) const {
   check_run_index(path(), runs_, run);
-  return index_.runs[run];
+  return indexer_.index().runs[run];
 }
 
 Eigen::MatrixXd SlogReader::excitation(std::size_t run) const {
-  return read_slog_excitation(source_, index_.info, run_index(run));
+  return read_slog_excitation(source_, info(), run_index(run));
 }
 
 void SlogReader::read(std::size_t run, std::uint64_t first, std::uint64_t count,
                       LogSamples& out) const {
   const SlogRunIndex& from = run_index(run);
   check_row_range(path(), from.run, first, count);
-  resize_samples(index_.info, count, out);
-  if (count == 0) return;
-  const auto starts_behind = [](std::uint64_t row, const SlogBlock& block) {
-    return row < block.header.first_row;
+  resize_samples(info(), count, out);
+  const auto ends_before = [](const SlogStretch& stretch, std::uint64_t row) {
+    return stretch.end_row() <= row;
   };
-  auto block = std::upper_bound(from.samples.begin(), from.samples.end(), first, starts_behind);
-  if (block != from.samples.begin()) --block;
-  for (; block != from.samples.end() && block->header.first_row < first + count; ++block) {
-    read_block(from, *block, {first, first + count, out});
+  auto stretch = std::lower_bound(from.samples.begin(), from.samples.end(), first, ends_before);
+  for (std::uint64_t row = first; row < first + count;) {
+    const SlogBlock block = stretch->read_block(source_, row);
+    read_block(from, block, {first, first + count, out});
+    row = block.header.first_row + block.header.rows;
+    if (row >= stretch->end_row()) ++stretch;
   }
 }
 
 void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
                             const Target& target) const {
   const std::size_t words = block.header.cols;
-  const std::size_t actuators = index_.info.actuators.size();
-  const std::size_t sensors = index_.info.sensors.size();
+  const std::size_t actuators = info().actuators.size();
+  const std::size_t sensors = info().sensors.size();
   const std::size_t row_bytes = words * sizeof(double);
   const std::uint64_t padded = slog_padded(block.header.payload_bytes);
   // Whole rows and a multiple of 64 bytes, so that only the last piece has padding.
@@ -111,7 +135,7 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
     }
     if (!finite) {
       if (!payload_intact(source_, block)) break;  // damage has priority, because it is the cause
-      throw_not_finite(path(), index_.info, run.run, target.first, target.out,
+      throw_not_finite(path(), info(), run.run, target.first, target.out,
                        static_cast<Eigen::Index>(to), static_cast<Eigen::Index>(count));
     }
   }

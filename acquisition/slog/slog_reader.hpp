@@ -18,27 +18,33 @@ class SlogReader final : public LogReader {
                       SlogScanDepth depth = SlogScanDepth::headers);
 
   const std::filesystem::path& path() const noexcept override { return source_.path(); }
-  const LogInfo& info() const noexcept override { return index_.info; }
+  const LogInfo& info() const noexcept override { return indexer_.index().info; }
   const std::vector<LogRun>& runs() const noexcept override { return runs_; }
   Eigen::MatrixXd excitation(std::size_t run) const override;
   void read(std::size_t run, std::uint64_t first, std::uint64_t count,
             LogSamples& out) const override;
 
   /// The damaged parts; empty unless opened with damaged_is_error = false.
-  const std::vector<LogDamage>& damage() const noexcept { return index_.damage; }
+  std::vector<LogDamage> damage() const;
 
-  std::uint64_t intact_blocks() const noexcept { return index_.blocks; }
+  std::uint64_t intact_blocks() const noexcept { return indexer_.index().blocks; }
 
   /// Exit status and message of the experiment, if the log was closed properly.
-  const std::optional<SlogEnd>& end() const noexcept { return index_.end; }
+  const std::optional<SlogEnd>& end() const noexcept { return indexer_.index().end; }
+
+  /// Takes what was written since. Not while another thread reads. @throws the same as the constructor
+  void update();
 
  private:
   struct Target;
   const SlogRunIndex& run_index(std::size_t run) const;
   void read_block(const SlogRunIndex& run, const SlogBlock& block, const Target& target) const;
 
+  void scan();
+
   SlogSource source_;
-  SlogIndex index_;
+  SlogScanner scanner_;
+  SlogIndexer indexer_;
   std::vector<LogRun> runs_;
 };
 

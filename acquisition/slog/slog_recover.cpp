@@ -180,7 +180,7 @@ class Recovery {
 
   /// Whether so many bytes that are not in the damaged log may be written; if so, they count.
   bool may_add(std::uint64_t bytes) {
-    if (bytes > kMostAdded * scan_.file_bytes - added_bytes_) return false;
+    if (bytes > kMostAdded * source_.bytes() - added_bytes_) return false;
     added_bytes_ += bytes;
     return true;
   }
@@ -189,7 +189,7 @@ class Recovery {
   bool fill(std::uint64_t row) {
     const std::uint32_t words = slog_row_words(info_);
     const std::uint64_t missing = row - run_->begin.samples;
-    if (missing > scan_.file_bytes || !may_add(missing * sizeof(double) * words)) return false;
+    if (missing > source_.bytes() || !may_add(missing * sizeof(double) * words)) return false;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
     for (std::size_t r = 0; r < kFillRows; ++r) {

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -24,30 +25,37 @@ namespace {
 
 constexpr std::size_t kScanBytes = std::size_t{1} << 18;
 
-/// Reads one file and collects its blocks and damage.
-class Scanner {
+/// One step of a scan: collects blocks and damage.
+class ScanStep {
  public:
-  Scanner(const SlogSource& source, SlogScanDepth depth) : source_(source), depth_(depth) {
-    scan_.file_bytes = source.bytes();
-  }
+  ScanStep(const SlogSource& source, SlogScanDepth depth, std::optional<std::uint32_t> log_id,
+           std::uint64_t sequence)
+      : source_(source), depth_(depth), log_id_(log_id), sequence_(sequence) {}
 
-  SlogScan run() {
-    std::uint64_t offset = 0;
-    while (offset < source_.bytes()) {
+  SlogScan run(std::uint64_t& offset, std::size_t most, std::optional<LogDamage>& tail) {
+    tail.reset();
+    while (offset < source_.bytes() && scan_.blocks.size() < most) {
       std::string wrong;
       if (const auto block = block_at(offset, wrong)) {
         offset = take(*block);
-      } else {
-        const std::uint64_t next = next_header(offset + 1);
-        scan_.damage.push_back({offset, next - offset, std::move(wrong)});
-        offset = next;
+        continue;
       }
+      const std::uint64_t next = next_header(offset + 1);
+      LogDamage damage{offset, next - offset, std::move(wrong)};
+      if (next == source_.bytes()) {
+        tail = std::move(damage);
+        break;
+      }
+      scan_.damage.push_back(std::move(damage));
+      offset = next;
     }
-    if (scan_.blocks.empty()) {
+    if (!log_id_) {
       throw FormatError(
           source_.path(), "",
           "contains no intact block of a native log (.slog); give a log written by 'stageid run'");
     }
+    scan_.log_id = *log_id_;
+    if (scan_.blocks.size() == most) leave_jumps(offset);
     keep_those_in_order();
     report_missing();
     return std::move(scan_);
@@ -72,7 +80,7 @@ class Scanner {
           fmt::format("has unsupported format version {}; this program reads version {}",
                       block.header.version, kSlogVersion));
     }
-    if (!scan_.blocks.empty() && block.header.log_id != scan_.log_id) {
+    if (log_id_ && block.header.log_id != *log_id_) {
       wrong = "a block belongs to another log";
       return std::nullopt;
     }
@@ -86,12 +94,22 @@ class Scanner {
 
   /// Records an intact header (and checks the payload if requested); returns the next offset.
   std::uint64_t take(const SlogBlock& block) {
-    if (scan_.blocks.empty()) scan_.log_id = block.header.log_id;
     if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block)) {
       return skip_payload(block);
     }
+    if (!log_id_) log_id_ = block.header.log_id;
     scan_.blocks.push_back(block);
     return block.end();
+  }
+
+  /// Whether a last block that does not follow its predecessor is misplaced is seen from those behind it.
+  void leave_jumps(std::uint64_t& offset) {
+    auto& blocks = scan_.blocks;
+    while (blocks.size() > 1 &&
+           blocks.back().header.sequence != blocks[blocks.size() - 2].header.sequence + 1)
+      blocks.pop_back();
+    offset = blocks.back().end();
+    std::erase_if(scan_.damage, [&](const LogDamage& d) { return d.offset >= offset; });
   }
 
   /// Keeps the longest list of blocks with increasing numbers: a misplaced one must not cost those around it.
@@ -100,6 +118,7 @@ class Scanner {
     std::vector<std::size_t> previous(scan_.blocks.size(), 0);
     const auto number = [this](std::size_t k) { return scan_.blocks[k].header.sequence; };
     for (std::size_t k = 0; k < scan_.blocks.size(); ++k) {
+      if (number(k) < sequence_) continue;
       const auto place = std::lower_bound(
           last.begin(), last.end(), number(k),
           [&](std::size_t a, std::uint64_t sequence) { return number(a) < sequence; });
@@ -110,7 +129,8 @@ class Scanner {
         *place = k;
     }
     std::vector<bool> kept(scan_.blocks.size(), false);
-    for (std::size_t n = last.size(), k = last.back(); n > 0; --n, k = previous[k]) kept[k] = true;
+    for (std::size_t n = last.size(), k = n > 0 ? last.back() : 0; n > 0; --n, k = previous[k])
+      kept[k] = true;
     std::vector<SlogBlock> in_order;
     for (std::size_t k = 0; k < scan_.blocks.size(); ++k) {
       const SlogBlock& block = scan_.blocks[k];
@@ -127,7 +147,7 @@ class Scanner {
   void report_missing() {
     std::set<std::uint64_t> damage_ends;
     for (const LogDamage& damage : scan_.damage) damage_ends.insert(damage.offset + damage.bytes);
-    std::uint64_t next = 0;
+    std::uint64_t next = sequence_;
     for (const SlogBlock& block : scan_.blocks) {
       if (block.header.sequence > next && !damage_ends.contains(block.offset))
         scan_.damage.push_back(
@@ -173,6 +193,8 @@ class Scanner {
 
   const SlogSource& source_;
   SlogScanDepth depth_;
+  std::optional<std::uint32_t> log_id_;
+  std::uint64_t sequence_;  // of the first block
   SlogScan scan_;
 };
 
@@ -189,6 +211,14 @@ SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
   if (!S_ISREG(status.st_mode)) {
     throw FileError(fmt::format("{}: is not a regular file; give a log file", path_.string()));
   }
+  bytes_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+void SlogSource::update_bytes() {
+  struct stat status {};
+  if (::fstat(file_.get(), &status) != 0)
+    throw FileError(fmt::format("{}: cannot be read: {}", path_.string(),
+                                std::error_code(errno, std::generic_category()).message()));
   bytes_ = static_cast<std::uint64_t>(status.st_size);
 }
 
@@ -224,11 +254,20 @@ void SlogSource::advise(int advice) const noexcept {
   static_cast<void>(::posix_fadvise(file_.get(), 0, 0, advice));
 }
 
-SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
+SlogScan SlogScanner::next(const SlogSource& source, std::size_t most) {
   // One header every few hundred kB; then everything in order.
-  if (depth == SlogScanDepth::headers) source.advise(POSIX_FADV_RANDOM);
-  SlogScan scan = Scanner(source, depth).run();
+  if (depth_ == SlogScanDepth::headers) source.advise(POSIX_FADV_RANDOM);
+  SlogScan scan = ScanStep(source, depth_, log_id_, sequence_).run(offset_, most, tail_);
   source.advise(POSIX_FADV_SEQUENTIAL);
+  log_id_ = scan.log_id;
+  if (!scan.blocks.empty()) sequence_ = scan.blocks.back().header.sequence + 1;
+  return scan;
+}
+
+SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
+  SlogScanner scanner(depth);
+  SlogScan scan = scanner.next(source, std::numeric_limits<std::size_t>::max());
+  if (scanner.tail()) scan.damage.push_back(*scanner.tail());
   return scan;
 }
 

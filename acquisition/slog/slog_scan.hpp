@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ class SlogSource {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   std::uint64_t bytes() const noexcept { return bytes_; }
+  void update_bytes();  ///< of a file that is being written. @throws FileError
 
   /// Reads exactly `size` bytes starting at `offset`.
   /// @throws FileError if the device fails or the file has become shorter.
@@ -57,7 +59,6 @@ struct LogDamage {
 struct SlogScan {
   std::vector<SlogBlock> blocks;  ///< in order of the file; sequence strictly increasing
   std::vector<LogDamage> damage;
-  std::uint64_t file_bytes = 0;
   std::uint32_t log_id = 0;
 };
 
@@ -66,9 +67,30 @@ enum class SlogScanDepth : std::uint8_t {
   payloads  ///< every byte is read and checked
 };
 
-/// Finds all intact blocks. After damage, it continues at the next intact header of this log.
-/// @throws FileError
-/// @throws FormatError if there is no intact block, or one of an unknown version.
+/// Finds the intact blocks of a file step by step. After damage, it continues at the next intact header of this log.
+class SlogScanner {
+ public:
+  explicit SlogScanner(SlogScanDepth depth) : depth_(depth) {}
+
+  /// The next blocks, at most `most` >= 4, whose order is judged among them.
+  /// @throws FileError
+  /// @throws FormatError if the file has no intact block, or one of an unknown version.
+  SlogScan next(const SlogSource& source, std::size_t most);
+  /// The damaged end of the file, where a writer may be at work: looked at again by the next step.
+  const std::optional<LogDamage>& tail() const noexcept { return tail_; }
+  bool is_at_end(const SlogSource& source) const noexcept {
+    return tail_ || offset_ >= source.bytes();
+  }
+
+ private:
+  SlogScanDepth depth_;
+  std::uint64_t offset_ = 0;
+  std::uint64_t sequence_ = 0;  // of the next block
+  std::optional<std::uint32_t> log_id_;
+  std::optional<LogDamage> tail_;
+};
+
+/// All blocks and all damage. @throws the same as SlogScanner
 SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth);
 
 /// The payload of a block, checked. @throws FormatError naming the block.

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "acquisition/formats/open_log.hpp"
-#include "acquisition/slog/slog_reader.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "frf/runs/excitation_spectrum.hpp"
 
@@ -30,8 +29,8 @@ std::vector<int> watched_lines(const LogReader& log, const std::array<double, 2>
 
 WatchSource::WatchSource(const AdditiveModel& model, std::filesystem::path log,
                          const std::array<double, 2>& band_hz, bool follow)
-    : file_(std::move(log)), follow_(follow) {
-  open();
+    : file_(std::move(log)) {
+  open(follow);
   if (log_->runs().empty())
     throw std::invalid_argument(
         fmt::format("{}: has no run yet; start the measurement first", file_.string()));
@@ -53,25 +52,27 @@ bool WatchSource::has_begun(const std::filesystem::path& log) {
   return !reader.runs().empty() || reader.end();
 }
 
-void WatchSource::open() {
-  if (!follow_) {
+void WatchSource::open(bool follow) {
+  if (!follow) {
     log_ = open_log(file_);
     return;
   }
   // The last block may be incomplete at this moment.
   auto log = std::make_unique<SlogReader>(file_, false);
-  ended_ = log->end().has_value();
+  growing_ = log.get();
   log_ = std::move(log);
 }
 
+bool WatchSource::has_ended() const { return growing_ == nullptr || growing_->end(); }
+
 bool WatchSource::refresh() {
-  if (ended_) return false;
-  open();
+  if (has_ended()) return false;
+  growing_->update();
   return true;
 }
 
 bool WatchSource::was_stopped_early() const {
-  return ended_ && !std::ranges::all_of(log_->runs(), &LogRun::complete);
+  return has_ended() && !std::ranges::all_of(log_->runs(), &LogRun::complete);
 }
 
 std::optional<WatchedPeriod> WatchSource::next() {

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "acquisition/record/log_reader.hpp"
+#include "acquisition/slog/slog_reader.hpp"
 #include "estimation/modal/model_spectra.hpp"
 
 namespace stageid {
@@ -44,12 +45,12 @@ class WatchSource {
   bool was_stopped_early() const;
 
  private:
-  void open();
+  void open(bool follow);
+  bool has_ended() const;
 
   std::filesystem::path file_;
-  bool follow_;
-  bool ended_ = true;
   std::unique_ptr<LogReader> log_;
+  SlogReader* growing_ = nullptr;  // log_, if it is being written
   std::optional<ModelSpectra> spectra_;
   Eigen::VectorXd frequency_hz_;
   Eigen::MatrixXd excitation_;  // of the current run

@@ -136,6 +136,42 @@ TEST_F(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
   }
 }
 
+TEST_F(SlogDamage, AScanInStepsFindsTheSame) {
+  test::write_small_log(file_, 2, 9);
+  const std::string good = test::bytes_of(file_);
+  const SlogScan intact = scan_slog(SlogSource(file_), SlogScanDepth::payloads);
+  const auto agrees = [&](const std::string& bytes) {
+    test::write_bytes(file_, bytes);
+    const SlogSource source(file_);
+    const SlogScan whole = scan_slog(source, SlogScanDepth::payloads);
+    for (const std::size_t most : {4U, 5U, 9U}) {
+      SlogScanner scanner(SlogScanDepth::payloads);
+      std::vector<std::uint64_t> offsets;
+      std::size_t damage = 0;
+      while (!scanner.is_at_end(source)) {
+        const SlogScan step = scanner.next(source, most);
+        for (const SlogBlock& block : step.blocks) offsets.push_back(block.offset);
+        damage += step.damage.size();
+      }
+      EXPECT_EQ(damage + (scanner.tail() ? 1U : 0U), whole.damage.size());
+      ASSERT_EQ(offsets.size(), whole.blocks.size());
+      for (std::size_t k = 0; k < offsets.size(); ++k)
+        EXPECT_EQ(offsets[k], whole.blocks[k].offset);
+    }
+  };
+  agrees(good);
+  const SlogBlock& late = intact.blocks[intact.blocks.size() - 3];
+  for (const SlogBlock& block : intact.blocks) {
+    std::string flipped = good;
+    flipped[block.offset + 70] ^= 1;
+    agrees(flipped);
+    agrees(good.substr(0, block.offset) + good.substr(block.end()));  // missing
+    agrees(good.substr(0, block.offset) + good.substr(late.offset, slog_block_bytes(late.header)) +
+           good.substr(block.offset));
+    agrees(good.substr(0, block.end() + 30));
+  }
+}
+
 // Recover ------------------------------------------------------------------------------------
 
 class SlogRecover : public test::SmallLogTest {

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 #include <random>
 #include <thread>
@@ -88,6 +88,30 @@ TEST_F(SlogReaderTest, SeveralThreadsReadAtOnce) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_THAT(good, testing::Each(8));
+}
+
+TEST_F(SlogReaderTest, UpdatesWhileTheLogIsBeingWritten) {
+  test::write_small_log(file_, 3, 9);
+  const std::string whole = test::bytes_of(file_);
+  const std::size_t first = SlogSource(file_).bytes() / 10;  // with the description
+  test::write_bytes(file_, whole.substr(0, first));
+  SlogReader growing(file_, false);
+  for (std::size_t bytes = first; bytes <= whole.size(); bytes += 7) {
+    if (whole.size() - bytes < 7) bytes = whole.size();
+    std::ofstream(file_, std::ios::app | std::ios::binary) << whole.substr(
+        std::filesystem::file_size(file_), bytes - std::filesystem::file_size(file_));
+    growing.update();
+    const SlogReader anew(file_, false);
+    ASSERT_EQ(growing.runs().size(), anew.runs().size());
+    ASSERT_EQ(growing.damage().size(), anew.damage().size());
+    ASSERT_EQ(growing.intact_blocks(), anew.intact_blocks());
+    ASSERT_EQ(growing.end().has_value(), anew.end().has_value());
+    for (std::size_t run = 0; run < anew.runs().size(); ++run)
+      ASSERT_EQ(growing.runs()[run].complete, anew.runs()[run].complete);
+    ASSERT_EQ(test::good_rows(growing), test::good_rows(anew));
+  }
+  EXPECT_EQ(growing.end()->message, "done");
+  EXPECT_EQ(test::good_rows(growing), 3U * 36);
 }
 
 TEST_F(SlogReaderTest, RefusesRangesOutsideARun) {
