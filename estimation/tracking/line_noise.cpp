@@ -23,15 +23,15 @@ Eigen::MatrixXcd inverse_root(Eigen::MatrixXcd C) {
 }  // namespace
 
 Eigen::MatrixXcd LineNoise::inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
-                                           double periods) const {
+                                           double freedom) const {
   return inverse_root(0.5 * (scatter + neighbours_[static_cast<std::size_t>(k)]) /
-                      (periods - 1.0 + static_cast<double>(n_y_)));
+                      (freedom + static_cast<double>(n_y_)));
 }
 
 /// The scatter around a line, of n_y degrees of freedom, each neighbour scaled to the power of the line's own noise.
 Eigen::MatrixXcd LineNoise::scatter_around(Eigen::Index k) const {
   const auto N = std::ssize(scatter_);
-  const auto freedom = static_cast<double>(deviations_.front().cols() - 1);
+  const auto freedom = static_cast<double>(deviations_.front().cols() - 2);
   const auto n_y = static_cast<double>(n_y_);
   const Eigen::Index first = std::max<Eigen::Index>(0, k - n_y_);
   const Eigen::Index last = std::min(N - 1, k + n_y_);
@@ -63,21 +63,26 @@ LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
   n_y_ = residuals.front().rows();
   const Eigen::Index N = residuals.front().cols();
   variance_.resize(n_y_, N);
+  const auto freedom = static_cast<double>(periods - 2);  // beside mean and slope
+  const Eigen::VectorXd time = Eigen::VectorXd::LinSpaced(periods, -1.0, 1.0);
+  const Eigen::ArrayXd leverage =
+      1.0 / static_cast<double>(periods) + time.array().square() / time.squaredNorm();
   for (Eigen::Index k = 0; k < N; ++k) {
     Eigen::MatrixXcd deviation(n_y_, periods);
     for (Eigen::Index t = 0; t < periods; ++t)
       deviation.col(t) = residuals[static_cast<std::size_t>(t)].col(k);
     const Eigen::VectorXcd mean = deviation.rowwise().mean();
     deviation.colwise() -= mean;
+    const Eigen::VectorXcd slope = deviation * time / time.squaredNorm();
+    deviation -= slope * time.transpose();
     // The mean inverse of a chi-square of nu complex degrees of freedom is 1 / (nu - 1).
-    variance_.col(k) = deviation.rowwise().squaredNorm() / static_cast<double>(periods - 2);
+    variance_.col(k) = deviation.rowwise().squaredNorm() / (freedom - 1.0);
     scatter_.emplace_back(deviation * deviation.adjoint());
-    deviations_.push_back(std::move(deviation));
+    deviations_.emplace_back(deviation * (1.0 - leverage).rsqrt().matrix().asDiagonal());
   }
   for (Eigen::Index k = 0; k < N; ++k) {
     neighbours_.push_back(scatter_around(k));
-    inverse_factor_.push_back(
-        inverse_factor(scatter_[static_cast<std::size_t>(k)], k, static_cast<double>(periods)));
+    inverse_factor_.push_back(inverse_factor(scatter_[static_cast<std::size_t>(k)], k, freedom));
   }
 }
 
@@ -102,9 +107,9 @@ SumCovariance LineNoise::covariance(const Eigen::MatrixXd& J) const {
   for (std::size_t k = 0; k < deviations_.size(); ++k) {
     const auto line = static_cast<Eigen::Index>(k);
     for (Eigen::Index t = 0; t < periods; ++t) {
-      // From the mean of the others, d n / (n - 1); its variance is n / (n - 1) of a period's.
-      const Eigen::VectorXcd d = deviations_[k].col(t) * std::sqrt(n / (n - 1.0));
-      const Eigen::MatrixXcd others = inverse_factor(scatter_[k] - d * d.adjoint(), line, n - 1.0);
+      // The scatter of the others is that of all without d d^H.
+      const Eigen::VectorXcd d = deviations_[k].col(t);
+      const Eigen::MatrixXcd others = inverse_factor(scatter_[k] - d * d.adjoint(), line, n - 3.0);
       // J is whitened by all periods: L^H W d, W of the others, gives J^T of the residual under their weights.
       const Eigen::VectorXcd w =
           inverse_factor_[k].adjoint().inverse() * (others.adjoint() * (others * d));

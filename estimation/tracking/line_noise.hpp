@@ -12,6 +12,7 @@ struct SumCovariance {
 };
 
 /// The noise of the outputs on every line, learned from the scatter of a stage's residuals over periods without change.
+/// A line through the periods is removed first: a stage may drift while it is learned.
 ///
 /// The scatter of few periods is regularized by that of the neighbouring lines, with as many degrees of freedom as
 /// outputs. Each neighbour is scaled to the power of the line's own noise, by the trace of the whitened scatter. In a
@@ -34,16 +35,16 @@ class LineNoise {
  private:
   /// Of the covariance of real and imaginary parts.
   Eigen::MatrixXcd inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
-                                  double periods) const;
+                                  double freedom) const;
   Eigen::MatrixXcd scatter_around(Eigen::Index k) const;
 
   Eigen::Index n_y_;
 
   std::vector<Eigen::MatrixXcd> neighbours_;      // scatter_around() each line
   std::vector<Eigen::MatrixXcd> inverse_factor_;  // L^-1 of each line, L L^H = C / 2
-  std::vector<Eigen::MatrixXcd> deviations_;      // of the periods, by line: n_y x periods
-  std::vector<Eigen::MatrixXcd> scatter_;         // sum of their squares, by line
-  Eigen::MatrixXd variance_;                      // n_y x N
+  std::vector<Eigen::MatrixXcd> deviations_;  // n_y x periods by line, each with the variance of the noise
+  std::vector<Eigen::MatrixXcd> scatter_;     // sum of the squares of the residuals, by line
+  Eigen::MatrixXd variance_;                  // n_y x N
 };
 
 }  // namespace stageid

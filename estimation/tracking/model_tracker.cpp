@@ -131,10 +131,12 @@ ModelTracker::ModelTracker(const AdditiveModel& model, const Eigen::VectorXd& fr
   if (options.learning_periods < 4)
     throw std::invalid_argument("learning needs at least 4 periods");
   if (!(options.memory_periods >= 1.0))
-    throw std::invalid_argument("the memory must be at least one period");
+    throw std::invalid_argument(
+        "the memory is shorter than one period; make it several periods long");
   if (!(options.false_alarms_per_period > 0.0 && options.false_alarms_per_period <= 0.1))
     throw std::invalid_argument(
-        "the rate of false alarms must be above 0 and at most 0.1 per period");
+        "the rate of false alarms must be above 0 and at most 0.1 per period; choose one such as "
+        "1/year");
   state_ = std::make_unique<State>(model, frequency_hz, options);
 }
 

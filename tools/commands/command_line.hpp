@@ -44,6 +44,13 @@ inline const CLI::Validator kNotNegative = number_check(true, "NONNEGATIVE");
 /// For options > 0.
 inline const CLI::Validator kPositive = number_check(false, "POSITIVE");
 
+inline CLI::Option* add_band(CLI::App& command, std::vector<double>& band_hz,
+                             const std::string& otherwise) {
+  return command.add_option("--band", band_hz, "LOW HIGH, Hz; default: " + otherwise)
+      ->expected(2)
+      ->check(kNotNegative);
+}
+
 inline void add_threads(CLI::App& command, int& threads) {
   command
       .add_option("--threads", threads,

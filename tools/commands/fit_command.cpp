@@ -111,7 +111,7 @@ void fit_command(CLI::App& app, Console& console) {
   command.add_option("--covariance", flags.covariance,
                      "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
                      "radius of the model response");
-  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz; default: all lines")->expected(2);
+  add_band(command, flags.band_hz, "all lines");
   command.add_option("--modes", flags.words.modes,
                      "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
                      "auto, or none with --submodel");

@@ -65,7 +65,7 @@ void modes_command(CLI::App& app, Console& console) {
                   "Find candidate modes of an FRF with a mode indicator function", find_modes);
   command.add_option("frf", flags.frf, "frf.h5")->required();
   command.add_option("-o,--output", flags.output, "modes.json to write");
-  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz")->expected(2);
+  add_band(command, flags.band_hz, "all lines");
   add_choice(
       command, "--kind", flags.kind,
       "matrix to analyse: response: the FRF G | accelerance: omega^2 G | whitened: G divided by "

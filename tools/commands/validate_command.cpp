@@ -150,8 +150,7 @@ void validate_command(CLI::App& app, Console& console) {
       .add_option("data", flags.data,
                   "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
       ->required();
-  command.add_option("--band", flags.band_hz, "LOW HIGH, Hz; default: the band of the fit")
-      ->expected(2);
+  add_band(command, flags.band_hz, "the band of the fit");
   command.add_option(
       "--stage", flags.stage,
       "stage or controller file for the health checks of a log; default: the one stored in it");

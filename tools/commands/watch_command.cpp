@@ -60,10 +60,7 @@ void watch(const WatchFlags& flags, Console& console) {
 
 std::vector<CLI::Option*> add_watch_options(CLI::App& command, WatchOptions& options) {
   return {
-      command
-          .add_option("--band", options.band_hz,
-                      "LOW HIGH, Hz, to watch; default: the band of the fit")
-          ->expected(2),
+      add_band(command, options.band_hz, "the band of the fit"),
       command
           .add_option("--learn", options.learn,
                       "periods without change, from which noise and reference are learned")

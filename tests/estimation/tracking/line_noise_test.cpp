@@ -106,6 +106,23 @@ TEST(LineNoise, TheCovarianceIsRightAlsoNextToLinesOfMuchLargerNoise) {
   expect_covariance_of_fresh_periods(30.0, 3.0);
 }
 
+TEST(LineNoise, ADriftWhileItIsLearnedIsNotNoise) {
+  constexpr int kPeriods = 16;
+  Noise noise(5, 1.0);
+  const std::vector<Eigen::MatrixXcd> steady = noise.periods(kPeriods);
+  std::vector<Eigen::MatrixXcd> drifting = steady;
+  const Eigen::MatrixXcd change = noise.period();
+  for (int t = 0; t < kPeriods; ++t)
+    drifting[static_cast<std::size_t>(t)] += (3.0 + static_cast<double>(t)) * change;
+  const Eigen::MatrixXcd columns = noise.period().reshaped();
+  const LineNoise a(steady);
+  const LineNoise b(drifting);
+  const Eigen::MatrixXd J = a.whitened(columns);
+  EXPECT_LT((J - b.whitened(columns)).norm(), 1e-9 * J.norm());
+  EXPECT_NEAR(b.covariance(J).value(0, 0), a.covariance(J).value(0, 0),
+              1e-9 * a.covariance(J).value(0, 0));
+}
+
 TEST(LineNoise, TheRelativePowerOfFewPeriodsIsOneOnAverage) {
   constexpr int kRuns = 2000;
   Noise noise(4, 30.0);
