@@ -132,7 +132,7 @@ ModelTracker::ModelTracker(const AdditiveModel& model, const Eigen::VectorXd& fr
     throw std::invalid_argument("learning needs at least 4 periods");
   if (!(options.memory_periods >= 1.0))
     throw std::invalid_argument(
-        "the memory is shorter than one period; make it several periods long");
+        "the memory must be at least one period; make it several periods long");
   if (!(options.false_alarms_per_period > 0.0 && options.false_alarms_per_period <= 0.1))
     throw std::invalid_argument(
         "the rate of false alarms must be above 0 and at most 0.1 per period; choose one such as "
@@ -161,6 +161,24 @@ const std::vector<TrackedParameter>& ModelTracker::parameters() const noexcept {
 }
 const Eigen::VectorXd& ModelTracker::estimate() const noexcept { return state_->filter.estimate(); }
 Eigen::MatrixXd ModelTracker::covariance() const { return state_->filter.covariance(); }
+Eigen::MatrixXcd ModelTracker::response() const { return state_->response.at(estimate()); }
+
+Eigen::MatrixXd ModelTracker::response_variance() const {
+  const TrackedResponse& response = state_->response;
+  const Eigen::Index n_y = response.model().n_outputs();
+  const Eigen::Index n_u = response.model().n_inputs();
+  const Eigen::MatrixXd C = covariance();
+  Eigen::MatrixXd out(n_y * n_u, response.lines());
+  for (Eigen::Index j = 0; j < n_u; ++j) {
+    Eigen::MatrixXcd one_input = Eigen::MatrixXcd::Zero(n_u, response.lines());
+    one_input.row(j).setOnes();
+    const Eigen::MatrixXcd D = response.derivatives(estimate(), one_input);
+    const Eigen::VectorXd variance = (D * C).cwiseProduct(D.conjugate()).rowwise().sum().real();
+    out.middleRows(j * n_y, n_y) = variance.reshaped(n_y, out.cols());
+  }
+  return out;
+}
+
 const ReferenceQuality& ModelTracker::reference() const noexcept { return state_->quality; }
 
 }  // namespace stageid

@@ -59,6 +59,10 @@ class ModelTracker {
   const Eigen::VectorXd& estimate() const noexcept;
   /// Of the tracked changes, without the error of the model itself, which is constant.
   Eigen::MatrixXd covariance() const;
+  /// Response of the model with the tracked changes, (n_y n_u) x N, column k = vec(P_k).
+  Eigen::MatrixXcd response() const;
+  /// E|error|^2 of its entries, of the tracked changes as covariance().
+  Eigen::MatrixXd response_variance() const;
   /// Of the last learned reference; empty before.
   const ReferenceQuality& reference() const noexcept;
 

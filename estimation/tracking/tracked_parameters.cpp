@@ -46,6 +46,24 @@ std::string describe(const TrackedParameter& parameter, const AdditiveModel& mod
   return "delay";
 }
 
+double nominal_value(const TrackedParameter& parameter, const AdditiveModel& model) {
+  const auto mode = [&]() -> const Submodel& {
+    return model.submodels[static_cast<std::size_t>(parameter.index)];
+  };
+  switch (parameter.kind) {
+    case TrackedKind::frequency:
+      return mode().natural_frequency_hz();
+    case TrackedKind::damping:
+      return mode().damping_ratio();
+    case TrackedKind::sensor_gain:
+    case TrackedKind::actuator_gain:
+      return 1.0;
+    case TrackedKind::delay:
+      break;
+  }
+  return 0.0;
+}
+
 Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,
                                 double sample_rate_hz) {
   Eigen::VectorXd changes(std::ssize(parameters));

@@ -31,6 +31,9 @@ std::vector<TrackedParameter> tracked_parameters(const AdditiveModel& model,
 /// "frequency of the mode at 752.68 Hz", "gain of sensor 'y1'".
 std::string describe(const TrackedParameter& parameter, const AdditiveModel& model);
 
+/// Its value in the model: a natural frequency in Hz, a damping ratio, 1 for a gain, 0 for the delay.
+double nominal_value(const TrackedParameter& parameter, const AdditiveModel& model);
+
 /// The largest change of a stage that still works, one standard deviation: 5 % of a frequency, 50 % of a damping ratio,
 /// 30 % of a gain, one sample of delay. It only matters for what the data do not determine.
 Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,

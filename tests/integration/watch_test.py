@@ -76,6 +76,17 @@ class WatchTest(ProcessTest):
             self.assertTrue(np.all(tracks["statistic"][32:] < tracks["threshold"][32:]))
             self.assertEqual(list(tracks["learning"][30:34]), [1, 1, 0, 0])
             np.testing.assert_allclose(tracks["time_s"][:], np.arange(3, 123))
+            self.assertEqual(tracks["statistics"].shape, (120, len(told["tracked"]) + 2))
+            np.testing.assert_allclose(np.max(tracks["statistics"][32:], axis=1) <= tracks["statistic"][32:], True)
+            np.testing.assert_allclose(np.sqrt(np.diag(tracks["covariance"])), tracks["deviation"][-1])
+            lines = len(tracks["frequency_hz"])
+            self.assertEqual(tracks["response"].shape, (lines, 2, 3))
+            self.assertEqual(tracks["response_variance"].shape, (lines, 2, 3))
+        done = self.call("fleet", "add", "same.db", "same.h5", "--stage", "A", "--json")
+        self.assertEqual((done.returncode, json.loads(done.stdout)["values"]), (0, len(told["tracked"])), done.stderr)
+        done = self.call("fleet", "query", "same.db", "watched", "--json")
+        frequency = next(r for r in json.loads(done.stdout)["rows"] if "181.147" in r["property"] and r["kind"] == "frequency")
+        self.assertAlmostEqual(frequency["value"], MODE_HZ, delta=1e-3)
 
     def test_frequency(self):
         change, told = self.only_change("kind: mode_frequency, mode: 7, value: 1e-4")

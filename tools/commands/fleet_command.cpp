@@ -20,6 +20,7 @@
 #include "tools/fleet/fleet_run.hpp"
 #include "tools/fleet/fleet_time.hpp"
 #include "tools/fleet/identify_log.hpp"
+#include "tools/fleet/watched_tracks.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -28,6 +29,12 @@ namespace stageid {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+void require_time(const char* flag, const std::string& text) {
+  if (!text.empty() && !days_of(text))
+    throw std::invalid_argument(
+        fmt::format("{}: got '{}'; expected 2026-05-04 or 2026-05-04T12:34:56Z", flag, text));
+}
 
 /// stageid fleet FLEET.yaml
 struct FleetFlags {
@@ -76,9 +83,7 @@ struct FleetJobFlags {
 void run_job(const FleetJobFlags& flags, Console& console) {
   const FleetConfig config = load_fleet_config(flags.config);
   FleetLog log = flags.log;
-  if (!log.time_utc.empty() && !days_of(log.time_utc))
-    throw std::invalid_argument(
-        fmt::format("--time: got '{}'; expected 2026-05-04T12:34:56Z", log.time_utc));
+  require_time("--time", log.time_utc);
   for (const std::string& tag : flags.tags) {
     const std::size_t at = tag.find('=');
     if (at == std::string::npos)
@@ -101,6 +106,22 @@ void run_job(const FleetJobFlags& flags, Console& console) {
   console.result({{"job", job}, {"added", added}});
 }
 
+/// stageid fleet add STORE watch.h5
+struct FleetAddFlags {
+  std::filesystem::path store;
+  WatchedLog log;
+};
+
+void add_watched_log(const FleetAddFlags& flags, Console& console) {
+  require_time("--time", flags.log.time_utc);
+  require_readable(flags.log.file);
+  FleetStore store(flags.store, Database::Access::create);
+  const std::size_t rows = add_watched(store, flags.log);
+  console.result(fmt::format("{}: {} of stage '{}'", flags.store.string(),
+                             counted(rows, "watched value"), flags.log.stage));
+  console.result({{"stage", flags.log.stage}, {"values", rows}});
+}
+
 /// stageid fleet report STORE -o page.html
 struct FleetReportFlags {
   std::filesystem::path store;
@@ -111,10 +132,8 @@ void report_fleet(const FleetReportFlags& flags, Console& console) {
   FleetStore store(flags.store, Database::Access::write);
   require_ending(flags.request.output, "a page", {".html", ".htm"});
   require_writable(flags.request.output, {flags.store});
-  for (const std::string& time : {flags.request.since, flags.request.until})
-    if (!time.empty() && !days_of(time))
-      throw std::invalid_argument(
-          fmt::format("--since, --until: got '{}'; expected 2026-05-04", time));
+  require_time("--since", flags.request.since);
+  require_time("--until", flags.request.until);
   pair_fleet(store);  // jobs of other processes
   write_text_file(flags.request.output, fleet_page(store, flags.request));
   console.result(fmt::format("wrote {}", flags.request.output.string()));
@@ -223,6 +242,15 @@ void fleet_command(CLI::App& app, Console& console) {
                  "time of the measurement, ISO 8601 in UTC; default: that in the log");
   job.add_option("--tag", job_flags.tags, "NAME=VALUE; repeatable")->allow_extra_args(false);
 
+  auto [add, add_flags] = add_command(
+      fleet, console, "add", "Add the hourly values of a watched log, from 'stageid watch -o'",
+      add_watched_log);
+  add.add_option("store", add_flags.store, "store of a fleet (.db)")->required();
+  add.add_option("tracks", add_flags.log.file, "watch.h5")->required();
+  add.add_option("--stage", add_flags.log.stage, "name of the stage")->required();
+  add.add_option("--time", add_flags.log.time_utc,
+                 "start of the log, ISO 8601 in UTC; default: that in the log");
+
   auto [report, report_flags] = add_command(
       fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
   report.add_option("store", report_flags.store, "store of a fleet (.db)")->required();
@@ -238,7 +266,8 @@ void fleet_command(CLI::App& app, Console& console) {
   query.add_option("store", query_flags.store, "store of a fleet (.db)")->required();
   query
       .add_option("sql", query_flags.sql,
-                  "stages | modes | stage_modes | identifications | outliers | another table | an "
+                  "stages | modes | stage_modes | identifications | outliers | watched | another "
+                  "table | an "
                   "SQL statement, which cannot change the store")
       ->capture_default_str();
   query.add_option("--csv", query_flags.csv, "file to write instead of printing");

@@ -102,7 +102,7 @@ void StageWatch::run(const std::filesystem::path& log, bool follow,
       if (!goes_on()) break;
     }
   } while (goes_on() && source_->refresh() && wait(0.5 * period_s_, goes_on));
-  if (tracks_) tracks_->commit();
+  if (tracks_) tracks_->commit(*tracker_);
 }
 
 std::array<double, 2> StageWatch::band() const {
@@ -124,7 +124,8 @@ void StageWatch::open(const std::filesystem::path& log, bool follow) {
   const double rate_hz = source_->info().sample_rate_hz;
   period_s_ = source_->info().period_samples / rate_hz;
   tracker_.emplace(sampled_at(rate_hz, model_), source_->frequency_hz(), tracker_options());
-  if (!track_file_.empty()) tracks_.emplace(track_file_, *tracker_, model_, options_.model);
+  if (!track_file_.empty())
+    tracks_.emplace(track_file_, *tracker_, model_, options_.model, *source_);
 }
 
 void StageWatch::add(const WatchedPeriod& period) {

@@ -35,6 +35,7 @@ class WatchSource {
   static bool has_begun(const std::filesystem::path& log);
 
   const LogInfo& info() const { return log_->info(); }
+  std::string started_utc() const { return log_->runs().front().started_utc; }  ///< may be empty
   const Eigen::VectorXd& frequency_hz() const noexcept { return frequency_hz_; }
   /// The next period; none at the end of the log, or at present if the log is being written.
   std::optional<WatchedPeriod> next();

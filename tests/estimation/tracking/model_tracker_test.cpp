@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -10,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "estimation/tracking/tracked_response.hpp"
 #include "tests/estimation/tracked_stage.hpp"
 
 namespace stageid {
@@ -72,6 +75,33 @@ TEST(ModelTracker, EstimatesOfAnUnchangedStageAreWithinTheirDeviations) {
   // The model is exact. 10 runs of 120 values of a sensor: one deviation is 0.04; weights from few periods raise the
   // mean, the estimated parameters lower it.
   for (const double value : chi_square) EXPECT_NEAR(value, 1.0, 0.2);
+}
+
+TEST(ModelTracker, TheResponseHasTheTrackedChangesAndTheirCovariance) {
+  StageProperties changed;
+  changed.frequency_hz[1] *= 1.0 + 1e-4;
+  changed.sensor_gain[0] = 1.001;
+  ModelTracker tracker = tracker_of();
+  LoopSpectra loop(5);
+  loop.become(changed);
+  watch(tracker, loop, 32 + 30);
+  const Eigen::VectorXd x = tracker.estimate();
+  const TrackedResponse response(model_of({}), tracker.parameters(), tracked_lines_hz());
+  const Eigen::MatrixXcd P = tracker.response();
+  EXPECT_EQ(P, response.at(x));
+  // By differences, along the principal directions of the covariance.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(tracker.covariance());
+  Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(P.rows(), P.cols());
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const Eigen::VectorXd step =
+        axes.eigenvectors().col(i) * std::sqrt(std::max(axes.eigenvalues()[i], 0.0));
+    variance += (0.5 * (response.at(x + step) - response.at(x - step))).cwiseAbs2();
+  }
+  const Eigen::MatrixXd told = tracker.response_variance();
+  EXPECT_LT(((told - variance).array() / variance.array()).abs().maxCoeff(), 1e-3);
+  const Eigen::MatrixXcd truth = TrackedResponse(model_of(changed), {}, tracked_lines_hz()).at({});
+  const Eigen::ArrayXXd ratio = (P - truth).cwiseAbs2().array() / told.array();
+  EXPECT_LT(ratio.mean(), 4.0) << "the few tracked values are common to all lines";
 }
 
 // With feedback, the noise of the residual depends on the parameters, which settle far from the model here.
