@@ -42,10 +42,9 @@ class LineNoise {
 
   std::vector<Eigen::MatrixXcd> neighbours_;      // scatter_around() each line
   std::vector<Eigen::MatrixXcd> inverse_factor_;  // L^-1 of each line, L L^H = C / 2
-  std::vector<Eigen::MatrixXcd>
-      deviations_;  // n_y x periods by line, each with the variance of the noise
-  std::vector<Eigen::MatrixXcd> scatter_;  // sum of the squares of the residuals, by line
-  Eigen::MatrixXd variance_;               // n_y x N
+  std::vector<Eigen::MatrixXcd> deviations_;  // n_y x periods by line, each of the noise's variance
+  std::vector<Eigen::MatrixXcd> scatter_;     // sum of the squares of the residuals, by line
+  Eigen::MatrixXd variance_;                  // n_y x N
 };
 
 }  // namespace stageid
