@@ -119,9 +119,9 @@ SumCovariance LineNoise::covariance(const Eigen::MatrixXd& J) const {
     K.value.noalias() += sums * sums.transpose() / n;
     squares += (sums.rowwise().squaredNorm().array() / n).square();
   }
-  // A variance kappa_k of n periods has n degrees of freedom; of their sum, see Satterthwaite (1946). `squares`
-  // includes the scatter of kappa_k^2, a factor 1 + 2/n.
-  K.freedom = (n + 2.0) * K.value.diagonal().array().square() / squares.max(1e-300);
+  // A variance kappa_k of n periods has n - 2 degrees of freedom; of their sum, see Satterthwaite (1946). `squares`
+  // includes the scatter of kappa_k^2, a factor n / (n - 2).
+  K.freedom = n * K.value.diagonal().array().square() / squares.max(1e-300);
   return K;
 }
 

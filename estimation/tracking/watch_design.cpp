@@ -171,7 +171,8 @@ WatchForecast watch_forecast(const std::vector<Eigen::MatrixXcd>& J,
     squares +=
         (2.0 * beside.middleRows(row, rows).colwise().squaredNorm().transpose().array()).square();
   // As many degrees of freedom as LineNoise::covariance() finds.
-  const Eigen::VectorXd freedom = (n * M.diagonal().array().square() / squares.max(kTiny)).max(n);
+  const Eigen::VectorXd freedom =
+      ((n - 2.0) * M.diagonal().array().square() / squares.max(kTiny)).max(n - 2.0);
   // Weights from the noise of n periods instead of the true one.
   M *= 1.0 - std::min(0.5, static_cast<double>(J.front().rows()) / n);
   WatchForecast out;
