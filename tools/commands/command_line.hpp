@@ -1,12 +1,19 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/terminal/console.hpp"
+
+/// Of all options that are paths, in help and manual.
+template <>
+constexpr const char* CLI::detail::type_name<std::filesystem::path>() {
+  return "FILE";
+}
 
 namespace stageid {
 
@@ -47,6 +54,7 @@ inline const CLI::Validator kPositive = number_check(false, "POSITIVE");
 inline CLI::Option* add_band(CLI::App& command, std::vector<double>& band_hz,
                              const std::string& otherwise) {
   return command.add_option("--band", band_hz, "LOW HIGH, Hz; default: " + otherwise)
+      ->type_name("HZ")
       ->expected(2)
       ->check(kNotNegative);
 }
@@ -55,6 +63,7 @@ inline void add_threads(CLI::App& command, int& threads) {
   command
       .add_option("--threads", threads,
                   "number of threads; 0: all cores. The result does not depend on it")
+      ->type_name("COUNT")
       ->check(kNotNegative)
       ->capture_default_str();
 }

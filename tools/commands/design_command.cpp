@@ -201,6 +201,7 @@ void design_command(CLI::App& app, Console& console) {
       .add_option("--accuracy", flags.accuracy,
                   "print the measuring time for this mean relative variance of the response, e.g. "
                   "1e-6 for 0.1 % rms; needs level.limits")
+      ->type_name("VARIANCE")
       ->check(kPositive);
   CLI::Option* watch = command.add_option(
       "--watch", flags.watch.model,

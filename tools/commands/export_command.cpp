@@ -158,6 +158,7 @@ void export_command(CLI::App& app, Console& console) {
       .add_option("--driving-point", flags.driving_point,
                   "OUTPUT INPUT at the same point and in the same direction: add the modal mass of "
                   "each mode at this point to .h5, .mat or .npz")
+      ->type_name("CHANNEL")
       ->expected(2);
   command.add_option(
       "--controller-view", flags.stage,

@@ -147,6 +147,7 @@ void fit_command(CLI::App& app, Console& console) {
                   "0. m: default n + l - 1. f: starting frequencies in Hz, one per pole pair, and "
                   "last that of the real pole if n is odd; default: found by a search. zeta: "
                   "starting damping ratio. n=auto: one denominator for all modes found by a search")
+      ->type_name("TERM")
       ->allow_extra_args(false);
   command.add_option("--damping", flags.words.damping,
                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
@@ -156,12 +157,14 @@ void fit_command(CLI::App& app, Console& console) {
                   "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
       ->capture_default_str();
   command.add_option("--max-iterations", flags.request.max_iterations, "iterations per fit")
+      ->type_name("COUNT")
       ->capture_default_str();
   command
       .add_option("--search-seconds", flags.request.search_seconds,
                   "limit of the search, in seconds of work on a typical core, so that the result "
                   "does not depend on the machine. At the limit, the best model so far is written "
                   "and the exit code is 3. 0: unlimited")
+      ->type_name("SECONDS")
       ->check(kNotNegative)
       ->capture_default_str();
   add_threads(command, flags.request.threads);

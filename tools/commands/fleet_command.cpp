@@ -229,6 +229,7 @@ void fleet_command(CLI::App& app, Console& console) {
   });
   fleet.add_option("config", flags->config, "fleet file (.yaml)");
   fleet.add_option("--workers", flags->workers, "jobs at a time; 0: one per core")
+      ->type_name("COUNT")
       ->check(kNotNegative)
       ->capture_default_str();
 
@@ -237,29 +238,39 @@ void fleet_command(CLI::App& app, Console& console) {
                   "Run one job, as 'stageid fleet' does for every log; for schedulers", run_job);
   job.add_option("config", job_flags.config, "fleet file (.yaml)")->required();
   job.add_option("log", job_flags.log.file, "its log")->required();
-  job.add_option("--stage", job_flags.log.stage, "name of the stage; default: see 'stage_name'");
+  job.add_option("--stage", job_flags.log.stage, "name of the stage; default: see 'stage_name'")
+      ->type_name("NAME");
   job.add_option("--time", job_flags.log.time_utc,
-                 "time of the measurement, ISO 8601 in UTC; default: that in the log");
-  job.add_option("--tag", job_flags.tags, "NAME=VALUE; repeatable")->allow_extra_args(false);
+                 "time of the measurement, ISO 8601 in UTC; default: that in the log")
+      ->type_name("TIME");
+  job.add_option("--tag", job_flags.tags, "NAME=VALUE; repeatable")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
 
   auto [add, add_flags] = add_command(
       fleet, console, "add", "Add the hourly values of a watched log, from 'stageid watch -o'",
       add_watched_log);
   add.add_option("store", add_flags.store, "store of a fleet (.db)")->required();
   add.add_option("tracks", add_flags.log.file, "watch.h5")->required();
-  add.add_option("--stage", add_flags.log.stage, "name of the stage")->required();
+  add.add_option("--stage", add_flags.log.stage, "name of the stage")
+      ->type_name("NAME")
+      ->required();
   add.add_option("--time", add_flags.log.time_utc,
-                 "start of the log, ISO 8601 in UTC; default: that in the log");
+                 "start of the log, ISO 8601 in UTC; default: that in the log")
+      ->type_name("TIME");
 
   auto [report, report_flags] = add_command(
       fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
   report.add_option("store", report_flags.store, "store of a fleet (.db)")->required();
   report.add_option("-o,--output", report_flags.request.output, "page to write (.html)")
       ->required();
-  report.add_option("--stage", report_flags.request.stages, "stages to show; default: all");
-  report.add_option("--since", report_flags.request.since,
-                    "first time to show, such as 2026-05-04");
-  report.add_option("--until", report_flags.request.until, "end of the time to show, not included");
+  report.add_option("--stage", report_flags.request.stages, "stages to show; default: all")
+      ->type_name("NAME");
+  report
+      .add_option("--since", report_flags.request.since, "first time to show, such as 2026-05-04")
+      ->type_name("TIME");
+  report.add_option("--until", report_flags.request.until, "end of the time to show, not included")
+      ->type_name("TIME");
 
   auto [query, query_flags] = add_command(
       fleet, console, "query", "Print a table of a store, or write it as CSV", query_fleet);

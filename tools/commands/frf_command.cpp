@@ -131,16 +131,21 @@ void frf_command(CLI::App& app, Console& console) {
   command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
   command
       .add_option("--inputs", flags.options.inputs, "actuators A,B,...; default: the excited ones")
+      ->type_name("CHANNELS")
       ->delimiter(',');
   command.add_option("--outputs", flags.options.outputs, "sensors C,D,...; default: all")
+      ->type_name("CHANNELS")
       ->delimiter(',');
   command
       .add_option("--realizations", flags.realizations,
                   "counted from 1; default: all complete ones")
+      ->type_name("NUMBERS")
       ->delimiter(',');
-  command.add_option(
-      "--transient-periods", flags.options.transient_periods,
-      "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
+  command
+      .add_option(
+          "--transient-periods", flags.options.transient_periods,
+          "periods to discard at the start of each run; default: as declared in the log, 0 for lpm")
+      ->type_name("COUNT");
   add_choice(command, "--method", flags.options.method,
              "periodic: means over periods | lpm: local polynomial method, which models the "
              "transient in whole records");
@@ -158,9 +163,11 @@ void frf_command(CLI::App& app, Console& console) {
              "diagonal: variances | full: also the covariances between channels");
   add_choice(command, "--compensate", flags.compensate,
              "remove from the response: none | delay | hold: hold and delay");
-  command.add_option("--delay", flags.delay_s,
-                     "delay to remove with --compensate, in s, without the half sample of the "
-                     "hold; default: as declared in the log");
+  command
+      .add_option("--delay", flags.delay_s,
+                  "delay to remove with --compensate, in s, without the half sample of the "
+                  "hold; default: as declared in the log")
+      ->type_name("SECONDS");
   command.add_option(
       "--stage", flags.stage,
       "stage or controller file for the health checks; default: the one stored in the log");

@@ -71,6 +71,7 @@ void modes_command(CLI::App& app, Console& console) {
       "matrix to analyse: response: the FRF G | accelerance: omega^2 G | whitened: G divided by "
       "its standard deviations");
   command.add_option("--prominence", flags.prominence_db, "minimum prominence of a peak, dB")
+      ->type_name("DB")
       ->check(kNotNegative)
       ->capture_default_str();
 }

@@ -132,21 +132,27 @@ void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
   command
       .add_option("--modbus-tcp", flags.tcp_port,
                   "Modbus TCP port on the loopback interface; 0: a free one")
+      ->type_name("PORT")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--modbus-rtu", flags.rtu_device, "Modbus RTU on this serial line");
+  command.add_option("--modbus-rtu", flags.rtu_device, "Modbus RTU on this serial line")
+      ->type_name("DEVICE");
   command.add_option("--modbus-baud", flags.baud, "baud rate of the serial line")
+      ->type_name("BAUD")
       ->capture_default_str();
   command.add_option("--modbus-parity", flags.parity, "N | E | O")
       ->check(CLI::IsMember({"N", "E", "O"}))
       ->capture_default_str();
   command.add_option("--modbus-unit", flags.unit, "unit identifier of the node")
+      ->type_name("ADDRESS")
       ->check(CLI::Range(1, 247))
       ->capture_default_str();
-  command.add_option(
-      "--modbus-fault", flags.faults,
-      "KIND[@REQUEST][xCOUNT][:VALUE]: inject a fault; requests are counted from 1. Kinds: "
-      "late_reply:SECONDS, half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, "
-      "interlock, temperature:KELVIN, gravity:NEWTON");
+  command
+      .add_option(
+          "--modbus-fault", flags.faults,
+          "KIND[@REQUEST][xCOUNT][:VALUE]: inject a fault; requests are counted from 1. Kinds: "
+          "late_reply:SECONDS, half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, "
+          "interlock, temperature:KELVIN, gravity:NEWTON")
+      ->type_name("FAULT");
 }
 
 bool forces_act(NodeState state) {
@@ -302,22 +308,26 @@ void node_command(CLI::App& app, Console& console) {
       .add_option(
           "--can", flags.can_interfaces,
           "CAN FD interfaces, one per bus, in the order of the stage file, such as can0,can1")
+      ->type_name("INTERFACE")
       ->delimiter(',');
   command
       .add_option("--can-fault", flags.can_faults,
                   "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
                   "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
                   "lost@100x3,late@500:0.004")
+      ->type_name("FAULT")
       ->delimiter(',');
   command
       .add_option("--pace", flags.pace,
                   "speed of resident experiments. 0: as fast as possible; 1: wall clock")
+      ->type_name("SPEED")
       ->check(kNotNegative)
       ->capture_default_str();
   command
       .add_option("--hold", flags.hold_s,
                   "after a quick stop or a fault, seconds for which the node keeps the loop closed "
                   "before it cuts the forces")
+      ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
   add_modbus_options(command, flags.modbus);
@@ -327,6 +337,7 @@ void node_command(CLI::App& app, Console& console) {
           "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
           "'watchdog_s' of the group 'can'; over Modbus, the longest time that the host needs to "
           "repeat a lost request, plus one sample")
+      ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 3600.0));
 }
 

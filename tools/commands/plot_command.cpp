@@ -119,11 +119,13 @@ void plot_command(CLI::App& app, Console& console) {
   command
       .add_option("--output-channel", flags.output_channels,
                   "entry: the output; bode: outputs A,B,... (default: all)")
+      ->type_name("CHANNEL")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       .add_option("--input-channel", flags.input_channels,
                   "entry: the input; bode: inputs A,B,... (default: all)")
+      ->type_name("CHANNEL")
       ->delimiter(',')
       ->allow_extra_args(false);
   command.add_option("-o,--output", flags.output, "picture to write: .pdf, .svg or .png")

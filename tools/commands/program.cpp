@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -22,6 +23,7 @@
 #include "tools/commands/commands.hpp"
 #include "tools/fit/flag_values.hpp"
 #include "tools/manual/command_tree.hpp"
+#include "tools/manual/help_text.hpp"
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -101,6 +103,7 @@ std::string usage_problem(const CLI::ParseError& error) {
 class Program {
  public:
   Program() {
+    app_.formatter(std::make_shared<HelpText>(help_columns()));  // the commands inherit it
     for (const auto command :
          {identify_command, design_command, run_command, log_command, frf_command, modes_command,
           fit_command, validate_command, watch_command, export_command, import_command,

@@ -101,10 +101,12 @@ void run_command(CLI::App& app, Console& console) {
       .add_option("--replay-tolerance", flags.request.replay_tolerance_n,
                   "largest allowed difference between a command and the replayed one, in the unit "
                   "of the actuator")
+      ->type_name("TOLERANCE")
       ->capture_default_str();
   command
       .add_option("--pace", flags.request.pace,
                   "0: as fast as possible; 1: wall clock; default: from the stage file")
+      ->type_name("SPEED")
       ->check(kNotNegative);
   command.add_option("--excitation", flags.excitation,
                      "play this result of 'stageid design' instead of designing again");
@@ -112,13 +114,16 @@ void run_command(CLI::App& app, Console& console) {
       .add_option("--until", flags.request.until,
                   "stop after the realization that lowers the mean relative variance of the "
                   "response to this value, e.g. 1e-6 for 0.1 % rms")
+      ->type_name("VARIANCE")
       ->check(kPositive);
   command.add_flag("--resume", flags.request.resume,
                    "continue an interrupted log; complete runs are not repeated");
-  command.add_option("--dashboard", flags.dashboard,
-                     "live view in a browser. PORT: on this machine (0: any free port) | "
-                     "HOST:PORT: also on other machines. These and the stop button need the "
-                     "access token in the printed address");
+  command
+      .add_option("--dashboard", flags.dashboard,
+                  "live view in a browser. PORT: on this machine (0: any free port) | "
+                  "HOST:PORT: also on other machines. These and the stop button need the "
+                  "access token in the printed address")
+      ->type_name("ADDRESS");
   CLI::Option* const watch =
       command.add_option("--watch", flags.watch.model,
                          "model.json: report how the stage differs from this model during the run");

@@ -64,15 +64,18 @@ std::vector<CLI::Option*> add_watch_options(CLI::App& command, WatchOptions& opt
       command
           .add_option("--learn", options.learn,
                       "periods without change, from which noise and reference are learned")
+          ->type_name("PERIODS")
           ->check(CLI::Range(4, 10000))
           ->capture_default_str(),
       command
           .add_option("--memory", options.memory_s,
                       "s; after this time the weight of a period is 1/e; default: 100 periods")
+          ->type_name("SECONDS")
           ->check(kPositive),
       command
           .add_option("--false-alarms", options.false_alarms,
                       "rate of alarms without change: NUMBER/period, /hour, /day, /week or /year")
+          ->type_name("RATE")
           ->capture_default_str()};
 }
 

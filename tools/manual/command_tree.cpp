@@ -30,7 +30,16 @@ std::vector<std::string> listed_words(const std::string& help) {
   return words;
 }
 
-CommandOption option_of(const CLI::Option& option) {
+/// What a value is, where the option does not say it.
+std::string value_name(const std::string& type) {
+  const std::string name = type.substr(0, type.find(':'));
+  if (name == "TEXT") return "WORD";
+  return name == "FLOAT" || name == "INT" ? "NUMBER" : name;
+}
+
+}  // namespace
+
+CommandOption command_option(const CLI::Option& option) {
   CommandOption out;
   for (const std::string& name : option.get_snames()) out.flags.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) out.flags.push_back("--" + name);
@@ -40,21 +49,18 @@ CommandOption option_of(const CLI::Option& option) {
   out.default_value = option.get_default_str();
   if (option.get_type_size() == 0) return out;
   const std::string type = option.get_type_name();
-  out.value = type.substr(0, type.find(':'));
+  out.value = value_name(type);
   out.words = checked_words(type);
   if (out.words.empty()) out.words = listed_words(out.help);
   out.repeats = option.get_expected_max() == CLI::detail::expected_max_vector_size;
-  for (int k = 1; k < option.get_expected_min(); ++k)
-    out.value += " " + type.substr(0, type.find(':'));
+  for (int k = 1; k < option.get_expected_min(); ++k) out.value += " " + value_name(type);
   return out;
 }
-
-}  // namespace
 
 CommandTree command_tree(const CLI::App& app) {
   CommandTree tree{app.get_name(), app.get_description(), app.get_footer(), {}, {}, {}};
   for (const CLI::Option* option : app.get_options()) {
-    CommandOption out = option_of(*option);
+    CommandOption out = command_option(*option);
     (option->nonpositional() ? tree.options : tree.arguments).push_back(std::move(out));
   }
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))

@@ -10,7 +10,7 @@ namespace stageid {
 struct CommandOption {
   std::vector<std::string> flags;  ///< "-o", "--output"; empty: an argument
   std::string name;                ///< of an argument
-  std::string value;               ///< "TEXT"; empty: takes none
+  std::string value;               ///< "FILE", "HZ HZ"; empty: takes none
   std::vector<std::string> words;  ///< possible values that are words
   std::string default_value;       ///< empty: none is documented
   std::string help;
@@ -28,6 +28,7 @@ struct CommandTree {
   std::vector<CommandTree> commands;
 };
 
+CommandOption command_option(const CLI::Option& option);
 CommandTree command_tree(const CLI::App& app);
 
 /// All flags of the options, "-o", "--output", ...

@@ -56,7 +56,7 @@ TEST_F(Manual, TextIsNotMarkup) {
   const std::string& text = pages[1].text;
   EXPECT_THAT(text, HasSubstr("prog\\-cut \\- Cuts \\(aqit\\(aq at a\\eb\n"));
   EXPECT_THAT(text, HasSubstr("\n\\&.dot first (required)\n"));
-  EXPECT_THAT(text, HasSubstr("[\\fIOPTIONS\\fR] \\fB\\-o\\fR \\fITEXT\\fR \\fIfiles\\fR ...\n"));
+  EXPECT_THAT(text, HasSubstr("[\\fIOPTIONS\\fR] \\fB\\-o\\fR \\fIWORD\\fR \\fIfiles\\fR ...\n"));
   EXPECT_THAT(text, HasSubstr(".SH EXIT STATUS\nExit codes: 0 done\n"));
 }
 
