@@ -1,13 +1,16 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
@@ -19,6 +22,7 @@
 #include "tools/commands/program.hpp"
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/format_errors.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace {
@@ -30,6 +34,7 @@ void open_standard_streams() {
 }
 
 bool has_ended = false;
+bool json_wanted = false;  // --json
 
 /// HDF5 calls exit() when it is out of memory.
 void end_after_library() {
@@ -41,11 +46,24 @@ void end_after_library() {
   ::_exit(stageid::kWorldFailed);
 }
 
-int report(const std::exception& error, int exit_code) {
+int report(const std::vector<std::string>& errors, int exit_code) {
   has_ended = true;
   stageid::wait_if_ending();
-  stageid::Console().warning(error.what());
+  stageid::Console console;
+  console.json = json_wanted;
+  for (const std::string& error : errors) console.warning(error);
+  console.result({{"errors", errors}, {"exit_code", exit_code}});
   return exit_code;
+}
+
+int report(const std::exception& error, int exit_code) {
+  return report(std::vector<std::string>{error.what()}, exit_code);
+}
+
+std::vector<std::string> texts_of(const stageid::FormatErrors& errors) {
+  std::vector<std::string> texts;
+  for (const stageid::FormatError& error : errors.all()) texts.emplace_back(error.what());
+  return texts;
 }
 
 }  // namespace
@@ -53,6 +71,7 @@ int report(const std::exception& error, int exit_code) {
 int main(int argc, char** argv) {
   open_standard_streams();
   std::atexit(end_after_library);
+  json_wanted = std::find(argv, argv + argc, std::string_view("--json")) != argv + argc;
   try {
     stageid::catch_signals();  // as early as possible
     stageid::protect_inputs();
@@ -62,6 +81,8 @@ int main(int argc, char** argv) {
     return exit_code;
   } catch (const stageid::Interrupted& error) {
     return report(error, stageid::kInterrupted);
+  } catch (const stageid::FormatErrors& errors) {
+    return report(texts_of(errors), stageid::kRequestWrong);
   } catch (const stageid::FormatError& error) {
     return report(error, stageid::kRequestWrong);
   } catch (const stageid::FileError& error) {

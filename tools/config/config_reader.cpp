@@ -184,7 +184,9 @@ class MapReader final : public ConfigVisitor {
   void read(const char* key, Presence presence, const char* help, Take take) {
     known_.emplace_back(key);
     const YamlNode* value = document_.value(map_, key);
-    if (value != nullptr)
+    if (value != nullptr && known_.back() == "format")
+      take(*value);  // a file of another kind has other keys
+    else if (value != nullptr)
       errors_.attempt([&] { take(*value); });
     else if (presence == Presence::required)
       missing_.push_back({key, help});

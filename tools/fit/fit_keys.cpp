@@ -19,7 +19,8 @@ void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
              "order of the denominator; auto: twice the number of modes found by a search");
   r.order_by_search = order.word == "auto";
   const double n = order.numbers.empty() ? 0.0 : order.numbers.front();
-  v.require(std::floor(n) == n && n <= kLargestOrder, "n",
+  const bool whole = std::floor(n) == n && n <= kLargestOrder;
+  v.require(whole, "n",
             fmt::format("n: expected a whole number from 0 to {}, or auto", kLargestOrder));
   r.shape.order = static_cast<int>(std::min(n, 1e6));
   count(v, "l", r.shape.integrators, 0, 2, kOptional, "number of integrators: the power of 1/s");
@@ -32,7 +33,7 @@ void describe_submodel(ConfigVisitor& v, SubmodelRequest& r) {
             "found by a search");
   v.numbers("damping_ratio", r.damping_ratio, {"", 0.0, 0.9, true}, {}, kOptional,
             "starting damping ratios: one per pair, or one for all; omitted: 0.01");
-  const std::string fault = fault_of(r);
+  const std::string fault = whole ? fault_of(r) : "";
   v.require(fault.empty(), r.order_by_search ? "n" : "m", fault);
 }
 

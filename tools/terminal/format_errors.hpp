@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -32,9 +34,9 @@ class FormatErrorList {
     try {
       work();
     } catch (const FormatErrors& errors) {
-      errors_.insert(errors_.end(), errors.all().begin(), errors.all().end());
+      for (const FormatError& error : errors.all()) add(error);
     } catch (const FormatError& error) {
-      errors_.push_back(error);
+      add(error);
     }
   }
   std::size_t size() const noexcept { return errors_.size(); }
@@ -44,6 +46,13 @@ class FormatErrorList {
   }
 
  private:
+  /// A group of keys may be read twice.
+  void add(const FormatError& error) {
+    const auto same = [&](const FormatError& other) {
+      return std::string_view(other.what()) == error.what();
+    };
+    if (std::none_of(errors_.begin(), errors_.end(), same)) errors_.push_back(error);
+  }
   std::vector<FormatError> errors_;
 };
 

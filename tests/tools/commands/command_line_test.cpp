@@ -11,7 +11,7 @@ class CommandLine : public ProgramTest {};
 
 TEST_F(CommandLine, Usage) {
   fail({"frff"}, 2, "unknown command 'frff'; did you mean 'frf'?");
-  fail({"--json"}, 2, "no command");
+  ends({"--json"}, 2, "no command");
   fail({"frf"}, 2, "required");
   fail({"frf", "a.slog", "-o", "b.h5", "--no-such-flag"}, 2, "--no-such-flag");
   fail({"frf", "a.slog", "-o", "b.h5", "--method", "lmp"}, 2, "(did you mean 'lpm'?)");
@@ -35,6 +35,21 @@ TEST_F(CommandLine, WhatIsNotInThisVersionSaysSo) {
   fail({"run", config_, "-o", "x.slog", "--dashboard", "http://a"}, 2, "--dashboard");
   fail({"run", config_, "-o", "x.slog", "--backend", "replay"}, 2, "--replay LOG");
   fail({"export", "model.json", "-o", "m.step"}, 2, ".json, .h5, .hdf5, .csv, .mat");
+}
+
+TEST_F(CommandLine, TellsAllErrorsOfAFileAlsoAsJson) {
+  const std::string bad = experiment("bad.yaml", "  lines: all", "  perods: 3\n  lines: none");
+  const ProgramResult told = run({"run", bad, "-o", "x.slog"});
+  EXPECT_EQ(told.exit_code, 2);
+  EXPECT_THAT(told.err, testing::HasSubstr("lines: "));
+  EXPECT_THAT(told.err, testing::HasSubstr("unknown key 'perods'; did you mean 'periods'?"));
+  const nlohmann::json json = tell({"run", bad, "-o", "x.slog"}, 2);
+  EXPECT_EQ(json["exit_code"], 2);
+  ASSERT_EQ(json["errors"].size(), 2U);
+  for (const nlohmann::json& error : json["errors"])
+    EXPECT_THAT(told.err, testing::HasSubstr("stageid: " + error.get<std::string>() + "\n"));
+  // Nothing but the kind of the file.
+  fail({"run", name("small_stage.yaml"), "-o", "x.slog"}, 2, "expected stageid-experiment");
 }
 
 TEST_F(CommandLine, HelpIsThatOfTheCommand) {
