@@ -1,11 +1,4 @@
 # Tests of the fleet: in C++, and its page in a browser.
-target_sources(tools_tests PRIVATE
-  fleet/fleet_fixture.cpp
-  fleet/fleet_jobs_test.cpp
-  fleet/fleet_page_test.cpp
-  fleet/fleet_pairing_test.cpp
-  fleet/fleet_store_test.cpp
-  fleet/watched_tracks_test.cpp)
 add_test(NAME fleet_in_browser
   COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/check_fleet.py
     $<TARGET_FILE:stageid_program> ${PROJECT_SOURCE_DIR}/configs ${CMAKE_CURRENT_BINARY_DIR}/fleet_in_browser)

@@ -1,15 +1,4 @@
 # Tests of the report page: in C++, and in a browser.
-target_sources(tools_tests PRIVATE
-  report/report_comparison_test.cpp
-  report/report_diagrams_test.cpp
-  report/report_encoding_test.cpp
-  report/report_input_test.cpp
-  report/report_modes_test.cpp
-  report/report_page_test.cpp
-  report/report_verdict_test.cpp
-  report/synthetic_report.cpp)
-target_link_libraries(tools_tests PRIVATE fmt::fmt nlohmann_json::nlohmann_json ZLIB::ZLIB)
-
 add_executable(report_sample
   report/report_sample.cpp
   report/synthetic_report.cpp)
