@@ -1,6 +1,8 @@
 #include "estimation/loop/loop_margins.hpp"
 
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -15,8 +17,9 @@ using Complex = std::complex<double>;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 const double kDecibels = 20.0 / std::log(10.0);
-constexpr double kStep = 1e-6;       // of differences, relative to the frequency
-constexpr double kRelative = 1e-12;  // accuracy of a crossing
+constexpr double kStep = 1e-6;     // of differences, relative to the frequency
+constexpr int kCrossingBits = 41;  // of its frequency
+constexpr int kMinimumBits = 26;   // a minimum is flat: a closer one does not have another value
 
 /// Frequencies at which a loop is searched: logarithmic, refined around the modes.
 Eigen::VectorXd search_grid(const AdditiveModel& model) {
@@ -33,55 +36,6 @@ Eigen::VectorXd search_grid(const AdditiveModel& model) {
     }
   std::sort(out.begin(), out.end());
   return Eigen::Map<const Eigen::VectorXd>(out.data(), std::ssize(out));
-}
-
-/// The zero of a continuous function with a change of sign in [a, b] (Illinois method).
-double zero_between(double a, double fa, double b, double fb,
-                    const std::function<double(double)>& f) {
-  int side = 0;
-  for (int i = 0; i < 100 && std::abs(b - a) > kRelative * b; ++i) {
-    const double c = (fb * a - fa * b) / (fb - fa);
-    const double fc = f(c);
-    if (fc == 0.0) return c;
-    if ((fc > 0.0) == (fb > 0.0)) {
-      b = c;
-      fb = fc;
-      if (side == -1) fa *= 0.5;
-      side = -1;
-    } else {
-      a = c;
-      fa = fc;
-      if (side == 1) fb *= 0.5;
-      side = 1;
-    }
-  }
-  return 0.5 * (a + b);
-}
-
-/// The minimum of a function with one minimum in [a, b] (golden section).
-double minimum_between(double a, double b, const std::function<double(double)>& f) {
-  const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
-  double c = b - golden * (b - a);
-  double d = a + golden * (b - a);
-  double fc = f(c);
-  double fd = f(d);
-  while (std::abs(b - a) >
-         1e-8 * b) {  // a minimum is flat: a closer one does not have another value
-    if (fc < fd) {
-      b = d;
-      d = c;
-      fd = fc;
-      c = b - golden * (b - a);
-      fc = f(c);
-    } else {
-      a = c;
-      c = d;
-      fc = fd;
-      d = a + golden * (b - a);
-      fd = f(d);
-    }
-  }
-  return 0.5 * (a + b);
 }
 
 /// The angle from -1 to L in (-pi, pi]: the lag, or if negative the lead, that turns L to -1.
@@ -128,9 +82,12 @@ class MarginSearch {
       const auto at = static_cast<Eigen::Index>(i);
       const double before = of(curve(points_[i - 1], k));
       const double after = of(curve(points_[i], k));
-      if ((before < 0.0) == (after < 0.0)) continue;
-      out.push_back(zero_between(grid_hz_[at - 1], before, grid_hz_[at], after,
-                                 [&](double f) { return of(curve_at(k, f)); }));
+      if (!(std::min(before, after) < 0.0 && std::max(before, after) >= 0.0)) continue;
+      std::uintmax_t evaluations = 100;
+      const auto [low, high] = boost::math::tools::toms748_solve(
+          [&](double f) { return of(curve_at(k, f)); }, grid_hz_[at - 1], grid_hz_[at], before,
+          after, boost::math::tools::eps_tolerance<double>(kCrossingBits), evaluations);
+      out.push_back(0.5 * (low + high));
     }
     return out;
   }
@@ -210,9 +167,11 @@ class MarginSearch {
       size[i] = std::abs(curve(points_[static_cast<std::size_t>(i)], k) + offset);
     size.minCoeff(&least);
     const double frequency_hz =
-        minimum_between(grid_hz_[std::max<Eigen::Index>(least - 1, 0)],
-                        grid_hz_[std::min(least + 1, grid_hz_.size() - 1)],
-                        [&](double f) { return std::abs(curve_at(k, f) + offset); });
+        boost::math::tools::brent_find_minima(
+            [&](double f) { return std::abs(curve_at(k, f) + offset); },
+            grid_hz_[std::max<Eigen::Index>(least - 1, 0)],
+            grid_hz_[std::min(least + 1, grid_hz_.size() - 1)], kMinimumBits)
+            .first;
     const Slope s = slope(k, frequency_hz);
     const Complex at = s.value + offset;
     return margin(std::abs(at), frequency_hz,

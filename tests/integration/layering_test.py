@@ -41,7 +41,7 @@ ARROWS = {
 # Third-party headers that only one library may include, by the start of their name.
 DOORS = {
     "fftw3": {"excitation"},
-    "boost/": {"frf"},
+    "boost/": {"frf", "estimation"},
     "xxhash": {"files"},
     "hdf5": {"files"},
     "H5": {"files"},
