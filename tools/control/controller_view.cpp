@@ -17,22 +17,18 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A number, or null if it is not finite.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
+/// What is not finite is written as null.
 Json numbers(const Eigen::VectorXd& values) {
-  Json out = Json::array();
-  for (const double value : values) out.push_back(number(value));
-  return out;
+  return std::vector<double>(values.begin(), values.end());
 }
 
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
 Json margin_json(const Margin& margin) {
-  const std::optional<double> radius = margin.radius_95();
   return {{"value", margin.value},
-          {"radius_95", radius ? number(*radius) : Json()},
+          {"radius_95", or_null(margin.radius_95())},
           {"frequency_hz", margin.frequency_hz},
-          {"frequency_std_hz",
-           margin.frequency_deviation_hz ? number(*margin.frequency_deviation_hz) : Json()},
+          {"frequency_std_hz", or_null(margin.frequency_deviation_hz)},
           {"extrapolated", margin.extrapolated}};
 }
 
