@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "estimation/problem/fit_problem.hpp"
@@ -104,9 +105,9 @@ class AutomaticFit {
     other.adopt(fit_additive_model(other.frf_, proportional.model, other.quick_));
     if (other.proportional_.model.fit.cost < other.cost())
       other.adopt(FitResult(other.proportional_));
+    other.take_structure_of(other.best_.model);
     if (!other.mode_may_be_worth_as_much(search->best_)) return;
     other.most_parameters_ = search->best_.parameters;
-    other.take_structure_of(other.best_.model);
     other.watch_ = {};
     other.search(0);
     if (other.score() < search->score()) search.emplace(std::move(other));
@@ -151,20 +152,27 @@ class AutomaticFit {
   bool at_rounding() const { return worth_.at_rounding(best_); }
   bool limit_reached() const { return options_.limit->reached(); }
 
+  /// Whether a fit has a better score than the model.
+  bool is_better(const FitResult& fit) const {
+    return fit.status() != FitStatus::singular && worth_.criterion(fit) < score();
+  }
+
+  std::vector<ProposedMode> proposals(std::size_t most) const {
+    return proposed_modes(frf_, best_.model, quick_.user_weights, most, quick_.threads);
+  }
+
   /// Whether the residual contains a mode that may be worth its parameters.
   bool misses_a_mode() const {
-    const std::vector<ProposedMode> missed =
-        proposed_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
+    const std::vector<ProposedMode> missed = proposals(1);
     return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
   }
 
   /// Whether a further mode may be worth as much per parameter (of the logarithm of the cost) as those of a larger model.
   bool mode_may_be_worth_as_much(const FitResult& larger) const {
-    const auto room = static_cast<double>(larger.parameters - best_.parameters) /
-                      static_cast<double>(2 + frf_.response.rows());
+    const double room =
+        static_cast<double>(larger.parameters - best_.parameters) / worth_.parameters_of_mode();
     if (best_.status() == FitStatus::singular || !(room > 0.0)) return false;
-    const std::vector<ProposedMode> modes =
-        proposed_modes(frf_, best_.model, quick_.user_weights, 1, quick_.threads);
+    const std::vector<ProposedMode> modes = proposals(1);
     const double share = 1.0 - std::pow(larger.model.fit.cost / cost(), 1.0 / room);
     return !modes.empty() &&
            modes.front().gain > share * 2.0 * static_cast<double>(frf_.lines()) * cost();
@@ -210,8 +218,7 @@ class AutomaticFit {
     const AdditiveModel relocated =
         start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.threads));
     FitResult fit = fit_additive_model(frf_, relocated, quick_);
-    if (fit.status() == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
-      return;
+    if (!is_better(fit)) return;
     say("pole relocation: cost {:.6g} -> {:.6g}", best_.model.fit.cost, fit.model.fit.cost);
     adopt(std::move(fit));
   }
@@ -333,12 +340,11 @@ class AutomaticFit {
     const auto costly = std::stable_partition(
         moves.begin(), moves.end(),
         [](const StructureMove& move) { return move.options.delay != DelayModel::per_channel; });
-    FitResult before = best_;
     if (!take_best(sample, {moves.begin(), costly}) && !take_best(sample, {costly, moves.end()}))
       return false;
     const bool was_proportional = !structure_.general_damping;
     take_structure_of(best_.model);
-    if (was_proportional && structure_.general_damping) proportional_ = std::move(before);
+    if (was_proportional && structure_.general_damping) proportional_ = std::move(before_);
     watch_ = {};  // it compares models of one structure
     return true;
   }
@@ -419,8 +425,7 @@ class AutomaticFit {
     options.delay = move.options.delay;
     options.delay_s = move.options.delay_s;
     if (!all) fit = fit_additive_model(frf_, with_all_inputs(frf_, fit.model), options);
-    if (fit.status() == FitStatus::singular || !(worth_.criterion(fit) < worth_.criterion(best_)))
-      return false;
+    if (!is_better(fit)) return false;
     say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, best_.model.fit.cost,
         fit.model.fit.cost, best_.parameters, fit.parameters);
     quick_.delay = options_.delay = options.delay;
@@ -437,14 +442,12 @@ class AutomaticFit {
     for (int round = 0; wanted_more(); ++round) {
       const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
       if (selection_.exactly == 0 && doubled && restructure()) reduce();
-      const std::vector<ProposedMode> candidates =
-          proposed_modes(frf_, best_.model, quick_.user_weights, added_together(), quick_.threads);
-      FitResult before = best_;
+      const std::vector<ProposedMode> candidates = proposals(added_together());
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
       if (selection_.exactly > 0) continue;
-      const std::size_t added = best_.model.submodels.size() - before.model.submodels.size();
-      if (!watch_.ends(frf_, quick_, before, best_, added)) continue;
+      const std::size_t added = best_.model.submodels.size() - before_.model.submodels.size();
+      if (!watch_.ends(frf_, quick_, before_, best_, added)) continue;
       best_ = watch_.model();
       say("{}", watch_.finding());
     }
@@ -464,8 +467,7 @@ class AutomaticFit {
     if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
     if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
-    if (trial.status() == FitStatus::singular) return false;
-    if (!demanded && !(worth_.criterion(trial) < worth_.criterion(best_))) return false;
+    if (demanded ? trial.status() == FitStatus::singular : !is_better(trial)) return false;
     for (const ProposedMode& candidate : clear)
       say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
           candidate.mode.frequency_hz, clear.size(), best_.model.fit.cost, trial.model.fit.cost);
@@ -496,7 +498,7 @@ class AutomaticFit {
       if (better) best_trial = std::move(trial);
       found = true;
       // The first candidate is usually right; the others are tried only if it is not worth its parameters.
-      if (worth_.criterion(best_trial) < worth_.criterion(best_) || limit_reached()) break;
+      if (is_better(best_trial) || limit_reached()) break;
     }
     if (!found) {
       say("no further mode: no candidate in the weighted residual justifies the parameters of a "
@@ -504,7 +506,7 @@ class AutomaticFit {
       return false;
     }
     const Submodel& added = best_trial.model.submodels.back();
-    if (selection_.exactly == 0 && !(worth_.criterion(best_trial) < worth_.criterion(best_))) {
+    if (selection_.exactly == 0 && !is_better(best_trial)) {
       say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, which "
           "does not justify its parameters (BIC)",
           added.natural_frequency_hz(),
@@ -535,8 +537,8 @@ class AutomaticFit {
       for (std::size_t n = out.size(); n-- > 0;)
         model.submodels.erase(model.submodels.begin() + static_cast<std::ptrdiff_t>(out[n]));
       FitResult without = fit_additive_model(frf_, model, quick_);
-      const bool worse = surplus > 0 ? out.size() > 1 && !is_predicted(without, out)
-                                     : !(worth_.criterion(without) < worth_.criterion(best_));
+      const bool worse =
+          surplus > 0 ? out.size() > 1 && !is_predicted(without, out) : !is_better(without);
       if (worse) {
         at_once = out.size() / 2;
         continue;
@@ -564,9 +566,9 @@ class AutomaticFit {
     if (selection_.exactly == 0) merge();
   }
 
-  /// Continues from `result`, with its iterations and decisions added to the history.
+  /// Continues from `result`, with its iterations added to the history.
   void adopt(FitResult&& result) {
-    best_ = std::move(result);
+    before_ = std::exchange(best_, std::move(result));
     history_.insert(history_.end(), best_.cost.begin(), best_.cost.end());
   }
 
@@ -586,6 +588,7 @@ class AutomaticFit {
   Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
   GrowthWatch watch_;
   FitResult best_;
+  FitResult before_;        ///< the last one before best_ was adopted
   FitResult proportional_;  ///< the last one before general damping
   std::vector<std::string> decisions_;
   std::vector<double> history_;

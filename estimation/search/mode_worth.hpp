@@ -32,6 +32,8 @@ class ModeWorth {
   /// The cost at which a fit of this model has that criterion.
   double cost_at(double criterion, const AdditiveModel& model, Eigen::Index parameters) const;
 
+  double parameters_of_mode() const { return parameters_of_mode_; }
+
   /// Of a mode, in the units of the criterion.
   double cost_of_one() const;
 
