@@ -1,7 +1,6 @@
 #include "estimation/loop/loop_view.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "estimation/loop/response_gradient.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
@@ -28,23 +27,13 @@ void fill_radii(const ResponseGradient& gradient, const std::vector<LoopPoint>& 
     for (Eigen::Index i = 0; i < curves; ++i) {
       const Eigen::Index re = 2 * curves * k + i;
       const Eigen::Index im = re + curves;
-      const double between = parts.col(re).dot(products.col(im));
-      const Eigen::Matrix2d errors{{parts.col(re).dot(products.col(re)), between},
-                                   {between, parts.col(im).dot(products.col(im))}};
       (i + 1 < curves ? view.loop_radius(i, first + k) : view.determinant_radius[first + k]) =
-          disc_radius_95(errors);
+          disc_radius_95(parts.col(re).dot(products.col(re)), parts.col(im).dot(products.col(im)),
+                         parts.col(re).dot(products.col(im)));
     }
 }
 
 }  // namespace
-
-double disc_radius_95(const Eigen::Matrix2d& covariance) {
-  const double variance = covariance.trace();
-  if (!(variance > 0.0)) return variance;  // zero, or unknown: NaN
-  const double relation =
-      std::hypot(covariance(0, 0) - covariance(1, 1), 2.0 * covariance(0, 1)) / variance;
-  return std::sqrt(variance) * error_quantile_95(std::min(relation, 1.0));
-}
 
 LoopView loop_view(const AdditiveModel& model, const LoopController& controller,
                    const Eigen::MatrixXd& covariance, const Eigen::VectorXd& frequency_hz) {

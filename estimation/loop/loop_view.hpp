@@ -20,10 +20,6 @@ struct LoopView {
   Eigen::VectorXd determinant_radius;  ///< N
 };
 
-/// The radius of the disc around a complex value with Gaussian error that contains it with probability 0.95, from the
-/// covariance of its real and imaginary part; see error_quantile_95().
-double disc_radius_95(const Eigen::Matrix2d& covariance);
-
 /// @param covariance of all parameters, FitCovariance::sandwich; 0 x 0: unknown
 /// @throws std::invalid_argument as loop_poles() and loop_margins()
 LoopView loop_view(const AdditiveModel& model, const LoopController& controller,

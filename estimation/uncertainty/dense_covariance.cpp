@@ -272,7 +272,6 @@ std::vector<Eigen::Index> own_parameters(const FitProblem& problem, Eigen::Index
 /// not circular: few parameters move P along few directions.
 void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
   const FitProblem& problem = fit.problem;
-  const QuantileTable quantile;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   covariance.response_variance.resize(problem.channels(), problem.size());
   covariance.response_radius.resize(problem.channels(), problem.size());
@@ -291,11 +290,9 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
       const Eigen::ArrayXd imaginary = (im * C).cwiseProduct(im).rowwise().sum();
       const Eigen::ArrayXd between = half.cwiseProduct(im).rowwise().sum();
       for (Eigen::Index i = 0; i < lines.count; ++i) {
-        const double variance = std::max(real[i] + imaginary[i], 0.0);
-        const double relation = std::hypot(real[i] - imaginary[i], 2.0 * between[i]);
-        covariance.response_variance(c, lines.first + i) = variance;
+        covariance.response_variance(c, lines.first + i) = std::max(real[i] + imaginary[i], 0.0);
         covariance.response_radius(c, lines.first + i) =
-            std::sqrt(variance) * quantile(variance > 0.0 ? relation / variance : 0.0);
+            disc_radius_95(real[i], imaginary[i], between[i]);
       }
     }
   });
@@ -342,6 +339,13 @@ double error_quantile_95(double relation) {
     (probability_above(middle, relation) > kOutside ? low : high) = middle;
   }
   return 0.5 * (low + high);
+}
+
+double disc_radius_95(double real, double imaginary, double between) {
+  static const QuantileTable quantile;
+  const double variance = real + imaginary;
+  if (!(variance > 0.0)) return std::max(variance, 0.0);
+  return std::sqrt(variance) * quantile(std::hypot(real - imaginary, 2.0 * between) / variance);
 }
 
 std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model) {

@@ -34,6 +34,10 @@ void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResul
 ///   P(|z| > r) = 2/pi int_0^{pi/2} exp(-r^2 / ((1 + rho) cos^2 t + (1 - rho) sin^2 t)) dt,  E|z|^2 = 1
 double error_quantile_95(double relation);
 
+/// The radius of the disc around a complex value with Gaussian error that contains it with probability 0.95, within
+/// 1e-5, from the variances of its real and imaginary part and their covariance; NaN: unknown.
+double disc_radius_95(double real, double imaginary, double between);
+
 /// The functions of every submodel among those of a channel.
 std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model);
 
