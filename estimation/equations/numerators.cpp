@@ -156,10 +156,11 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
 
 }  // namespace
 
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, double& cost, bool& factored) {
+std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
+                                                 const std::vector<BasisGroup>& groups,
+                                                 Eigen::MatrixXd& B) {
   B.setZero(problem.channels(), problem.functions());
-  factored = false;
+  SolvedNumerators out;
   double sum = 0.0;
   Eigen::MatrixXd of_block;
   Eigen::MatrixXd by_factors;
@@ -169,7 +170,7 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
     if (digits != Digits::enough) {
       double squares_by_factors = 0.0;
       if (factored_numerators(problem, group, block, by_factors, squares_by_factors)) {
-        factored = true;
+        out.factored = true;
         of_block.swap(by_factors);
         squares = squares_by_factors;
       } else if (digits == Digits::none) {
@@ -183,15 +184,9 @@ bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& 
       B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
     return true;
   };
-  if (!visit_blocks(problem, groups, solve)) return false;
-  cost = sum / (2.0 * static_cast<double>(problem.size()));
-  return std::isfinite(cost);
-}
-
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, double& cost) {
-  bool factored = false;
-  return solve_numerators(problem, groups, B, cost, factored);
+  if (!visit_blocks(problem, groups, solve)) return std::nullopt;
+  out.cost = sum / (2.0 * static_cast<double>(problem.size()));
+  return std::isfinite(out.cost) ? std::optional(out) : std::nullopt;
 }
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,

@@ -1,20 +1,25 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "estimation/problem/fit_problem.hpp"
 
 namespace stageid {
 
+/// What solve_numerators() finds besides them.
+struct SolvedNumerators {
+  double cost = 0.0;
+  bool factored = false;  ///< some were computed by factors, as sums have too few digits
+};
+
 /// Solves the convex problem, numerators for fixed denominators, per channel, by normal equations scaled to unit
 /// diagonal and one step of refinement; by orthogonal factors where the refinement shows that products have too few
-/// digits, as for nearly exact data or modes that cancel each other. Also returns the cost. `B` is overwritten.
-/// @param factored whether some were computed by factors
-/// @returns false if the equations of a channel are singular to rounding.
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, double& cost, bool& factored);
-bool solve_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                      Eigen::MatrixXd& B, double& cost);
+/// digits, as for nearly exact data or modes that cancel each other. `B` is overwritten.
+/// @returns nothing if the equations of a channel are singular to rounding
+std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
+                                                 const std::vector<BasisGroup>& groups,
+                                                 Eigen::MatrixXd& B);
 
 /// Rise of sum W |E|^2 if the numerators of a submodel were removed and the others re-solved; one entry per submodel.
 /// @pre `B` solves the convex problem.

@@ -29,8 +29,7 @@ constexpr ChannelEquationsUse kGlobalsOnly = ChannelEquationsUse::eliminated;
 /// A candidate with its numerators solved.
 struct Trial {
   FitParameters beta;
-  double cost = 0.0;
-  bool factored = false;  ///< the numerators, as sums have too few digits
+  SolvedNumerators solved = {};
 };
 
 /// Largest change of a denominator coefficient or delay, relative to its own size.
@@ -81,8 +80,10 @@ class Iteration {
 
   /// Numerators and cost of the candidate.
   bool solve(Trial& trial) {
-    return solve_numerators(problem_, evaluate_groups(problem_, trial.beta, false), trial.beta.B,
-                            trial.cost, trial.factored);
+    const auto solved =
+        solve_numerators(problem_, evaluate_groups(problem_, trial.beta, false), trial.beta.B);
+    if (solved) trial.solved = *solved;
+    return solved.has_value();
   }
 
   std::optional<Trial> try_step(const Eigen::VectorXd& step) {
@@ -94,7 +95,7 @@ class Iteration {
 
   bool go_on() {
     if (options_.limit && options_.limit->reached() && problem_.globals() > 0) {
-      if (best_.cost > 0.0 && best_.cost < cost_)
+      if (best_.solved.cost > 0.0 && best_.solved.cost < cost_)
         return end_at_best(options_.limit->status(), options_.limit->message());
       return result_.end(options_.limit->status(), options_.limit->message());
     }
@@ -106,8 +107,8 @@ class Iteration {
 
   void take(Trial&& trial) {
     beta_ = std::move(trial.beta);
-    cost_ = trial.cost;
-    factored_ = trial.factored;
+    cost_ = trial.solved.cost;
+    factored_ = trial.solved.factored;
   }
 
   void accept(Trial&& trial) {
@@ -188,7 +189,7 @@ class Iteration {
           const Eigen::VectorXd step = system.solve_globals(damping, result_.frozen);
           step_size_ = relative_step(problem_, beta_, step);
           std::optional<Trial> trial = try_step(step);
-          if (!trial || !(trial->cost < cost_)) return false;
+          if (!trial || !(trial->solved.cost < cost_)) return false;
           accept(std::move(*trial));
           return true;
         },
@@ -203,7 +204,7 @@ class Iteration {
   }
 
   bool fixed_point_step() {
-    if (result_.iterations == 0) best_ = Trial{beta_, cost_};
+    if (result_.iterations == 0) best_ = Trial{beta_, {cost_}};
     const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
     if (!system.regular())
@@ -217,7 +218,7 @@ class Iteration {
     }
     if (!trial) return end_at_best(FitStatus::cost_stalled, "no acceptable step");
     accept(std::move(*trial));
-    if (cost_ < best_.cost) best_ = Trial{beta_, cost_};
+    if (cost_ < best_.solved.cost) best_ = Trial{beta_, {cost_}};
     if (step_size_ < std::max(options_.step_tolerance, 1e-9))
       return end_at_best(
           FitStatus::step_small,
@@ -230,7 +231,7 @@ class Iteration {
 
   bool end_at_best(FitStatus status, std::string message) {
     beta_ = best_.beta;
-    cost_ = best_.cost;
+    cost_ = best_.solved.cost;
     return result_.end(status, std::move(message));
   }
 

@@ -47,9 +47,9 @@ void search_delay(const FitProblem& problem, FitParameters& beta) {
   for (int i = 0; i <= 24; ++i) {
     trial.input_delay_s.setConstant(step * i);
     const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
-    double cost = 0.0;
-    if (!solve_numerators(relative, groups, trial.B, cost) || !(cost < best_cost)) continue;
-    best_cost = cost;
+    const auto solved = solve_numerators(relative, groups, trial.B);
+    if (!solved || !(solved->cost < best_cost)) continue;
+    best_cost = solved->cost;
     best.setConstant(step * i);
   }
   beta.input_delay_s = best;

@@ -72,8 +72,7 @@ Case make_case(int times, Eigen::Index every, int threads) {
   }
   out.beta.input_delay_s.setConstant(problem.n_inputs, stage.delay_s);
   out.beta.output_delay_s.setZero(problem.n_outputs);
-  double cost = 0.0;
-  solve_numerators(problem, evaluate_groups(problem, out.beta, false), out.beta.B, cost);
+  solve_numerators(problem, evaluate_groups(problem, out.beta, false), out.beta.B);
   return out;
 }
 
@@ -82,9 +81,7 @@ double iterate_once(const Case& c, FitMethod method) {
   const std::vector<BasisGroup> groups = evaluate_groups(c.problem, c.beta, true);
   const ArrowSystem system(c.problem, c.beta, groups, method, ChannelEquationsUse::eliminated);
   FitParameters next = stepped(c.problem, c.beta, system.solve_globals(1e-6));
-  double cost = 0.0;
-  solve_numerators(c.problem, evaluate_groups(c.problem, next, false), next.B, cost);
-  return cost;
+  return solve_numerators(c.problem, evaluate_groups(c.problem, next, false), next.B).value().cost;
 }
 
 /// Floating-point operations of the matrix products of one iteration: sums of fractions, the pairs that

@@ -33,8 +33,7 @@ TEST(FactoredEquations, GiveTheStepOfTheSums) {
       weights.row(2).setZero();  // a channel without data
       return weights;
     }();
-    double cost = 0.0;
-    ASSERT_TRUE(solve_numerators(fit, groups, beta.B, cost));
+    ASSERT_TRUE(solve_numerators(fit, groups, beta.B));
     const FactoredEquations factored(fit, beta, groups);
     const ArrowSystem summed(fit, beta, groups, FitMethod::gn);
     const Eigen::VectorXd scale = summed.schur().diagonal().cwiseSqrt();
@@ -57,8 +56,7 @@ TEST(FactoredEquations, HeldGlobalsHaveNoPart) {
   fit.held = {0, 3};
   FitParameters beta = test::fit_parameters(problem);
   const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
-  double cost = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, beta.B, cost));
+  ASSERT_TRUE(solve_numerators(fit, groups, beta.B));
   const FactoredEquations factored(fit, beta, groups);
   const ArrowSystem summed(fit, beta, groups, FitMethod::gn);
   const Eigen::VectorXd step = factored.solve_globals(0.0, fit.held);
@@ -77,8 +75,7 @@ TEST(FactoredEquations, FewLinesSuffice) {
   problem.W = Eigen::MatrixXd(problem.W(Eigen::all, lines));
   auto [fit, beta, groups] = test::Evaluated(problem);
   ASSERT_LT(2 * fit.size(), fit.functions() + fit.globals() + 1);
-  double cost = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, beta.B, cost));
+  ASSERT_TRUE(solve_numerators(fit, groups, beta.B));
   const FactoredEquations factored(fit, beta, groups);
   const ArrowSystem summed(fit, beta, groups, FitMethod::gn);
   EXPECT_LT(difference(factored.schur(), summed.schur()), 1e-7);
@@ -94,10 +91,10 @@ TEST(FactoredEquations, NumeratorsHaveAllDigitsOfExactData) {
   problem.W = problem.G.cwiseAbs2().cwiseInverse();
   const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd B;
-  double cost = 0.0;
-  bool factored = false;
-  ASSERT_TRUE(solve_numerators(fit, groups, B, cost, factored));
-  EXPECT_TRUE(factored);
+  const auto solved = solve_numerators(fit, groups, B);
+  ASSERT_TRUE(solved);
+  EXPECT_TRUE(solved->factored);
+  const double cost = solved->cost;
   EXPECT_LT(std::sqrt(2.0 * cost / static_cast<double>(fit.channels())), 1e-13);
   EXPECT_NEAR(residual_cost(fit, groups, B), cost, 0.5 * cost);
 }
@@ -107,11 +104,11 @@ TEST(FactoredEquations, NumeratorsOfNoisyDataAreThoseOfTheSums) {
   const auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd summed;
   Eigen::MatrixXd by_factors;
-  double cost = 0.0;
   double squares = 0.0;
-  bool factored = true;
-  ASSERT_TRUE(solve_numerators(fit, groups, summed, cost, factored));
-  EXPECT_FALSE(factored) << "the sums have all the digits that noise leaves";
+  const auto solved = solve_numerators(fit, groups, summed);
+  ASSERT_TRUE(solved);
+  const double cost = solved->cost;
+  EXPECT_FALSE(solved->factored) << "the sums have all the digits that noise leaves";
   const TileRange all{0, fit.channels(), 0, fit.size()};
   ASSERT_TRUE(factored_numerators(fit, groups[0], all, by_factors, squares));
   EXPECT_LT((summed - by_factors).cwiseAbs().maxCoeff(), 1e-9 * summed.cwiseAbs().maxCoeff());

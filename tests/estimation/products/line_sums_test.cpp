@@ -123,17 +123,18 @@ TEST(LineSums, NumeratorsOfManyChannelsAreThoseOfEachAlone) {
   const DenseProblem problem = wide_problem(HoldModel::exact);
   auto [fit, beta, groups] = test::Evaluated(problem, DelayModel::fixed, false);
   Eigen::MatrixXd together;
-  double cost = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, together, cost));
+  const auto solved = solve_numerators(fit, groups, together);
+  ASSERT_TRUE(solved);
+  const double cost = solved->cost;
   EXPECT_NEAR(cost, residual_cost(fit, groups, together), 1e-12 * cost);
   const std::vector<Eigen::Index> all = groups[0].channels;
   groups.assign(all.size(), groups[0]);
   for (std::size_t c = 0; c < all.size(); ++c) groups[c].channels = {all[c]};
   Eigen::MatrixXd alone;
-  double cost_alone = 0.0;
-  ASSERT_TRUE(solve_numerators(fit, groups, alone, cost_alone));
+  const auto solved_alone = solve_numerators(fit, groups, alone);
+  ASSERT_TRUE(solved_alone);
   EXPECT_LT((together - alone).cwiseAbs().maxCoeff(), 1e-10 * alone.cwiseAbs().maxCoeff());
-  EXPECT_NEAR(cost, cost_alone, 1e-12 * cost);
+  EXPECT_NEAR(cost, solved_alone->cost, 1e-12 * cost);
 }
 
 TEST(WeightedProducts, AreTheSumsTheySay) {

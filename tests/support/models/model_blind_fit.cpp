@@ -81,8 +81,9 @@ bool plain_iteration_succeeds(const RandomStage& stage, double wanted, int threa
   const FitProblem problem =
       make_problem(stage.frf, start, options, make_weights(stage.frf, options));
   FitParameters beta = make_parameters(problem, start, options);
-  double cost = 0.0;
-  if (!solve_numerators(problem, evaluate_groups(problem, beta, false), beta.B, cost)) return false;
+  const auto solved = solve_numerators(problem, evaluate_groups(problem, beta, false), beta.B);
+  if (!solved) return false;
+  double cost = solved->cost;
   for (int i = 0; i < kIterations; ++i) {
     const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
     const ArrowSystem system(problem, beta, groups, FitMethod::riv);
