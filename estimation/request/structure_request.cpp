@@ -20,15 +20,10 @@ bool takes_rank(const SubmodelRequest& submodel, int residue_rank) {
 void choose_submodels(const FitRequest& request, FitSetup& setup) {
   RequestedStructure& structure = setup.structure;
   structure.submodels = request.submodels;
-  for (const SubmodelRequest& submodel : structure.submodels) {
-    if (const std::string fault = fault_of(submodel); !fault.empty())
-      throw std::invalid_argument(fmt::format("submodel: {}: {}", submodel_text(submodel), fault));
+  check(setup.frf, structure);
+  for (const SubmodelRequest& submodel : structure.submodels)
     for (const double frequency_hz : submodel.frequency_hz)
       require_below_nyquist("submodel", setup, frequency_hz);
-  }
-  const std::string fault =
-      fault_of(structure.submodels, structure.common.rigid_body, structure.common.direct_term);
-  if (!fault.empty()) throw std::invalid_argument("submodel: " + fault);
   const bool nothing = structure.submodels.empty() && !structure.suspension &&
                        !structure.common.rigid_body && !structure.common.direct_term;
   if (modes_kind(request) == ModesRequest::Kind::none && nothing)
@@ -44,15 +39,7 @@ void choose_rigid_body(const FitRequest& request, FitSetup& setup) {
   structure.common.rigid_body = kind == Kind::automatic || kind == Kind::free;
   structure.suspension = kind == Kind::suspension;
   if (kind == Kind::free) setup.options.rigid_body_rank = request.rigid_body.rank;
-  if (kind != Kind::suspension) return;
-  const double lowest_hz = setup.frf.frequency_hz[0];
-  for (const double frequency_hz : request.rigid_body.suspension_hz)
-    if (!(frequency_hz > 0.0 && frequency_hz < lowest_hz))
-      throw std::invalid_argument(
-          fmt::format("rigid body: suspension at {} Hz; expected frequencies below the lowest "
-                      "line, {} Hz",
-                      frequency_hz, lowest_hz));
-  structure.suspension_hz = request.rigid_body.suspension_hz;
+  if (kind == Kind::suspension) structure.suspension_hz = request.rigid_body.suspension_hz;
 }
 
 void choose_residue_rank(const FitRequest& request, FitSetup& setup) {

@@ -173,23 +173,6 @@ class PoleSearch {
   FitResult found_;
 };
 
-void check_requests(const FrfEstimate& frf, const RequestedStructure& structure) {
-  const auto require_faultless = [](const std::string& fault) {
-    if (!fault.empty()) throw std::invalid_argument("fit: submodel: " + fault);
-  };
-  for (const SubmodelRequest& r : structure.submodels) require_faultless(fault_of(r));
-  require_faultless(
-      fault_of(structure.submodels, structure.common.rigid_body, structure.common.direct_term));
-  if (structure.suspension && structure.common.rigid_body)
-    throw std::invalid_argument(
-        "fit: a suspension replaces the rigid body; request only one of them");
-  for (const double frequency_hz : structure.suspension_hz)
-    if (!(frequency_hz > 0.0 && frequency_hz < frf.frequency_hz[0]))
-      throw std::invalid_argument(fmt::format(
-          "fit: a suspension at {} Hz is not below the lowest line, {} Hz; give it as a mode",
-          frequency_hz, frf.frequency_hz[0]));
-}
-
 /// Why the residual is clearly larger than noise and known distortion, with advice; else nothing.
 std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOptions& options,
                                          ModeNumber number, bool cut_short,
@@ -216,12 +199,30 @@ std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOption
 
 }  // namespace
 
+void check(const FrfEstimate& frf, const RequestedStructure& structure) {
+  const auto require_faultless = [](const std::string& fault) {
+    if (!fault.empty()) throw std::invalid_argument("submodel: " + fault);
+  };
+  for (const SubmodelRequest& r : structure.submodels) require_faultless(fault_of(r));
+  require_faultless(
+      fault_of(structure.submodels, structure.common.rigid_body, structure.common.direct_term));
+  if (structure.suspension && structure.common.rigid_body)
+    throw std::invalid_argument(
+        "rigid body: a suspension replaces the rigid body; request only one of them");
+  for (const double frequency_hz : structure.suspension_hz)
+    if (!(frequency_hz > 0.0 && frequency_hz < frf.frequency_hz[0]))
+      throw std::invalid_argument(
+          fmt::format("rigid body: suspension at {} Hz; expected frequencies below the lowest "
+                      "line, {} Hz",
+                      frequency_hz, frf.frequency_hz[0]));
+}
+
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
                          const ModeSelection& selection, const FitOptions& asked) {
   check(frf);
   if (frf.response.isZero(0.0))
     throw std::invalid_argument("fit: the response is zero on all lines; check the FRF");
-  check_requests(frf, structure);
+  check(frf, structure);
   std::vector<std::string> decisions;
   ModelStructure complete = structure.common;
   if (structure.suspension) {

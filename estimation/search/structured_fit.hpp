@@ -18,13 +18,16 @@ struct RequestedStructure {
   std::vector<double> suspension_hz;
 };
 
+/// @throws std::invalid_argument: submodels with a fault_of(), a suspension besides a rigid body or not below the lines
+void check(const FrfEstimate& frf, const RequestedStructure& structure);
+
 /// automatic_fit() with any submodels besides the modes.
 ///
 /// Poles without a start are searched: automatic_fit() finds as many modes as the submodels need. These are
 /// distributed by frequency and their denominators multiplied; real poles are searched on a grid of the profiled cost.
 /// Suspension frequencies that the lines do not determine are held, see settled_fit().
 /// Undetermined submodels give FitStatus::undetermined, see determinacy.hpp.
-/// @throws std::invalid_argument: as automatic_fit(), and for requests with a fault_of()
+/// @throws std::invalid_argument: as automatic_fit() and check()
 FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& structure,
                          const ModeSelection& selection, const FitOptions& options);
 
