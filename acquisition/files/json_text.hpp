@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -52,6 +53,12 @@ template <class Json>
 Json parse_json_object(std::string_view text) {
   Json json = parse_json<Json>(text);
   return json.is_object() ? json : Json::object();
+}
+
+/// In one line. Bytes that are not UTF-8 are replaced, because names and texts come from files of others.
+template <class Json>
+std::string json_line(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace stageid

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/record/utc_time.hpp"
 
@@ -24,7 +25,7 @@ std::string line_of(std::string_view event, const std::vector<EventField>& field
   Json json = {{"time_utc", utc_now_ms()}, {"event", event}};
   for (const EventField& field : fields)
     std::visit([&](const auto& value) { json[field.name] = value; }, field.value);
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(json);
 }
 
 }  // namespace

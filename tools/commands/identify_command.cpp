@@ -25,7 +25,6 @@
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/modal/validation.hpp"
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/periods/health_finding.hpp"
 #include "tools/commands/command_line.hpp"
@@ -164,7 +163,6 @@ class Identification {
     request.resume = flags_.resume;
     request.backend = config_.stage.backend;
     const MeasurementResult result = measure(config_, plan_, request, console_);
-    if (result.exit_code == kNotTrustworthy) notes_.push_back(result.message);
     const double stage_s =
         static_cast<double>(result.experiment.health.cycles) / plan_.grid().sample_rate_hz();
     finish_step("run", result.seconds,

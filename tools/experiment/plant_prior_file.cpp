@@ -113,8 +113,8 @@ auto interpolated(const Columns& columns, const Between& at) {
 }
 
 double period_s_of(const FrfEstimate& frf) {
-  const auto json = parse_json<nlohmann::json>(frf.provenance_json);
-  if (!json.is_object() || !json.contains("options")) return 0.0;
+  const auto json = parse_json_object<nlohmann::json>(frf.provenance_json);
+  if (!json.contains("options")) return 0.0;
   return number_in(json["options"], "period_samples").value_or(0.0) / frf.sample_rate_hz;
 }
 

@@ -1,13 +1,13 @@
 #include "tools/fleet/fleet_page.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <stdexcept>
 
+#include "acquisition/files/json_text.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/fleet/fleet_series.hpp"
@@ -48,8 +48,7 @@ class FleetPage {
                     {"folders", folder_links()}};
     const std::vector<report::Block> blocks = series_.blocks(content["arrays"]);
     return html_page(HtmlPage::fleet, fmt::format("{}: fleet", database_.file().stem().string()),
-                     script_safe(content.dump(-1, ' ', false, Json::error_handler_t::replace)),
-                     blocks);
+                     script_safe(json_line(content)), blocks);
   }
 
  private:

@@ -1,7 +1,6 @@
 #include "tools/steps/fit_step.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -40,7 +39,7 @@ std::string provenance(const FitSetup& setup, const FitResult& result, const std
   if (!problems.empty()) json["problems"] = stored(problems);
   if (setup.distortion.band_hz.size() > 0) json["distortion"] = distortion_json(setup.distortion);
   json["frf"] = parse_json_object<Json>(setup.frf.provenance_json);
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(json);
 }
 
 std::string optional_number(const std::optional<double>& value) {
@@ -65,7 +64,7 @@ std::vector<PoleEstimate> poles_of(const Submodel& s) {
 
 std::vector<std::string> texts_in(const Json& object, const char* key) {
   std::vector<std::string> texts;
-  if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return texts;
+  if (!object.contains(key) || !object[key].is_array()) return texts;
   for (const Json& text : object[key])
     if (text.is_string()) texts.push_back(text.get<std::string>());
   return texts;
@@ -110,11 +109,10 @@ std::vector<std::string> findings_beside_message(const FitResult& result) {
 }
 
 Distortion distortion_of(const AdditiveModel& model) {
-  const Json json = parse_json<Json>(model.provenance_json);
+  const Json json = parse_json_object<Json>(model.provenance_json);
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Distortion out;
-  if (!json.is_object() || !json.contains("distortion") || !json["distortion"].is_array())
-    return out;
+  if (!json.contains("distortion") || !json["distortion"].is_array()) return out;
   const Json& bands = json["distortion"];
   const auto count = static_cast<Eigen::Index>(bands.size());
   out.band_hz.resize(count, 2);
@@ -131,7 +129,7 @@ Distortion distortion_of(const AdditiveModel& model) {
 }
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {
-  return texts_in(parse_json<Json>(model.provenance_json), "decisions");
+  return texts_in(parse_json_object<Json>(model.provenance_json), "decisions");
 }
 
 std::string relative_error_text(const FitRecord& fit) {

@@ -25,8 +25,7 @@ using Json = nlohmann::ordered_json;
 
 /// The reproducible part of the metadata of a log: everything except times.
 Json lasting_metadata(const LogReader& log) {
-  Json metadata = parse_json<Json>(log.info().metadata_json);
-  if (!metadata.is_object()) return Json::object();
+  Json metadata = parse_json_object<Json>(log.info().metadata_json);
   metadata.erase("started_utc");
   return metadata;
 }
@@ -44,8 +43,7 @@ Json options_json(const FrfOptions& options) {
 
 std::string complete_provenance(const FrfEstimate& frf, const std::vector<const LogReader*>& logs,
                                 const FrfOptions& options) {
-  Json provenance = parse_json<Json>(frf.provenance_json);
-  if (!provenance.is_object()) provenance = Json::object();
+  Json provenance = parse_json_object<Json>(frf.provenance_json);
   provenance["stageid_version"] = version();
   provenance["request_id"] = frf_request_id(logs, options);
   provenance["realizations"] = options.realizations;
@@ -54,7 +52,7 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
     if (!log->path().empty()) provenance["logs"].push_back(log->path().filename().string());
   provenance["experiments"] = Json::array();
   for (const LogReader* log : logs) provenance["experiments"].push_back(lasting_metadata(*log));
-  return provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(provenance);
 }
 
 }  // namespace
@@ -62,13 +60,13 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
 void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
   Json provenance = Json::parse(frf.provenance_json);
   provenance["fft_plans"] = fingerprint;
-  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  frf.provenance_json = json_line(provenance);
 }
 
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
   Json request = {{"version", version()}, {"options", options_json(options)}};
   for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));
-  return fingerprint_of(request.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return fingerprint_of(json_line(request));
 }
 
 std::string request_id_of(const std::string& provenance_json) {

@@ -130,18 +130,16 @@ std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings
   for (Finding& finding : unsettled_bands) findings.push_back(std::move(finding));
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
-  Json provenance = parse_json<Json>(frf.provenance_json);
-  if (!provenance.is_object()) provenance = Json::object();
+  Json provenance = parse_json_object<Json>(frf.provenance_json);
   provenance["health"] = health_json(findings);
-  frf.provenance_json = provenance.dump(-1, ' ', false, Json::error_handler_t::replace);
+  frf.provenance_json = json_line(provenance);
   return findings;
 }
 
 std::vector<Finding> health_of(const std::string& provenance_json) {
-  const Json provenance = parse_json<Json>(provenance_json);
+  const Json provenance = parse_json_object<Json>(provenance_json);
   std::vector<Finding> findings;
-  if (!provenance.is_object() || !provenance.contains("health") || !provenance["health"].is_array())
-    return findings;
+  if (!provenance.contains("health") || !provenance["health"].is_array()) return findings;
   for (const Json& object : provenance["health"])
     if (object.is_object()) findings.push_back(finding_of(object));
   return findings;

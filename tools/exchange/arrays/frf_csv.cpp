@@ -72,7 +72,7 @@ std::string description_of(const FrfEstimate& frf) {
     else
       json[key] = value;
   });
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return json_line(json);
 }
 
 constexpr std::string_view kDescription = "# {\"format\":\"stageid-frf\"";
