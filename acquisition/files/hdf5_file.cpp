@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 
 #include "acquisition/files/child_process.hpp"
 #include "acquisition/files/file_descriptor.hpp"

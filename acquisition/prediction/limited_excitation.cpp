@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <complex>
 #include <stdexcept>
 
 #include "acquisition/loop/excited_actuators.hpp"

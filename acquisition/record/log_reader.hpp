@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"

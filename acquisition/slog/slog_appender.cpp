@@ -10,10 +10,8 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <random>
 #include <stdexcept>
-#include <system_error>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"

@@ -2,10 +2,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "estimation/products/equation_method.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {

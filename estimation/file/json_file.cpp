@@ -1,8 +1,6 @@
 #include "estimation/file/json_file.hpp"
 
 #include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <limits>
 
 #include "acquisition/files/file_kind.hpp"

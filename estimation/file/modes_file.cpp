@@ -1,8 +1,5 @@
 #include <nlohmann/json.hpp>
 
-#include <cmath>
-#include <fstream>
-
 #include "acquisition/files/output_file.hpp"
 #include "estimation/file/json_file.hpp"
 #include "estimation/model/cmif.hpp"

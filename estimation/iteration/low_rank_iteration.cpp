@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 
 #include "estimation/equations/residue_factors.hpp"

@@ -1,7 +1,5 @@
 #include "estimation/modal/state_space.hpp"
 
-#include <cmath>
-
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/modal/submodel_residues.hpp"
 

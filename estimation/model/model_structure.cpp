@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <numbers>
 #include <numeric>
-#include <utility>
 
 #include "estimation/model/basis.hpp"
 #include "frf/response/channel_positions.hpp"

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <complex>
-#include <vector>
 
 #include "estimation/model/pole_set.hpp"
 

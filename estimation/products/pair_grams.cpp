@@ -1,7 +1,5 @@
 #include "estimation/products/pair_grams.hpp"
 
-#include <algorithm>
-
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {

@@ -1,7 +1,6 @@
 #include "estimation/request/structure_request.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <stdexcept>
 

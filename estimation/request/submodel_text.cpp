@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "acquisition/files/key_suggestion.hpp"
 
 namespace stageid {
 namespace {

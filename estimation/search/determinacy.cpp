@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/model/poles.hpp"
 #include "estimation/search/mode_worth.hpp"

@@ -1,7 +1,6 @@
 #include "estimation/search/hidden_modes.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "estimation/equations/numerators.hpp"
 #include "estimation/model/model_structure.hpp"

@@ -1,7 +1,6 @@
 #include "estimation/search/residue_ranks.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <Eigen/Core>
 #include <algorithm>

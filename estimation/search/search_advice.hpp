@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "estimation/problem/fit_options.hpp"
 #include "estimation/search/fit_verdict.hpp"
 #include "frf/response/frf_estimate.hpp"

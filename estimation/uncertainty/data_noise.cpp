@@ -1,7 +1,5 @@
 #include "estimation/uncertainty/data_noise.hpp"
 
-#include <algorithm>
-
 namespace stageid {
 namespace {
 

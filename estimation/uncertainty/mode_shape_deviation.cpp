@@ -1,6 +1,5 @@
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "excitation/multisine/crest_reduction.hpp"
 
 #include <cmath>
-#include <complex>
 #include <limits>
 
 #include "excitation/multisine/line_spectrum.hpp"

@@ -1,6 +1,5 @@
 #include "excitation/multisine/line_spectrum.hpp"
 
-#include <algorithm>
 #include <complex>
 #include <limits>
 #include <stdexcept>

@@ -1,7 +1,6 @@
 #include "frf/health/health_measures.hpp"
 
 #include <array>
-#include <complex>
 #include <limits>
 #include <vector>
 

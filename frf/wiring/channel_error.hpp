@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <string>
 
 #include "frf/periods/realization_change.hpp"
 #include "frf/runs/health_record.hpp"

@@ -18,7 +18,6 @@
 #include "tools/exchange/import/mapped_log.hpp"
 #include "tools/exchange/import/si_unit.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
-#include "tools/exchange/uff/uff_frf.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {

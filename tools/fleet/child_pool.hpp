@@ -3,8 +3,6 @@
 #include <sys/types.h>
 
 #include <cstddef>
-#include <filesystem>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>

@@ -1,6 +1,5 @@
 #include "tools/fleet/fleet_config.hpp"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string_view>
 

@@ -7,7 +7,6 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_library.hpp"
-#include "tools/exchange/matlab/mat_file.hpp"
 #include "tools/exchange/matlab/mat_variable.hpp"
 #include "tools/terminal/unicode.hpp"
 
