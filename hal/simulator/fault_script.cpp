@@ -105,6 +105,22 @@ void check(const Fault& fault, std::size_t number, const StageInfo& info,
           "faults: entry {}: {} cannot be gradual; remove ramp_s", number, to_string(fault.kind));
 }
 
+/// Faults of one mode multiply. In every run, all of them together must leave it oscillating.
+void check_together(const std::vector<Fault>& faults, const std::vector<PlantMode>& modes) {
+  for (const Fault& one : faults)
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      if (one.kind != Kind::mode_damping || !hits(one, i)) continue;
+      double ratio = modes[i].damping_ratio;
+      for (const Fault& other : faults)
+        if (other.kind == one.kind && hits(other, i) && (other.run < 0 || other.run == one.run))
+          ratio *= std::max(1.0, 1.0 + other.value);
+      require(ratio < 1.0,
+              "faults: the entries together raise the damping ratio of mode {} to {:.6g}; must be "
+              "below 1",
+              i, ratio);
+    }
+}
+
 }  // namespace
 
 FaultTraits fault_traits(Kind kind) noexcept { return kTraits[static_cast<std::size_t>(kind)]; }
@@ -121,6 +137,7 @@ FaultScript::FaultScript(std::vector<SimulationSpec::Fault> faults, const StageI
     if (faults_[i].kind == Kind::extra_delay)
       history_cycles_ = std::max(history_cycles_, static_cast<std::size_t>(faults_[i].value) + 1);
   }
+  check_together(faults_, modes);
   history_.assign(history_cycles_ * info.actuators.size(), 0.0);
   tuned_ = modes_;
 }

@@ -217,6 +217,18 @@ TEST(Faults, ThatCannotBe) {
   refuses_fault(of(Kind::dead_sensor, 0, 0.0, 1.0), "dead_sensor cannot be gradual");
 }
 
+TEST(Faults, ThatCannotBeTogether) {
+  test::SimulatedSpec spec = with_fault(Kind::none, 0, 0);
+  const auto of = [](int run) {  // of a damping ratio of 0.02
+    return SimulationSpec::Fault{Kind::mode_damping, 6, 0, 1, run, 9.0};
+  };
+  spec.simulation.faults = {of(0), of(1)};
+  EXPECT_NO_THROW(test::simulated(spec));
+  spec.simulation.faults = {of(-1), of(1)};
+  EXPECT_THAT([&] { test::simulated(spec); },
+              test::refuses<std::invalid_argument>("together raise the damping ratio of mode 6"));
+}
+
 // One sample more after every second cycle.
 TEST_F(FaultTest, AnExtraDelayGrowsInWholeSamples) {
   test::SimulatedSpec spec = with_value(Kind::extra_delay, -1, 4, 2.0);
