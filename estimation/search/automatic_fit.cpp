@@ -18,14 +18,13 @@
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/part_of_data.hpp"
 #include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/ranked_fit.hpp"
 #include "estimation/search/residue_ranks.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
-#include "estimation/search/trial_options.hpp"
+#include "estimation/search/trials.hpp"
 #include "estimation/start/pole_relocation.hpp"
 
 namespace stageid {
@@ -90,7 +89,7 @@ class AutomaticFit {
       adopt(fit_additive_model(frf_, best_.model, last));
     }
     say("{}, reached by way of {}: cost {:.6g}", counted(count_modes(best_.model), "mode"), target_,
-        best_.model.fit.cost);
+        cost());
   }
 
   /// Decides between general and proportional damping. A model with general damping can describe what a few missing
@@ -219,7 +218,7 @@ class AutomaticFit {
         start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.threads));
     FitResult fit = fit_additive_model(frf_, relocated, quick_);
     if (!is_better(fit)) return;
-    say("pole relocation: cost {:.6g} -> {:.6g}", best_.model.fit.cost, fit.model.fit.cost);
+    say("pole relocation: cost {:.6g} -> {:.6g}", cost(), fit.model.fit.cost);
     adopt(std::move(fit));
   }
 
@@ -426,8 +425,8 @@ class AutomaticFit {
     options.delay_s = move.options.delay_s;
     if (!all) fit = fit_additive_model(frf_, with_all_inputs(frf_, fit.model), options);
     if (!is_better(fit)) return false;
-    say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, best_.model.fit.cost,
-        fit.model.fit.cost, best_.parameters, fit.parameters);
+    say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, cost(), fit.model.fit.cost,
+        best_.parameters, fit.parameters);
     quick_.delay = options_.delay = options.delay;
     quick_.delay_s = options_.delay_s = options.delay_s;
     adopt(std::move(fit));
@@ -470,7 +469,7 @@ class AutomaticFit {
     if (demanded ? trial.status() == FitStatus::singular : !is_better(trial)) return false;
     for (const ProposedMode& candidate : clear)
       say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
-          candidate.mode.frequency_hz, clear.size(), best_.model.fit.cost, trial.model.fit.cost);
+          candidate.mode.frequency_hz, clear.size(), cost(), trial.model.fit.cost);
     adopt(std::move(trial));
     return true;
   }
@@ -491,8 +490,7 @@ class AutomaticFit {
       if (selection_.exactly == 0 && reach * candidate.gain < price) continue;
       FitResult trial = fit_with({candidate});
       if (trial.status() == FitStatus::singular) continue;
-      const double gain =
-          static_cast<double>(frf_.lines()) * (best_.model.fit.cost - trial.model.fit.cost);
+      const double gain = static_cast<double>(frf_.lines()) * (cost() - trial.model.fit.cost);
       reach = 2.0 * std::max(1.0, gain / candidate.gain);  // as the last one, with a margin
       const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
       if (better) best_trial = std::move(trial);
@@ -509,12 +507,11 @@ class AutomaticFit {
     if (selection_.exactly == 0 && !is_better(best_trial)) {
       say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, which "
           "does not justify its parameters (BIC)",
-          added.natural_frequency_hz(),
-          100.0 * (1.0 - best_trial.model.fit.cost / best_.model.fit.cost));
+          added.natural_frequency_hz(), 100.0 * (1.0 - best_trial.model.fit.cost / cost()));
       return false;
     }
     say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),
-        added.damping_ratio(), best_.model.fit.cost, best_trial.model.fit.cost);
+        added.damping_ratio(), cost(), best_trial.model.fit.cost);
     adopt(std::move(best_trial));
     return true;
   }
@@ -545,8 +542,7 @@ class AutomaticFit {
       }
       for (const std::size_t i : out)
         say("dropped {:.6g} Hz: cost {:.6g} -> {:.6g}",
-            best_.model.submodels[i].natural_frequency_hz(), best_.model.fit.cost,
-            without.model.fit.cost);
+            best_.model.submodels[i].natural_frequency_hz(), cost(), without.model.fit.cost);
       adopt(std::move(without));
       at_once *= 2;
     }
@@ -558,7 +554,7 @@ class AutomaticFit {
     double predicted = 0.0;
     for (const std::size_t i : out) predicted += best_.removal_cost[i];
     const double lines = static_cast<double>(frf_.lines());
-    return 2.0 * lines * (without.model.fit.cost - best_.model.fit.cost) <= predicted;
+    return 2.0 * lines * (without.model.fit.cost - cost()) <= predicted;
   }
 
   void reduce() {

@@ -61,6 +61,10 @@ bool supports_all_modes(const FrfEstimate& frf, const FitEvidence& evidence, con
 std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& options,
                                     const FitResult& fit);
 
+/// The channels whose delay differs from the median of the other inputs or outputs by more than five standard
+/// deviations, as a finding; empty if there are none. @pre model.sample_rate_hz > 0
+std::string late_channels(const AdditiveModel& model);
+
 /// The verdict on a fit: those on its modes, its status with the reasons, and the findings. Nothing else changes them
 /// after the last iteration.
 void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit);

@@ -42,11 +42,8 @@ bool is_coloured(const FitResult& fit, std::size_t i) {
 bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& before, const FitResult& now, std::size_t added) {
   const SharedMatrix<Eigen::MatrixXd> weights = make_weights(frf, options);
-  const auto squares = [&](const AdditiveModel& model) -> Eigen::VectorXd {
-    const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
-    return weights->cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose();
-  };
-  Eigen::VectorXd gain = squares(before.model) - squares(now.model);
+  Eigen::VectorXd gain =
+      squares_of_lines(frf, before.model, weights) - squares_of_lines(frf, now.model, weights);
   const auto n = static_cast<Eigen::Index>(added);
   std::sort(gain.begin(), gain.end());
   const auto parameters = static_cast<double>(now.parameters - before.parameters);

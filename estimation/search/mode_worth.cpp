@@ -32,6 +32,12 @@ double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parame
   return in_squares(2.0 * lines * fit.model.fit.cost, cost_of_mode(parameters, data, lines), data);
 }
 
+Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
+                                 const Eigen::MatrixXd& weights) {
+  const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
+  return weights.cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose();
+}
+
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),

@@ -17,6 +17,10 @@ double information_criterion(const FrfEstimate& frf, const FitResult& fit);
 /// Rise of sum W |E|^2 of `fit` without a mode above which the mode is worth that many parameters, see ModeWorth.
 double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters);
 
+/// sum W |E|^2 of a model on every line. @param weights n_c x N
+Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
+                                 const Eigen::MatrixXd& weights);
+
 /// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen, Biometrika 95
 /// (2008) 759) with unknown scale of the variances. With correct variances it decides like the criterion with known
 /// variance; if the model cannot be right, it does not fit its errors.

@@ -17,7 +17,7 @@
 #include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
-#include "estimation/search/trial_options.hpp"
+#include "estimation/search/trials.hpp"
 
 namespace stageid {
 namespace {
@@ -156,10 +156,7 @@ void advise_structure(const FrfEstimate& frf, const FitOptions& options, const F
 /// The band without its worse end, if the smaller part of the lines has the larger part of the cost.
 void advise_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit,
                  FitReason& reason) {
-  const Eigen::MatrixXcd error =
-      frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
-  const Eigen::VectorXd squares =
-      trial.user_weights->cwiseProduct(error.cwiseAbs2()).colwise().sum().transpose();
+  const Eigen::VectorXd squares = squares_of_lines(frf, fit.model, trial.user_weights);
   const auto end = static_cast<Eigen::Index>(kSmallEnd * static_cast<double>(frf.lines()));
   const double most = kMostOfCost * squares.sum();
   const Eigen::Index last = frf.lines() - 1;

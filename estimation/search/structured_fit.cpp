@@ -12,7 +12,6 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/modal/residual_verdict.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/late_channels.hpp"
 #include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/search_advice.hpp"
 #include "estimation/search/search_constants.hpp"

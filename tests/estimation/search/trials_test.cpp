@@ -1,4 +1,4 @@
-#include "estimation/search/part_of_data.hpp"
+#include "estimation/search/trials.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "estimation/search/late_channels.hpp"
+#include "estimation/search/fit_verdict.hpp"
 
 #include <gtest/gtest.h>
 

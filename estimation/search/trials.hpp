@@ -6,6 +6,10 @@
 
 namespace stageid {
 
+/// `options` for fits that are compared with each other: few iterations to the same minimum, free residues, the
+/// weights computed once and diagonal, no standard deviations.
+FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options);
+
 /// Some of the lines and inputs of an FRF, evenly spaced, with a model of them and the options of a fit.
 struct PartOfData {
   FrfEstimate frf;
