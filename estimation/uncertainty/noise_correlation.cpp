@@ -10,14 +10,14 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 17;  // of the columns of all channels
 
-/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined; 1 for a = b. @param C (a, b, line) -> complex
-template <typename Covariance>
-SplitMatrix correlation_of(const Covariance& C, Eigen::Index a, Eigen::Index b, IndexRange lines) {
+/// C(a, b) / sqrt(C(a, a) C(b, b)) on some lines, 0 if undefined; 1 for a = b. @param columns vec of C, n x n, per line
+SplitMatrix correlation_of(const Eigen::MatrixXcd& columns, Eigen::Index n, Eigen::Index a,
+                           Eigen::Index b, IndexRange lines) {
   SplitMatrix out{Eigen::MatrixXd::Ones(lines.count, 1), Eigen::MatrixXd::Zero(lines.count, 1)};
   for (Eigen::Index i = 0; a != b && i < lines.count; ++i) {
-    const Eigen::Index k = lines.first + i;
-    const double power = C(a, a, k).real() * C(b, b, k).real();
-    const std::complex<double> rho = power > 0.0 ? C(a, b, k) / std::sqrt(power) : 0.0;
+    const auto C = columns.col(lines.first + i).reshaped(n, n);
+    const double power = C(a, a).real() * C(b, b).real();
+    const std::complex<double> rho = power > 0.0 ? C(a, b) / std::sqrt(power) : 0.0;
     out.re(i, 0) = rho.real();
     out.im(i, 0) = rho.imag();
   }
@@ -110,17 +110,11 @@ class GramOfTiles {
 }  // namespace
 
 SplitMatrix NoiseCorrelation::R(Eigen::Index y, Eigen::Index z, IndexRange lines) const {
-  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    return frf_->residual_covariance(a + frf_->n_outputs() * b, k);
-  };
-  return correlation_of(C, y, z, lines);
+  return correlation_of(frf_->residual_covariance, frf_->n_outputs(), y, z, lines);
 }
 
 SplitMatrix NoiseCorrelation::S(Eigen::Index u, Eigen::Index v, IndexRange lines) const {
-  const auto C = [this](Eigen::Index a, Eigen::Index b, Eigen::Index k) {
-    return frf_->input_factor(a + frf_->n_inputs() * b, k);
-  };
-  return correlation_of(C, u, v, lines);
+  return correlation_of(frf_->input_factor, frf_->n_inputs(), u, v, lines);
 }
 
 OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, IndexRange lines) const {
