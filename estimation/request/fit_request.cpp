@@ -265,9 +265,12 @@ nlohmann::ordered_json flags_of(const FitRequest& request) {
   if (request.modes.kind == Kind::none) flags["--modes"] = "none";
   if (request.modes.kind == Kind::count) flags["--modes"] = fmt::format("{}", request.modes.count);
   if (request.modes.kind == Kind::given) {
-    std::vector<double> frequency_hz;
-    for (const ModeCandidate& mode : request.modes.given) frequency_hz.push_back(mode.frequency_hz);
-    flags["--modes"] = fmt::format("{}", fmt::join(frequency_hz, ","));
+    std::vector<std::string> modes;
+    for (const ModeCandidate& mode : request.modes.given)
+      modes.push_back(mode.damping_ratio == ModeCandidate{}.damping_ratio
+                          ? fmt::format("{}", mode.frequency_hz)
+                          : fmt::format("{}:{}", mode.frequency_hz, mode.damping_ratio));
+    flags["--modes"] = fmt::format("{}{}", fmt::join(modes, ","), modes.size() == 1 ? "," : "");
   }
   if (request.weighting)
     flags["--weighting"] = *request.weighting == Weighting::user

@@ -113,8 +113,8 @@ void fit_command(CLI::App& app, Console& console) {
                      "radius of the model response");
   add_band(command, flags.band_hz, "all lines");
   command.add_option("--modes", flags.words.modes,
-                     "auto | none | COUNT | frequencies f1,f2,... in Hz | modes.json; default: "
-                     "auto, or none with --submodel");
+                     "auto | none | COUNT | frequencies f1,f2,... in Hz, each with a damping ratio "
+                     "if you like (f1:0.01) | modes.json; default: auto, or none with --submodel");
   command.add_option(
       "--weighting", flags.words.weighting,
       "unit | inverse_magnitude | relative | noise_variance | total_variance | likelihood | "

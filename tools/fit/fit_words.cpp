@@ -29,20 +29,26 @@ int parse_rank(const char* flag, const std::string& text, const char* expected) 
   return static_cast<int>(*number);
 }
 
+/// "f1,f2:zeta2,...": frequencies in Hz, each with its damping ratio if that is given.
 std::vector<ModeCandidate> parse_frequencies(const std::string& text) {
   std::vector<ModeCandidate> modes;
   std::string_view rest = text;
   while (!rest.empty()) {
-    const std::size_t comma = std::min(rest.find(','), rest.size());
-    const std::optional<double> frequency_hz = parse_number(rest.substr(0, comma));
-    if (!frequency_hz || *frequency_hz <= 0.0)
+    const std::string_view one = rest.substr(0, rest.find(','));
+    const std::size_t colon = std::min(one.find(':'), one.size());
+    const std::optional<double> frequency_hz = parse_number(one.substr(0, colon));
+    const std::optional<double> damping_ratio =
+        colon < one.size() ? parse_number(one.substr(colon + 1)) : ModeCandidate{}.damping_ratio;
+    if (!frequency_hz || *frequency_hz <= 0.0 || !damping_ratio || *damping_ratio <= 0.0 ||
+        *damping_ratio >= 1.0)
       refuse("--modes", text,
-             "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', or a file");
-    modes.push_back({*frequency_hz});
-    rest.remove_prefix(std::min(comma + 1, rest.size()));
+             "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', each with a damping "
+             "ratio below 1 if you like ('f1:0.01'), or a file");
+    modes.push_back({*frequency_hz, *damping_ratio});
+    rest.remove_prefix(std::min(one.size() + 1, rest.size()));
   }
-  std::sort(modes.begin(), modes.end(),
-            [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+  std::stable_sort(modes.begin(), modes.end(),
+                   [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
   return modes;
 }
 
@@ -57,7 +63,7 @@ ModesRequest parse_modes(const std::string& text) {
     if (*number < 1.0 || *number > 1000.0) refuse("--modes", text, "1 to 1000 modes");
     return {Kind::count, static_cast<int>(*number), {}};
   }
-  if (number || text.find_first_not_of("0123456789.eE+-") == std::string::npos)
+  if (number || text.find_first_not_of("0123456789.eE+-:") == std::string::npos)
     return {Kind::given, 0, parse_frequencies(text)};
   if (!std::filesystem::exists(text))
     throw FileError(

@@ -10,7 +10,7 @@ namespace stageid {
 
 /// The flags of `stageid fit` with text values; empty: not given.
 struct FitWords {
-  std::string modes;                  ///< auto | none | N | f1,f2,... | FILE.json
+  std::string modes;                  ///< auto | none | N | f1,f2:zeta2,... | FILE.json
   std::string weighting;              ///< unit | inverse_magnitude | ... | likelihood | FILE.h5
   std::string hold;                   ///< none | phase | sinc | exact
   std::string delay;                  ///< SECONDS | estimate | per_channel

@@ -47,6 +47,15 @@ TEST(FitWords, ModesAreACountFrequenciesOrAFile) {
   EXPECT_EQ(modes("30.5,12").given[0].frequency_hz, 12.0);
   EXPECT_EQ(modes("76.2").given.at(0).frequency_hz, 76.2);  // a point makes it a frequency
   EXPECT_EQ(modes("76,").given.at(0).frequency_hz, 76.0);   // so does a comma
+  const std::vector<ModeCandidate> damped = modes("30.5:0.002,12").given;
+  ASSERT_EQ(damped.size(), 2U);
+  EXPECT_EQ(damped[0].damping_ratio, 0.01);
+  EXPECT_EQ(damped[1].damping_ratio, 0.002);
+  EXPECT_EQ(modes("76:0.5").given.at(0).damping_ratio, 0.5);
+  for (const char* text : {"76:", "76:1", "76:0,", "76:-0.1,80", ":0.01", "76:0.1:0.2"})
+    EXPECT_THAT([&] { modes(text); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("--modes")))
+        << text;
   const ModesRequest by_file = modes((directory / "modes.json").string());
   ASSERT_EQ(by_file.given.size(), 2U);
   EXPECT_EQ(by_file.kind, Modes::given);
