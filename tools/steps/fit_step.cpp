@@ -76,6 +76,18 @@ std::string fit_request_id(const FitSetup& setup, const std::string& frf_fingerp
   return fingerprint_of(fmt::format("{} {} {}", version(), frf_fingerprint, setup.request_json));
 }
 
+FitResult complete_fit(const FitSetup& setup, const FitOptions& options,
+                       const std::string& frf_name, const std::string& frf_fingerprint) {
+  FitResult result = fit_model(setup, options);
+  std::vector<Problem> problems = problems_of(setup.frf);
+  rank(problems);
+  for (const Problem& problem : problems)
+    if (problem.grave)
+      result.model.fit.distrust({FitStatus::faulty_data, problem.what, problem.remedy});
+  result.model.provenance_json = provenance(setup, result, frf_name, frf_fingerprint, problems);
+  return result;
+}
+
 FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
                           const std::string& frf_fingerprint, const Console& console) {
   FitStep step;
@@ -87,15 +99,8 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   options.progress = [&](int iteration, double cost) {
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };
-  step.result = fit_model(setup, options);
-  std::vector<Problem> problems = problems_of(setup.frf);
-  rank(problems);
-  for (const Problem& problem : problems)
-    if (problem.grave)
-      step.result.model.fit.distrust({FitStatus::faulty_data, problem.what, problem.remedy});
+  step.result = complete_fit(setup, options, frf_name, frf_fingerprint);
   step.seconds = progress.seconds();
-  step.result.model.provenance_json =
-      provenance(setup, step.result, frf_name, frf_fingerprint, problems);
   return step;
 }
 

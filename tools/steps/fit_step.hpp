@@ -15,7 +15,14 @@ struct FitStep {
   double seconds = 0.0;
 };
 
-/// Fits, shows progress, and completes the provenance of the model. A signal ends the fit with the best model so far,
+/// Fits, distrusts a model of faulty data, and adds the provenance: the model that `stageid fit` writes.
+/// @param options those of the setup, with callbacks of the caller
+/// @param frf_name, frf_fingerprint of the fitted FRF.
+/// @throws what fit_model() throws
+FitResult complete_fit(const FitSetup& setup, const FitOptions& options,
+                       const std::string& frf_name, const std::string& frf_fingerprint);
+
+/// The same with progress on the console. A signal ends the fit with the best model so far,
 /// FitStatus::interrupted; before the first step there is none.
 /// @param frf_name, frf_fingerprint of the fitted FRF.
 /// @throws std::invalid_argument, Interrupted

@@ -124,8 +124,7 @@ class Commands {
     const auto options = fit_.find("options");
     const Json asked =
         options != fit_.end() && options->contains("flags") ? (*options)["flags"] : Json::object();
-    return fmt::format("stageid fit {} -o {}{}", in_shell(files_.frf), in_shell(files_.model),
-                       refit_flags(asked, flags));
+    return fit_command_line(files_.frf, files_.model, asked, flags);
   }
 
   std::string estimate(const std::string& flags) const {
@@ -180,6 +179,12 @@ void add_all_commands(std::vector<Problem>& problems, ResultFiles files, const J
 }
 
 }  // namespace
+
+std::string fit_command_line(const Path& frf, const Path& model, const Json& flags,
+                             const std::string& changed) {
+  return fmt::format("stageid fit {} -o {}{}", in_shell(frf), in_shell(model),
+                     refit_flags(flags, changed));
+}
 
 void add_commands(std::vector<Problem>& problems, ResultFiles files,
                   const std::string& frf_provenance_json, const AdditiveModel* model) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,12 @@ struct ResultFiles {
   std::filesystem::path frf;
   std::filesystem::path model;
 };
+
+/// "stageid fit FRF -o MODEL FLAGS" for a shell.
+/// @param flags "options.flags" of a provenance: {"--band": "30 2000", ...}
+/// @param changed flags with values, instead of those of the same name
+std::string fit_command_line(const std::filesystem::path& frf, const std::filesystem::path& model,
+                             const nlohmann::ordered_json& flags, const std::string& changed = "");
 
 /// Adds the commands for problems of a measured response or of a fit to it.
 /// @param files those that the provenance names are added if they are beside the others
