@@ -23,6 +23,7 @@ void export_command(CLI::App& app, Console& console);
 void import_command(CLI::App& app, Console& console);
 void fleet_command(CLI::App& app, Console& console);
 void report_command(CLI::App& app, Console& console);
+void open_command(CLI::App& app, Console& console);
 void plot_command(CLI::App& app, Console& console);
 void config_command(CLI::App& app, Console& console);
 void node_command(CLI::App& app, Console& console);

@@ -7,7 +7,8 @@ namespace stageid {
 /// Address at which the dashboard listens.
 struct DashboardAddress {
   std::string host = "127.0.0.1";
-  int port = 0;  ///< 0: any free port
+  int port = 0;                      ///< 0: any free port
+  const char* flag = "--dashboard";  ///< for errors
 
   /// True if other machines cannot reach it; then no token is required.
   bool is_loopback() const;

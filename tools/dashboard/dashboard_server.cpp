@@ -31,7 +31,7 @@ constexpr int kBusyKeepAlive_ms = 50;
 constexpr auto kBusyPatience = 250ms;
 constexpr std::size_t kLargestHead = std::size_t{1}
                                      << 14;  // with the cookies of other servers here
-constexpr const char* kAbortHeader = "X-Stageid";
+constexpr const char* kPageHeader = "X-Stageid";
 
 /// Not those of httplib, which let two programs share a port.
 void set_socket_options(int socket) {
@@ -43,7 +43,7 @@ constexpr std::chrono::milliseconds kPatience = std::chrono::seconds{DashboardSe
 
 constexpr const char* kWholeAddress = "open the address printed by stageid, with its token";
 
-void refuse(httplib::Response& response, int status, const std::string& why) {
+void answer(httplib::Response& response, int status, const std::string& why) {
   response.status = status;
   response.set_content(why + "\n", "text/plain");
 }
@@ -163,7 +163,13 @@ struct DashboardServer::State {
     return same_token(request.get_param_value("token"), token);
   }
 
+  /// A request of our page, not of another one in the same browser.
+  bool from_page(const httplib::Request& request, const char* what) const {
+    return has_token(request) && request.get_header_value(kPageHeader) == what;
+  }
+
   bool allowed(const httplib::Request& request) const {
+    if (content.secret && !has_token(request)) return false;
     if (!address.is_loopback()) return has_token(request);
     const std::string host = request.get_header_value("Host");
     const std::string mine = fmt::format("{}:{}", host_in_url(address.host), address.port);
@@ -186,9 +192,9 @@ struct DashboardServer::State {
       return;
     }
     const std::string why = errno != 0 ? std::strerror(errno) : "no such address";
-    throw StageError(fmt::format(
-        "--dashboard: cannot listen on {} ({}); use another port, or 0 for any free one",
-        address.host, why));
+    throw StageError(
+        fmt::format("{}: cannot listen on {} ({}); use another port, or 0 for any free one",
+                    address.flag, address.host, why));
   }
 
   /// Rejects requests that are not allowed before any other processing.
@@ -199,17 +205,17 @@ struct DashboardServer::State {
           response.set_header("X-Content-Type-Options", "nosniff");
           response.set_header("Referrer-Policy", "no-referrer");
           if (allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
-          refuse(response, 403, kWholeAddress);
+          answer(response, 403, kWholeAddress);
           return httplib::Server::HandlerResponse::Handled;
         });
     server.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
       if (!response.body.empty()) return;
       if (response.status == 404)
-        refuse(response, 404, fmt::format("{}: not found; open /", request.path));
+        answer(response, 404, fmt::format("{}: not found; open /", request.path));
       else if (response.status == 413)
-        refuse(response, 413, fmt::format("body too large; at most {} bytes", kLargestBody));
+        answer(response, 413, fmt::format("body too large; at most {} bytes", kLargestBody));
       else
-        refuse(response, response.status, "bad request; open the address printed by stageid");
+        answer(response, response.status, "bad request; open the address printed by stageid");
     });
     server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
       response.set_content(content.page, "text/html; charset=utf-8");
@@ -219,7 +225,7 @@ struct DashboardServer::State {
     server.Get("/response.json", [this](const httplib::Request&, httplib::Response& response) {
       const LatestText::Edition edition = content.response.get();
       if (edition.number == 0) {
-        refuse(response, 404, "no response yet; wait for the first complete realization");
+        answer(response, 404, "no response yet; wait for the first complete realization");
       } else {
         response.set_content(*edition.text, "application/json");
       }
@@ -233,19 +239,22 @@ struct DashboardServer::State {
                            "text/plain; version=0.0.4; charset=utf-8");
     });
     server.Post("/abort", [this](const httplib::Request& request, httplib::Response& response) {
-      if (!has_token(request) || request.get_header_value(kAbortHeader) != "abort") {
-        refuse(response, 403, kWholeAddress);
-        return;
-      }
+      if (!from_page(request, "abort")) return answer(response, 403, kWholeAddress);
       content.abort();
       response.set_content("stopping\n", "text/plain");
+    });
+    if (!content.act) return;
+    server.Post("/act", [this](const httplib::Request& request, httplib::Response& response) {
+      if (!from_page(request, "act")) return answer(response, 403, kWholeAddress);
+      const ActionReply reply = content.act(request.body);
+      answer(response, reply.status, reply.text);
     });
   }
 
   void stream(httplib::Response& response) {
     if (watchers.fetch_add(1) >= kWatchers) {
       watchers.fetch_sub(1);
-      refuse(response, 503, fmt::format("{} pages are already open; close one", kWatchers));
+      answer(response, 503, fmt::format("{} pages are already open; close one", kWatchers));
       return;
     }
     content.watched();

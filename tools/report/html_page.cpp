@@ -69,14 +69,20 @@ PageKind kind_of(HtmlPage page) {
   constexpr const char* kWithoutScript =
       "This report needs JavaScript, which is included in this file; enable scripts to see the "
       "plots.";
+  constexpr const char* kServed = "; connect-src 'self'; base-uri 'none'; form-action 'none'";
   switch (page) {
     case HtmlPage::dashboard:
-      return {"stageidDashboard", "; connect-src 'self'; base-uri 'none'; form-action 'none'",
+      return {"stageidDashboard", kServed,
               "The dashboard needs JavaScript, which is included in this page; enable scripts to "
               "see it.",
               report::dashboard_css, report::dashboard_js};
     case HtmlPage::fleet:
       return {"stageidFleet", "", kWithoutScript, "", report::fleet_js};
+    case HtmlPage::workbench:
+      return {"stageidReport", kServed,
+              "The workbench needs JavaScript, which is included in this page; enable scripts to "
+              "use it.",
+              report::workbench_css, report::workbench_js};
     case HtmlPage::report:
       break;
   }

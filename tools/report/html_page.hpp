@@ -10,7 +10,7 @@ namespace stageid {
 /// Escapes JSON for use inside <script>: no '<'. @pre `json` is JSON.
 std::string script_safe(std::string_view json);
 
-enum class HtmlPage : std::uint8_t { report, dashboard, fleet };
+enum class HtmlPage : std::uint8_t { report, dashboard, fleet, workbench };
 
 namespace report {
 

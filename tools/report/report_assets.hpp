@@ -9,6 +9,8 @@ extern const std::string_view page_html;  ///< template with {{title}}, {{css}},
 extern const std::string_view dashboard_css;
 extern const std::string_view dashboard_js;
 extern const std::string_view fleet_js;
+extern const std::string_view workbench_css;
+extern const std::string_view workbench_js;
 extern const std::string_view page_css;
 extern const std::string_view page_js;
 extern const std::string_view library_css;

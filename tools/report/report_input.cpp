@@ -104,9 +104,10 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
   put(input.*part->place, file);
 }
 
-/// Only the lines that the model was fitted to are shown.
+/// Only the lines that the model was fitted to are shown, unless all are wanted.
 void keep_fitted_band(ReportData& data) {
-  if (!data.model || !(data.model->fit.band_hz[1] > data.model->fit.band_hz[0])) return;
+  if (data.all_lines || !data.model || !(data.model->fit.band_hz[1] > data.model->fit.band_hz[0]))
+    return;
   for (std::optional<FrfEstimate>* frf : {&data.frf, &data.validation_frf})
     if (*frf)
       *frf = select_band(std::move(**frf), data.model->fit.band_hz[0], data.model->fit.band_hz[1]);
@@ -186,6 +187,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
 
 ReportData read_response(const ReportInput& input) {
   ReportData data;
+  data.all_lines = input.all_lines;
   if (!input.frf.empty()) data.frf = read_frf(input.frf);
   if (!input.validation_frf.empty()) data.validation_frf = read_frf(input.validation_frf);
   if (!input.model.empty()) data.model = read_model(input.model);
@@ -267,21 +269,25 @@ ReportData read_report_data(const ReportInput& input) {
   return data;
 }
 
-void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files) {
+ComparedResult read_compared(const std::vector<std::filesystem::path>& files) {
   const ReportInput input = report_input(files);
   if (input.frf.empty() && input.model.empty())
     throw std::invalid_argument(
         fmt::format("--compare {}: contains neither an FRF nor a model; use the output directory "
                     "of 'stageid identify', or an FRF or model file",
                     files.at(0).string()));
-  std::optional<FrfEstimate> frf;
-  if (!input.frf.empty()) frf = read_frf(input.frf);
-  std::optional<AdditiveModel> model;
-  if (!input.model.empty()) model = read_model(input.model);
   const std::filesystem::path first = std::filesystem::absolute(files.at(0)).lexically_normal();
-  const std::filesystem::path name =
-      first.has_filename() ? first.filename() : first.parent_path().filename();
-  data.comparison = report::make_comparison(data, name.string(), std::move(model), frf);
+  ComparedResult result;
+  result.title = (first.has_filename() ? first : first.parent_path()).filename().string();
+  if (!input.frf.empty()) result.frf = read_frf(input.frf);
+  if (!input.model.empty()) result.model = read_model(input.model);
+  return result;
+}
+
+void add_comparison(ReportData& data, const std::vector<std::filesystem::path>& files) {
+  ComparedResult other = read_compared(files);
+  data.comparison =
+      report::make_comparison(data, std::move(other.title), std::move(other.model), other.frf);
 }
 
 }  // namespace stageid

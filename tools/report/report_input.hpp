@@ -19,6 +19,7 @@ struct ReportInput {
   std::filesystem::path summary;
   std::filesystem::path controller_view;
   std::filesystem::path stage;  ///< for the positions; default: the one in the log
+  bool all_lines = false;       ///< show those outside the band of the model too
 };
 
 /// Sorts files (or the files of a directory of `identify`) by their content.
@@ -32,6 +33,15 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files);
 /// @throws FileError, FormatError, std::invalid_argument
 void complete_report(ReportData& data, const ReportInput& input,
                      const nlohmann::ordered_json& summary);
+
+/// A result of files for comparison; each part may be missing, but not both.
+struct ComparedResult {
+  std::string title;  ///< name of the first file or directory
+  std::optional<AdditiveModel> model;
+  std::optional<FrfEstimate> frf;
+};
+/// @throws as report_input(); std::invalid_argument if there is neither an FRF nor a model
+ComparedResult read_compared(const std::vector<std::filesystem::path>& files);
 
 /// The response data of files. @throws FileError, FormatError, std::invalid_argument
 ReportData read_response_data(const ReportInput& input);

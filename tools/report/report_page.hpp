@@ -57,6 +57,7 @@ struct ReportComparison {
 struct ReportData {
   std::string title;
 
+  bool all_lines = false;                     ///< also those outside the band of the model
   std::optional<FrfEstimate> frf;             ///< the fitted response
   std::optional<FrfEstimate> validation_frf;  ///< held back; same channels and lines as frf
 

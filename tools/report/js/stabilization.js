@@ -40,8 +40,12 @@ function stableTable() {
   ], stablePoles().map(([, f, zeta]) => ({ f, zeta, mode: near(f) })));
 }
 
+function stabilizationArea(width, height) {
+  return { x: 46, y: 8, w: width - 58, h: height - 34 };
+}
+
 function drawStabilization(context, width, height) {
-  const area = { x: 46, y: 8, w: width - 58, h: height - 34 };
+  const area = stabilizationArea(width, height);
   const [low, high] = shownBand();
   const most = lastOrder();
   const x = (hz) => area.x + area.w * Math.log(hz / low) / Math.log(high / low);

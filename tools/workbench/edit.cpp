@@ -1,0 +1,159 @@
+#include "tools/workbench/edit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "acquisition/files/json_members.hpp"
+#include "estimation/request/request_flags.hpp"
+#include "tools/fit/fit_words.hpp"
+#include "tools/workbench/model_request.hpp"
+
+namespace stageid {
+namespace {
+
+using Json = nlohmann::json;
+using Modes = ModesRequest::Kind;
+
+constexpr double kSameMode = 1e-3;  // relative distance of a removed mode from the nearest one
+constexpr std::size_t kMostModes = 1000;
+constexpr std::size_t kLongestWord = 64;
+
+double require_number(const Json& action, const char* key, double low, double high) {
+  const std::optional<double> value = number_in(action, key);
+  if (!value || !(*value > low && *value < high))
+    throw std::invalid_argument(
+        fmt::format("{}: expected a number above {} and below {}", key, low, high));
+  return *value;
+}
+
+Edit add_mode(const Json& action, FitRequest request) {
+  const ModeCandidate mode = rounded_mode(require_number(action, "frequency_hz", 0.0, 1e9),
+                                          action.contains("damping_ratio")
+                                              ? require_number(action, "damping_ratio", 0.0, 1.0)
+                                              : ModeCandidate{}.damping_ratio);
+  std::vector<ModeCandidate>& modes = request.modes.given;
+  if (modes.size() >= kMostModes)
+    throw std::invalid_argument(fmt::format("at most {} modes", kMostModes));
+  modes.insert(std::ranges::upper_bound(modes, mode.frequency_hz, {}, &ModeCandidate::frequency_hz),
+               mode);
+  request.modes.kind = Modes::given;
+  return {std::move(request), fmt::format("added {:.6g} Hz", mode.frequency_hz)};
+}
+
+Edit remove_mode(const Json& action, FitRequest request) {
+  const double frequency_hz = require_number(action, "frequency_hz", 0.0, 1e9);
+  std::vector<ModeCandidate>& modes = request.modes.given;
+  const auto distance = [&](const ModeCandidate& mode) {
+    return std::abs(mode.frequency_hz - frequency_hz);
+  };
+  const auto nearest = std::ranges::min_element(modes, {}, distance);
+  if (nearest == modes.end() || distance(*nearest) > kSameMode * frequency_hz)
+    throw std::invalid_argument(fmt::format(
+        "no mode at {:.6g} Hz can be removed; that of a suspension belongs to the rigid body",
+        frequency_hz));
+  const std::string what = fmt::format("removed {:.6g} Hz", nearest->frequency_hz);
+  modes.erase(nearest);
+  if (modes.empty()) request.modes.kind = Modes::none;
+  return {std::move(request), what};
+}
+
+Edit set_band(const Json& action, FitRequest request) {
+  if (!number_in(action, "low_hz") && !number_in(action, "high_hz")) {
+    request.band_hz.reset();
+    return {std::move(request), "all lines"};
+  }
+  const double low_hz = require_number(action, "low_hz", -1e-300, 1e9);
+  const double high_hz = require_number(action, "high_hz", low_hz, 1e9);
+  const auto rounded = [](double value) { return std::stod(fmt::format("{:.6g}", value)); };
+  request.band_hz = {rounded(low_hz), rounded(high_hz)};
+  return {std::move(request),
+          fmt::format("band {:.6g} to {:.6g} Hz", (*request.band_hz)[0], (*request.band_hz)[1])};
+}
+
+/// The words of a request, without those that name files or that the page does not change.
+FitWords words_of(const FitRequest& request) {
+  const nlohmann::ordered_json flags = flags_of(request);
+  FitWords words;
+  words.weighting = request.weighting == Weighting::user ? "" : text_in(flags, "--weighting");
+  words.delay = text_in(flags, "--delay");
+  words.rigid_body = text_in(flags, "--rigid-body");
+  words.damping = text_in(flags, "--damping");
+  words.direct_term = text_in(flags, "--direct-term");
+  if (request.residue_rank > 0) words.residue_rank = fmt::format("{}", request.residue_rank);
+  return words;
+}
+
+/// Each control: its key, and its word.
+constexpr std::pair<const char*, std::string FitWords::*> kControls[] = {
+    {"weighting", &FitWords::weighting},       {"damping", &FitWords::damping},
+    {"residue_rank", &FitWords::residue_rank}, {"delay", &FitWords::delay},
+    {"rigid_body", &FitWords::rigid_body},     {"direct_term", &FitWords::direct_term}};
+
+/// A count or a search instead of the given modes.
+void set_modes(const std::string& word, FitRequest& request) {
+  if (word.empty()) return;
+  if (word == "auto") {
+    request.modes = {Modes::search, 0, {}};
+    return;
+  }
+  if (word.find_first_not_of("0123456789") != std::string::npos || word.size() > 4)
+    throw std::invalid_argument("modes: expected auto or a number of modes");
+  request.modes = {Modes::count, std::stoi(word), {}};
+}
+
+Edit refit(const Json& action, FitRequest request) {
+  FitWords words = words_of(request);
+  std::string what;
+  for (const auto& [key, member] : kControls) {
+    const auto given = action.find(key);
+    if (given == action.end()) continue;
+    if (!given->is_string() || given->get_ref<const std::string&>().size() > kLongestWord)
+      throw std::invalid_argument(fmt::format("{}: expected a word", key));
+    auto word = given->get<std::string>();
+    if (member == &FitWords::residue_rank && word.empty()) word = "full";
+    if (words.*member == word) continue;
+    words.*member = word;
+    what += fmt::format("{}{}: {}", what.empty() ? "" : ", ", key, word.empty() ? "default" : word);
+  }
+  if (words.weighting != "" && (!from_word<Weighting>(words.weighting) ||
+                                from_word<Weighting>(words.weighting) == Weighting::user))
+    throw std::invalid_argument(fmt::format("weighting: '{}' is unknown", words.weighting));
+  FitRequest parsed;
+  parse_fit_words(words, parsed);
+  if (request.weighting != Weighting::user || !words.weighting.empty())
+    request.weighting = parsed.weighting;
+  request.delay = parsed.delay;
+  request.rigid_body = parsed.rigid_body;
+  request.residue_rank = parsed.residue_rank;
+  request.general_damping = parsed.general_damping;
+  request.direct_term = parsed.direct_term;
+  if (const std::string modes = text_in(action, "modes"); !modes.empty()) {
+    set_modes(modes, request);
+    what += fmt::format("{}modes: {}", what.empty() ? "" : ", ", modes);
+  }
+  return {std::move(request), what.empty() ? "fitted again" : what};
+}
+
+}  // namespace
+
+Edit edited(const Json& action, FitRequest request) {
+  const std::string kind = text_in(action, "kind");
+  if (kind == "add") return add_mode(action, std::move(request));
+  if (kind == "remove") return remove_mode(action, std::move(request));
+  if (kind == "band") return set_band(action, std::move(request));
+  if (kind == "refit") return refit(action, std::move(request));
+  throw std::invalid_argument("unknown action");
+}
+
+Json controls_json(const FitRequest& request) {
+  const FitWords words = words_of(request);
+  Json json = {{"band_hz", nullptr}};
+  if (request.band_hz) json["band_hz"] = *request.band_hz;
+  for (const auto& [key, member] : kControls) json[key] = words.*member;
+  return json;
+}
+
+}  // namespace stageid

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimation/request/fit_request.hpp"
+#include "excitation/words/words.hpp"
+
+namespace stageid {
+
+/// How far a fit of the workbench is.
+enum class FitStage : std::uint8_t {
+  waiting,
+  linear,   ///< a preview, see warm_start()
+  refined,  ///< what `stageid fit` writes
+  stopped,  ///< by the user: the preview remains
+  failed
+};
+template <>
+inline constexpr std::array kWords<FitStage> = {"waiting", "linear", "refined", "stopped",
+                                                "failed"};
+
+/// One fit of the workbench: what was requested, and the result so far.
+struct FitState {
+  std::string what;  ///< the edit that led here
+  FitRequest request;
+  FitStage stage = FitStage::waiting;
+  std::shared_ptr<const AdditiveModel> model = nullptr;  ///< null: none yet
+  std::vector<double> cost = {};                         ///< of the refinement so far
+  std::string message = {};                              ///< how the fit ended, or why it failed
+  std::filesystem::path saved = {};                      ///< the model file; empty: not saved
+};
+
+/// The fits of a session in their order, with undo and redo. Never empty.
+class FitHistory {
+ public:
+  static constexpr std::size_t kMost = 200;
+
+  explicit FitHistory(FitState first) { states_.push_back(std::move(first)); }
+  /// Appends after the current state and makes it current. Forgets the undone states, and beyond kMost the oldest ones
+  /// after the first.
+  void push(FitState state);
+  /// @returns false if there is no such state
+  bool go(std::size_t index);
+  bool undo() { return index_ > 0 && go(index_ - 1); }
+  bool redo() { return go(index_ + 1); }
+  /// Removes the current state, which must not be the first; that before it becomes current.
+  void drop();
+
+  std::size_t index() const noexcept { return index_; }
+  const std::vector<FitState>& states() const noexcept { return states_; }
+  FitState& current() noexcept { return states_[index_]; }
+  const FitState& current() const noexcept { return states_[index_]; }
+
+ private:
+  std::vector<FitState> states_;
+  std::size_t index_ = 0;
+};
+
+}  // namespace stageid

@@ -1,0 +1,337 @@
+#include "tools/workbench/workbench.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fingerprint.hpp"
+#include "acquisition/files/json_members.hpp"
+#include "acquisition/files/json_text.hpp"
+#include "estimation/request/request_flags.hpp"
+#include "tools/steps/fit_step.hpp"
+#include "tools/steps/problem_commands.hpp"
+#include "tools/workbench/edit.hpp"
+#include "tools/workbench/model_request.hpp"
+#include "tools/workbench/warm_start.hpp"
+
+namespace stageid {
+namespace {
+
+using namespace std::chrono_literals;
+using Json = nlohmann::json;
+
+constexpr std::size_t kLongestName = 64;
+constexpr auto kBetweenCosts = 100ms;
+constexpr auto kFarewell = 2s;  // for pages to read the end
+
+ReportInput input_of(const std::vector<std::filesystem::path>& files) {
+  ReportInput input = report_input(files);
+  input.all_lines = true;
+  input.controller_view.clear();  // of one model
+  input.model_h5.clear();
+  if (input.frf.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: contains no FRF; add the FRF to which the model is fitted",
+                    files.empty() ? "open" : files.front().string()));
+  return input;
+}
+
+/// A model, if there is one, is the first fit; weights that it names are beside the FRF.
+FitState first_state(const ReportInput& input) {
+  FitState state;
+  state.what = "opened";
+  state.stage = FitStage::refined;
+  if (input.model.empty()) {
+    state.message = "no model: add modes, or fit with automatic modes";
+    return state;
+  }
+  auto model = std::make_shared<const AdditiveModel>(read_model(input.model));
+  state.request = request_of(*model);
+  std::filesystem::path& weights = state.request.weight_file;
+  if (!weights.empty() && weights.is_relative()) weights = input.frf.parent_path() / weights;
+  state.cost = model->cost_history;
+  state.message = model->fit.message;
+  state.model = std::move(model);
+  state.saved = input.model;
+  return state;
+}
+
+bool is_plain_name(const std::string& name) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+  return !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, plain);
+}
+
+int modes_in(const FitState& state) {
+  if (!state.model) return static_cast<int>(state.request.modes.given.size());
+  return static_cast<int>(
+      std::ranges::count_if(state.model->submodels, [](const Submodel& s) { return s.is_mode(); }));
+}
+
+bool needs_fit(const FitState& state) {
+  return state.stage == FitStage::waiting || state.stage == FitStage::linear;
+}
+
+}  // namespace
+
+Workbench::Workbench(const WorkbenchOptions& options)
+    : options_(options),
+      input_(input_of(options.inputs)),
+      page_(read_report_data(input_)),
+      fingerprint_(fingerprint_of_file(input_.frf)),
+      history_(first_state(input_)) {
+  if (options_.directory.empty()) options_.directory = input_.frf.parent_path();
+  for (const std::filesystem::path& file : options_.compare)
+    compared_.push_back(page_.compared(read_compared({file})));
+  content_.page = page_.html();
+  content_.secret = true;
+  content_.act = [this](const std::string& body) { return act(body); };
+  content_.abort = [this] { stopped_ = version_.load(); };
+  content_.state.publish(state_json());
+  server_ = std::make_unique<DashboardServer>(
+      DashboardAddress{"127.0.0.1", options_.port, "--port"}, content_);
+  thread_ = std::thread([this] { run(); });
+}
+
+Workbench::~Workbench() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+    ++version_;
+    content_.state.publish(state_text());
+  }
+  wake_.notify_all();
+  server_->finish(kFarewell);
+  server_.reset();
+  thread_.join();
+}
+
+ActionReply Workbench::act(const std::string& body) {
+  const auto action = parse_json<Json>(body);
+  if (!action.is_object()) return {400, "expected a JSON object"};
+  const std::lock_guard lock(mutex_);
+  try {
+    return act_locked(action);
+  } catch (const std::invalid_argument& error) {
+    return {400, error.what()};
+  } catch (const FileError& error) {
+    return {409, error.what()};
+  }
+}
+
+ActionReply Workbench::act_locked(const Json& action) {
+  const std::string kind = text_in(action, "kind");
+  if (kind == "save") return save(text_in(action, "name"));
+  if (kind == "keep") return keep();
+  if (kind == "compare") return choose(action);
+  if (kind == "undo" || kind == "redo" || kind == "go") {
+    const double index = number_in(action, "index").value_or(-1.0);
+    const bool done = kind == "undo"   ? history_.undo()
+                      : kind == "redo" ? history_.redo()
+                                       : index >= 0.0 && index < FitHistory::kMost &&
+                                             history_.go(static_cast<std::size_t>(index));
+    if (!done) return {409, fmt::format("{}: there is no such fit", kind)};
+    changed();
+    return {200, "done"};
+  }
+  Edit edit = edited(action, editable());
+  FitState state;
+  state.what = std::move(edit.what);
+  state.request = std::move(edit.request);
+  history_.push(std::move(state));
+  changed();
+  return {200, "done"};
+}
+
+/// The request that an edit changes: the current one, from the poles of its model.
+FitRequest Workbench::editable() const {
+  const FitState& state = history_.current();
+  if (state.model && !needs_fit(state))
+    return with_modes_of(*state.model, state.request, page_.frf().frequency_hz[0]);
+  FitRequest request = state.request;
+  if (request.modes.kind == ModesRequest::Kind::given) return request;
+  if (needs_fit(state) && request.modes.kind != ModesRequest::Kind::none)
+    throw std::invalid_argument("the search is not finished; wait for it, stop it, or undo");
+  request.modes = {ModesRequest::Kind::none, 0, {}};
+  return request;
+}
+
+ActionReply Workbench::save(const std::string& name) {
+  if (!options_.write) return {403, "the workbench is read-only; start it with --write to save"};
+  FitState& state = history_.current();
+  if (state.stage != FitStage::refined || !state.model)
+    return {409, "there is no finished fit to save; wait for it"};
+  if (!state.saved.empty()) return {409, fmt::format("already saved as {}", state.saved.string())};
+  if (!is_plain_name(name))
+    return {400, fmt::format("name: expected 1 to {} letters, digits, _ and -", kLongestName)};
+  const std::filesystem::path file = options_.directory / (name + ".json");
+  if (std::filesystem::exists(std::filesystem::symlink_status(file)))
+    return {409, fmt::format("{} exists; choose another name", file.string())};
+  write_model(file, *state.model);
+  state.saved = file;
+  changed();
+  return {200, file.string()};
+}
+
+ActionReply Workbench::keep() {
+  const FitState& state = history_.current();
+  if (!state.model) return {409, "there is no model to compare with"};
+  if (compared_.size() >= kMostCompared)
+    return {409, fmt::format("at most {} results can be compared", kMostCompared)};
+  const std::string title = state.saved.empty()
+                                ? fmt::format("fit {}: {}", history_.index() + 1, state.what)
+                                : state.saved.filename().string();
+  compared_.push_back(page_.compared({title, *state.model, std::nullopt}));
+  changed();
+  return {200, title};
+}
+
+ActionReply Workbench::choose(const Json& action) {
+  const double index = number_in(action, "index").value_or(-1.0);
+  if (index >= static_cast<double>(compared_.size()))
+    return {409, "compare: there is no such result"};
+  chosen_.reset();
+  if (index >= 0.0) chosen_ = static_cast<std::size_t>(index);
+  changed();
+  return {200, "done"};
+}
+
+std::string Workbench::command() const {
+  const FitState& state = history_.current();
+  nlohmann::ordered_json flags = flags_of(state.request);
+  if (state.request.weighting == Weighting::user)
+    flags["--weighting"] = state.request.weight_file.string();
+  return fit_command_line(input_.frf, state.saved.empty() ? "model.json" : state.saved, flags);
+}
+
+std::string Workbench::state_json() const {
+  const std::lock_guard lock(mutex_);
+  return state_text();
+}
+
+std::string Workbench::state_text() const {
+  const FitState& current = history_.current();
+  Json json = {{"state", ending_                          ? "ended"
+                         : fitting_ || needs_fit(current) ? "fitting"
+                                                          : "ready"},
+               {"index", history_.index()},
+               {"states", Json::array()},
+               {"command", history_.index() == 0 && !current.model ? "" : command()},
+               {"cost", current.cost},
+               {"message", current.message},
+               {"controls", controls_json(current.request)},
+               {"error", error_},
+               {"writable", options_.write},
+               {"directory", options_.directory.string()},
+               {"compared", Json::array()},
+               {"chosen", chosen_ ? Json(*chosen_) : Json()},
+               {"edition", edition_}};
+  for (const FitState& state : history_.states())
+    json["states"].push_back({{"what", state.what},
+                              {"stage", to_string(state.stage)},
+                              {"modes", modes_in(state)},
+                              {"cost", state.model ? Json(state.model->fit.cost) : Json()},
+                              {"saved", state.saved.filename().string()}});
+  for (const auto& other : compared_) json["compared"].push_back(other->result.title);
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
+/// The current state is another one, or is to be shown differently.
+void Workbench::changed() {
+  ++version_;
+  error_.clear();
+  content_.state.publish(state_text());
+  wake_.notify_all();
+}
+
+bool Workbench::next(Work& work) {
+  std::unique_lock lock(mutex_);
+  wake_.wait(lock, [&] { return ending_ || version_ != work.version; });
+  if (ending_) return false;
+  const std::size_t index = history_.index();
+  work = {version_, history_.current(), index > 0 ? history_.states()[index - 1].model : nullptr,
+          compared_, chosen_};
+  fitting_ = needs_fit(work.state);
+  return true;
+}
+
+void Workbench::run() {
+  Work work;
+  while (next(work)) {
+    if (work.state.model || work.state.stage != FitStage::waiting) store(work);
+    if (needs_fit(work.state)) fit(work);
+  }
+}
+
+/// Shows the results so far, unless another state is current by now.
+void Workbench::store(Work& work) {
+  std::string results = page_.results(work.state, work.compared, work.chosen);
+  const std::lock_guard lock(mutex_);
+  if (version_ != work.version) return;
+  FitState& current = history_.current();
+  current = work.state;
+  fitting_ = needs_fit(work.state);
+  content_.response.publish(std::move(results));
+  edition_ = content_.response.get().number;
+  content_.state.publish(state_text());
+}
+
+void Workbench::fail(const Work& work, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  if (version_ != work.version) return;
+  const std::string what = history_.current().what;
+  history_.drop();
+  changed();
+  error_ = fmt::format("{}: {}", what, why);
+  fitting_ = false;
+  content_.state.publish(state_text());
+}
+
+void Workbench::tell_progress(const Work& work, double cost) {
+  const std::lock_guard lock(mutex_);
+  if (version_ != work.version) return;
+  history_.current().cost.push_back(cost);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - told_ < kBetweenCosts) return;
+  told_ = now;
+  content_.state.publish(state_text());
+}
+
+/// The preview, then the fit of `stageid fit`.
+void Workbench::fit(Work& work) {
+  using Modes = ModesRequest::Kind;
+  FitState& state = work.state;
+  try {
+    FitRequest request = state.request;
+    request.threads = options_.threads;
+    FitSetup setup = make_fit_setup(request, page_.frf());
+    setup.options.response_variance = false;
+    if (request.modes.kind == Modes::given || request.modes.kind == Modes::none) {
+      state.model = std::make_shared<const AdditiveModel>(warm_start(setup, work.before.get()));
+      state.stage = FitStage::linear;
+      store(work);
+    }
+    FitOptions options = setup.options;
+    options.progress = [&](int, double cost) { tell_progress(work, cost); };
+    options.interrupted = [&] { return version_ != work.version || stopped_ == work.version; };
+    FitResult result = complete_fit(setup, options, input_.frf.filename().string(), fingerprint_);
+    state.message = fmt::format("{}: {}", to_string(result.status()), result.message());
+    state.cost = result.cost;
+    state.stage = result.status() == FitStatus::interrupted ? FitStage::stopped : FitStage::refined;
+    state.model = std::make_shared<const AdditiveModel>(std::move(result.model));
+    store(work);
+  } catch (const std::invalid_argument& error) {
+    fail(work, error.what());
+  } catch (const FileError& error) {
+    fail(work, error.what());
+  } catch (const std::bad_alloc&) {
+    fail(work, "out of memory; use fewer modes or a narrower band");
+  } catch (const std::exception&) {
+    fail(work, "unexpected error, a bug in stageid; report the command with its input files");
+  }
+}
+
+}  // namespace stageid
