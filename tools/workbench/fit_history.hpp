@@ -16,14 +16,15 @@ namespace stageid {
 /// How far a fit of the workbench is.
 enum class FitStage : std::uint8_t {
   waiting,
-  linear,   ///< a preview, see warm_start()
-  refined,  ///< what `stageid fit` writes
-  stopped,  ///< by the user: the preview remains
+  linear,    ///< a preview, see warm_start()
+  improved,  ///< a better one, see improved()
+  refined,   ///< what `stageid fit` writes
+  stopped,   ///< by the user: the preview remains
   failed
 };
 template <>
-inline constexpr std::array kWords<FitStage> = {"waiting", "linear", "refined", "stopped",
-                                                "failed"};
+inline constexpr std::array kWords<FitStage> = {"waiting", "linear",  "improved",
+                                                "refined", "stopped", "failed"};
 
 /// One fit of the workbench: what was requested, and the result so far.
 struct FitState {

@@ -31,4 +31,12 @@ AdditiveModel warm_start(const FitSetup& setup, const AdditiveModel* before) {
   return fit_additive_model(frf, start, options).model;
 }
 
+AdditiveModel improved(const FitSetup& setup, const AdditiveModel& start,
+                       const std::function<bool()>& enough) {
+  FitOptions options = setup.options;
+  options.uncertainty = false;
+  options.interrupted = enough;
+  return fit_additive_model(setup.frf, start, options).model;
+}
+
 }  // namespace stageid

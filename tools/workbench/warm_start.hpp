@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "estimation/request/fit_request.hpp"
 
 namespace stageid {
@@ -9,5 +11,9 @@ namespace stageid {
 /// @param before null: none
 /// @throws what fit_additive_model() throws
 AdditiveModel warm_start(const FitSetup& setup, const AdditiveModel* before);
+
+/// The second answer: poles, delays and numerators fitted from `start`, until they converge or enough() is true.
+AdditiveModel improved(const FitSetup& setup, const AdditiveModel& start,
+                       const std::function<bool()>& enough);
 
 }  // namespace stageid

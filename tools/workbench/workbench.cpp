@@ -26,7 +26,8 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kLongestName = 64;
 constexpr auto kBetweenCosts = 100ms;
-constexpr auto kFarewell = 2s;  // for pages to read the end
+constexpr auto kImprovement = 1s;  // of the second preview
+constexpr auto kFarewell = 2s;     // for pages to read the end
 
 ReportInput input_of(const std::vector<std::filesystem::path>& files) {
   ReportInput input = report_input(files);
@@ -72,7 +73,8 @@ int modes_in(const FitState& state) {
 }
 
 bool needs_fit(const FitState& state) {
-  return state.stage == FitStage::waiting || state.stage == FitStage::linear;
+  return state.stage == FitStage::waiting || state.stage == FitStage::linear ||
+         state.stage == FitStage::improved;
 }
 
 }  // namespace
@@ -300,7 +302,21 @@ void Workbench::tell_progress(const Work& work, double cost) {
   content_.state.publish(state_text());
 }
 
-/// The preview, then the fit of `stageid fit`.
+/// Two answers that do not wait for the fit: the numerators at once, then what a second of iterations gives.
+void Workbench::preview(const FitSetup& setup, Work& work, const std::function<bool()>& is_over) {
+  const auto show = [&](FitStage stage, AdditiveModel model) {
+    work.state.model = std::make_shared<const AdditiveModel>(std::move(model));
+    work.state.stage = stage;
+    store(work);
+  };
+  show(FitStage::linear, warm_start(setup, work.before.get()));
+  const auto end = std::chrono::steady_clock::now() + kImprovement;
+  show(FitStage::improved, improved(setup, *work.state.model, [&] {
+         return is_over() || std::chrono::steady_clock::now() > end;
+       }));
+}
+
+/// The previews, then the fit of `stageid fit`.
 void Workbench::fit(Work& work) {
   using Modes = ModesRequest::Kind;
   FitState& state = work.state;
@@ -309,14 +325,12 @@ void Workbench::fit(Work& work) {
     request.threads = options_.threads;
     FitSetup setup = make_fit_setup(request, page_.frf());
     setup.options.response_variance = false;
-    if (request.modes.kind == Modes::given || request.modes.kind == Modes::none) {
-      state.model = std::make_shared<const AdditiveModel>(warm_start(setup, work.before.get()));
-      state.stage = FitStage::linear;
-      store(work);
-    }
+    const auto is_over = [&] { return version_ != work.version || stopped_ == work.version; };
+    if (request.modes.kind == Modes::given || request.modes.kind == Modes::none)
+      preview(setup, work, is_over);
     FitOptions options = setup.options;
     options.progress = [&](int, double cost) { tell_progress(work, cost); };
-    options.interrupted = [&] { return version_ != work.version || stopped_ == work.version; };
+    options.interrupted = is_over;
     FitResult result = complete_fit(setup, options, input_.frf.filename().string(), fingerprint_);
     state.message = fmt::format("{}: {}", to_string(result.status()), result.message());
     state.cost = result.cost;

@@ -25,8 +25,8 @@ struct WorkbenchOptions {
   int threads = 0;                             ///< of a fit
 };
 
-/// A page in the browser that edits a fit: modes, band and options, with undo and redo. Each edit is answered by a linear
-/// preview, then by the fit that `stageid fit` would make, with the command line for it. Files are written by the action
+/// A page in the browser that edits a fit: modes, band and options, with undo and redo. Each edit is answered by previews,
+/// see warm_start.hpp, then by the fit that `stageid fit` would make, with the command line for it. Files are written by the action
 /// "save" only.
 ///
 /// Actions, POST /act, JSON: those of edited(); {"kind": "undo"}, "redo", {"kind": "go", "index"}; {"kind": "save",
@@ -70,6 +70,7 @@ class Workbench {
   void changed();
   void run();
   bool next(Work& work);
+  void preview(const FitSetup& setup, Work& work, const std::function<bool()>& is_over);
   void fit(Work& work);
   void store(Work& work);
   void fail(const Work& work, const std::string& why);

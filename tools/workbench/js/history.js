@@ -54,7 +54,7 @@ function statusText({ state, states, index, cost, message }) {
   if (state === 'ended') return 'the program has ended';
   const { stage } = states[index];
   const newest = cost.length ? ', cost ' + number(cost[cost.length - 1], 5) : '';
-  if (state === 'fitting') return (stage === 'linear' ? 'preview; refining' : 'fitting') + newest;
+  if (state === 'fitting') return (stage === 'waiting' ? 'fitting' : 'preview; fitting') + newest;
   return (stage === 'stopped' ? 'stopped' : 'ready') + newest + (message ? ': ' + message : '');
 }
 

@@ -5,6 +5,11 @@ const bench = { state: null, stage: null, trends: [], edition: 0, loading: false
 // Sections that depend on the model, in resultParts; 'trends' is that of the workbench.
 const modelKeys = ['verdict', 'model', 'modes', 'shapes', 'shape_channels', 'geometry', 'decisions', 'cost', 'comparison', 'validation'];
 
+const previews = {
+  linear: 'Preview: the numerators are fitted, poles and delays not yet', improved: 'Preview after a second of iterations; the fit is running',
+  stopped: 'The fit was stopped: this is the best model so far',
+};
+
 // Sends an action; the program answers with a text. Only this page can set the header.
 async function send(path, kind, body) {
   const answer = await fetch(path + location.search, { method: 'POST', headers: { 'X-Stageid': kind }, body });
@@ -54,7 +59,6 @@ async function takeResults(fresh) {
   const responses = content.provenance.filter(({ of }) => of !== 'model');
   content.provenance = responses.concat(fresh.content.provenance);
   Object.assign(bench, { stage: fresh.stage, trends: fresh.trends });
-  if (fresh.stage === 'linear')
-    content.verdict = { level: 'doubt', text: 'Preview: the numerators are fitted, poles and delays are not yet', head: [], reasons: [] };
+  if (previews[fresh.stage]) content.verdict = { level: 'doubt', text: previews[fresh.stage], head: [], reasons: [] };
   curvesOfChannel.clear();
 }

@@ -26,6 +26,6 @@ function provenanceOf(id) {
   if (measuredSections.has(id) || !content.model) return measured;
   const model = inputsOf('model');
   const inputs = (model.inputs || []).map(({ file, fingerprint }) => file + ' (' + fingerprint + ')').join(', ');
-  return [bench.stage === 'linear' ? 'Preview: poles as requested, numerators fitted' : 'Fit ' + (bench.state.index + 1) + ' to ' + (inputs || 'unknown data') + ', stageid ' + (model.stageid_version || '?'),
+  return [previews[bench.stage] || 'Fit ' + (bench.state.index + 1) + ' to ' + (inputs || 'unknown data') + ', stageid ' + (model.stageid_version || '?'),
     bench.state.command, measured].filter(Boolean).join('\n');
 }
