@@ -23,12 +23,15 @@ std::optional<std::array<double, 2>> band_in(const OrderedJson& flags) {
   return std::nullopt;
 }
 
+/// A model is foreign, so no word may name a file to read now.
 FitWords words_of_flags(const OrderedJson& flags) {
   FitWords words;
   const auto take = [&](const char* flag, std::string& word) {
     if (std::string text = text_in(flags, flag); !text.empty()) word = std::move(text);
   };
   take("--modes", words.modes);
+  if (words.modes.find_first_not_of("0123456789.eE+-:,autone") != std::string::npos)
+    words.modes.clear();
   take("--weighting", words.weighting);
   take("--hold", words.hold);
   take("--delay", words.delay);
@@ -57,6 +60,7 @@ FitRequest request_of(const AdditiveModel& model) {
   FitRequest request;
   if (!flags.is_object()) return request;
   parse_fit_words(words_of_flags(flags), request);
+  request.weight_file = request.weight_file.filename();  // a model cannot name files elsewhere
   request.band_hz = band_in(flags);
   if (const auto limit = number_in(options, "max_iterations"))
     request.max_iterations = static_cast<int>(std::clamp(*limit, 1.0, 1e6));

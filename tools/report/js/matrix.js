@@ -39,9 +39,7 @@ function buildMatrix() {
     'Each panel is one sensor over one actuator, named at the edges: magnitude over frequency, both logarithmic, ' +
     'with a common scale. Select a panel to enlarge it, drag across one to zoom all; the arrow keys move between panels, ' +
     '+ and \u2212 zoom, Page Up and Page Down pan, Home shows the whole band.');
-  const legend = element('div', { class: 'legend' }, swatch('measured', 'measured'));
-  if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel'));
-  if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
+  const legend = element('div', { class: 'legend' }, element('span', { class: 'legend', id: 'matrix-legend' }));
   const times = element('input', { type: 'checkbox', id: 'times-omega', onchange: () => {
     matrix.timesOmega = times.checked ? 2 : 0;
     redrawMatrix();
@@ -58,11 +56,19 @@ function buildMatrix() {
   legend.append(saveButtons('frequency response', savedMatrix));
   body.append(legend, bandBar(), element('div', { class: 'matrix-scroll' }, grid),
     element('p', { class: 'quiet', id: 'matrix-scale' }));
+  fillMatrixLegend();
   followBand(() => {
     if (!matrix.pending) matrix.pending = requestAnimationFrame(redrawMatrix);
   });
   plots.add({ resize: () => {}, recolour: redrawMatrix });
   watchPanels();
+}
+
+function fillMatrixLegend() {
+  const legend = document.getElementById('matrix-legend');
+  legend.replaceChildren(swatch('measured', 'measured'));
+  if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel'));
+  if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
 }
 
 // The trace of the compared day or model: its measurement, else its model.
@@ -151,6 +157,7 @@ function drawPanel(channel) {
   if (width === 0) return;
   panel.drawn = true;
   paintPanel(channel, sharpContext(panel.canvas, width, height), width, height);
+  panel.error.textContent = '';
   if (!array('residual')) return;
   const { relativeError } = channelCurves(channel);
   if (relativeError !== null) panel.error.textContent = percent(relativeError);

@@ -7,10 +7,11 @@ function problemItem(problem) {
     ...(problem.command ? [element('code', { class: 'command' }, problem.command)] : []));
 }
 
-function buildHead() {
+// @param page its name
+function buildHead(page = 'report') {
   const head = document.getElementById('head');
   const { verdict, model, validation, frf } = content;
-  head.append(element('p', { class: 'brand' }, 'stageid ' + content.version + ' \u00b7 report'),
+  head.append(element('p', { class: 'brand' }, 'stageid ' + content.version + ' \u00b7 ' + page),
     element('h1', null, content.title || 'Report'),
     element('p', { class: 'verdict ' + verdict.level, id: 'verdict' }, element('span', { class: 'sign', 'aria-hidden': 'true' }), verdict.text));
   if (verdict.head.length) head.append(element('ol', { class: 'steps' }, ...verdict.head.map(problemItem)));

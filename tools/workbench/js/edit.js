@@ -29,10 +29,11 @@ const changingParts = new Set(['modes', 'shapes', 'comparison', 'trends', 'valid
 function showResults() {
   const top = window.scrollY;
   document.getElementById('head').replaceChildren();
-  buildHead();
+  buildHead('workbench');
   resultParts.forEach(([id], place) => {
     if (changingParts.has(id)) rebuild(resultParts, place);
   });
+  fillMatrixLegend();
   redrawMatrix();
   showEntry(entry.channel);
   if (content.arrays.cmif) drawCmif();

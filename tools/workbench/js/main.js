@@ -4,7 +4,7 @@ responseParts.unshift(responseParts.pop());  // the diagram is the tool, so it c
 resultParts.splice(resultParts.findIndex(([id]) => id === 'comparison') + 1, 0,
   ['trends', () => bench.trends.length && bench.trends.some((one) => one.own), () => buildTrends()]);
 
-buildHead();
+buildHead('workbench');
 readBlocks().then(() => {
   buildBench();
   buildSections();
@@ -23,5 +23,5 @@ function listen() {
   };
   stream.onerror = () => { session.status.textContent = 'connection to the program lost; reconnecting'; };
   window.addEventListener('pagehide', () => stream.close());
-  Object.assign(window.stageidReport, { bench, act, diagramFrame, trendRows });
+  Object.assign(window.stageidReport, { bench, act, diagramFrame, trendRows, nyquistShown: () => [nyquist.shown.low, nyquist.shown.high] });
 }

@@ -1,14 +1,14 @@
 // Frequency and damping of a mode over all compared results, with 95 % bands, and the differences in deviations.
 
-const trends = { mode: 0, kind: 'frequency_hz', figures: [] };
+const trends = { mode: null, figures: [] };
 
 const trendKinds = { frequency_hz: ['frequency_std_hz', 'Natural frequency, difference from this fit [%]'], damping_ratio: ['damping_std', 'Damping ratio, difference from this fit [%]'] };
 
 function buildTrends() {
   const body = section('trends', 'Trends', 'Trends', 'Modes of this fit in the results to compare with, and the newest fit last; bands contain the true value with 95\u00a0% probability. ' +
     'Deviations are in standard deviations of the difference of two independent estimates.');
-  const own = bench.trends[0].own || [];
-  trends.mode = Math.min(trends.mode, Math.max(0, own.length - 1));
+  const { own = [] } = bench.trends.find((one) => one.own) || {};
+  if (trends.mode === null || trends.mode >= own.length) trends.mode = own.length ? strongestShape() : 0;
   const pick = element('select', { id: 'trend-mode', onchange: () => showTrend(Number(pick.value)) },
     ...own.map((mode, i) => element('option', { value: i }, fixed(mode.frequency_hz) + ' Hz')));
   trends.table = element('div', { id: 'trend-table' });
@@ -46,22 +46,26 @@ function showTrend(mode) {
   for (const figure of trends.figures) figure.redraw();
 }
 
+function axisText(value) {
+  return value === 0 ? '0' : (value < 0 ? '\u2212' : '+') + String(Number(Math.abs(value).toPrecision(2)));
+}
+
 function drawTrend(context, width, height, kind) {
   const rows = trendRows(kind);
   if (!rows.length) return;
   const area = { x: 62, y: 8, w: width - 74, h: height - 34 };
-  const most = Math.max(1e-9, ...rows.map((row) => Math.abs(row.value) + row.half)) * 1.1;
+  const most = Math.max(1e-6, ...rows.map((row) => Math.abs(row.value) + row.half)) * 1.1;
   const x = (i) => area.x + area.w * (i + 0.5) / rows.length;
   const y = (value) => area.y + area.h * (0.5 - 0.5 * value / most);
   const colours = palette();
   for (const value of [-most / 1.1, 0, most / 1.1]) {
-    drawText(context, number(value, 2), area.x - 6, y(value), { align: 'right', base: 'middle' });
+    drawText(context, axisText(value), area.x - 6, y(value), { align: 'right', base: 'middle' });
     context.strokeStyle = value === 0 ? colours.frame : colours.grid;
     drawLine(context, area.x, y(value), area.x + area.w, y(value));
   }
-  context.strokeStyle = context.fillStyle = colours.curves[0];
   context.lineWidth = 1.5;
   rows.forEach((row, i) => {
+    context.strokeStyle = context.fillStyle = colours.curves[0];
     drawLine(context, x(i), y(row.value - row.half), x(i), y(row.value + row.half));
     circle(context, x(i), y(row.value), 3.5);
     context.fill();
