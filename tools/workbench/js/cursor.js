@@ -14,6 +14,7 @@ function cursorFrames() {
 }
 
 function followPointer() {
+  window.addEventListener('resize', () => showCursor(null));  // places are in pixels
   document.getElementById('main').addEventListener('pointermove', (event) => {
     const frame = cursorFrames().find(({ node }) => node.contains(event.target));
     if (!frame) return showCursor(null);
