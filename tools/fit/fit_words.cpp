@@ -42,8 +42,8 @@ std::vector<ModeCandidate> parse_frequencies(const std::string& text) {
     if (!frequency_hz || *frequency_hz <= 0.0 || !damping_ratio || *damping_ratio <= 0.0 ||
         *damping_ratio >= 1.0)
       refuse("--modes", text,
-             "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', each with a damping "
-             "ratio below 1 if you like ('f1:0.01'), or a file");
+             "auto, none, a number of modes, frequencies in Hz 'f1,f2,...', the same with damping "
+             "ratios 'f1:0.01,...', or a file");
     modes.push_back({*frequency_hz, *damping_ratio});
     rest.remove_prefix(std::min(one.size() + 1, rest.size()));
   }

@@ -1,6 +1,9 @@
 #include "tools/workbench/warm_start.hpp"
 
+#include <memory>
+
 #include "estimation/model/model_structure.hpp"
+#include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 
 namespace stageid {
@@ -35,7 +38,7 @@ AdditiveModel improved(const FitSetup& setup, const AdditiveModel& start,
                        const std::function<bool()>& enough) {
   FitOptions options = setup.options;
   options.uncertainty = false;
-  options.interrupted = enough;
+  options.limit = std::make_shared<SearchLimit>(0.0, enough);
   return fit_additive_model(setup.frf, start, options).model;
 }
 
