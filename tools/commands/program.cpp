@@ -107,8 +107,8 @@ class Program {
     for (const auto command :
          {identify_command, design_command, run_command, log_command, frf_command, modes_command,
           fit_command, validate_command, watch_command, export_command, import_command,
-          fleet_command, report_command, open_command, plot_command, config_command, node_command, manual_command,
-          help_command})
+          fleet_command, report_command, open_command, plot_command, config_command, node_command,
+          manual_command, help_command})
       command(app_, console_);
     app_.name("stageid");
     app_.set_version_flag("--version", fmt::format("stageid {}", version()));
