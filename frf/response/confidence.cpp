@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -52,6 +53,14 @@ double mean_relative_variance(const FrfEstimate& frf, VarianceKind kind) {
     sum += (line.rowwise().sum().array() / size.array()).mean();
   }
   return sum / static_cast<double>(frf.lines());
+}
+
+std::optional<double> worst_relative_variance(const FrfEstimate& frf) {
+  double variance = 0.0;
+  if (frf.noise_variance.size() > 0) variance = mean_relative_variance(frf, VarianceKind::noise);
+  if (frf.total_variance.size() > 0)
+    variance = std::max(variance, mean_relative_variance(frf, VarianceKind::total));
+  return variance > 0.0 ? std::optional(variance) : std::nullopt;
 }
 
 }  // namespace stageid

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 
 #include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
@@ -37,5 +38,9 @@ Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, Variance
 /// Rows are not mixed, because outputs may differ in unit. Zeros of single entries do not dominate it.
 /// @throws std::invalid_argument if the variance is unknown, or an output is zero on a line.
 double mean_relative_variance(const FrfEstimate& frf, VarianceKind kind);
+
+/// The larger one of noise and total variance, as far as they are known; none if neither is known, or both are zero.
+/// @throws as mean_relative_variance()
+std::optional<double> worst_relative_variance(const FrfEstimate& frf);
 
 }  // namespace stageid

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kEventsShown = 14;
+constexpr std::size_t kEventsShown = 60;
 
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
@@ -103,9 +103,13 @@ std::string dashboard_content_json(const ExperimentConfig& config, const Experim
 
 Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
                      const ExperimentPlan& plan, const StageInfo& stage,
-                     const std::filesystem::path& log, int runs_before)
+                     const std::filesystem::path& log, int runs_before,
+                     std::optional<double> wanted_variance)
     : runs_before_(runs_before),
+      wanted_variance_(wanted_variance),
       levels_(static_cast<Eigen::Index>(stage.actuators.size() + stage.sensors.size())),
+      traces_(static_cast<Eigen::Index>(stage.actuators.size() + stage.sensors.size()),
+              stage.sample_rate_hz),
       response_(log, config.frf, content_.response) {
   progress_.runs_total = static_cast<int>(plan.runs().size()) - runs_before;
   content_.page = html_page(HtmlPage::dashboard,
@@ -121,10 +125,20 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
     const StageWatch* const watch = watch_;
     return watch != nullptr ? watch->history_json() : "{}";
   };
+  content_.trace = [this](int channel) { return traces_.json(channel); };
   content_.watched = [this] { response_.watch(); };
   shown_levels_ = levels_.take();
   publish();
   server_ = std::make_unique<DashboardServer>(address, content_);
+}
+
+/// Mean relative variance so far, and the one at which the measurement ends; null: unknown.
+nlohmann::json Dashboard::accuracy_json() const {
+  const std::optional<LiveAccuracy> reached = response_.accuracy();
+  if (!reached) return {};
+  return {{"variance", reached->variance},
+          {"realizations", reached->realizations},
+          {"wanted", wanted_variance_ ? Json(*wanted_variance_) : Json()}};
 }
 
 /// What changes during a measurement, for the script of the page: one line.
@@ -147,6 +161,7 @@ std::string Dashboard::state_json() const {
         {"rms", list(shown_levels_.rms)},
         {"largest_peak", list(shown_levels_.largest_peak)}}},
       {"response", {{"edition", content_.response.get().number}, {"status", response_.status()}}},
+      {"accuracy", accuracy_json()},
       {"supervisor", plant_ ? plant_json(plant_()) : Json()},
       {"watch", watch != nullptr ? Json(watch->state()) : Json()},
       {"watchers", server_ ? server_->watchers() : 0},
@@ -164,7 +179,9 @@ void Dashboard::publish() { content_.state.publish(state_json()); }
 
 const std::string& Dashboard::url() const noexcept { return server_->url(); }
 
-std::vector<RunObserver*> Dashboard::observers() noexcept { return {&levels_, &response_}; }
+std::vector<RunObserver*> Dashboard::observers() noexcept {
+  return {&levels_, &traces_, &response_};
+}
 
 void Dashboard::watch(EventLog& events) noexcept {
   events_ = &events;

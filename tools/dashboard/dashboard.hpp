@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,12 +15,13 @@
 #include "tools/dashboard/dashboard_server.hpp"
 #include "tools/dashboard/live_levels.hpp"
 #include "tools/dashboard/live_response.hpp"
+#include "tools/dashboard/live_traces.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
 
-/// Shows an experiment in a browser while it is measured: progress, levels against limits, states,
+/// Shows an experiment in a browser while it is measured: progress, accuracy, levels against limits, traces, states,
 /// misses, timing, response and CMIF, and a button that stops it as Ctrl-C does.
 ///
 /// It reads samples only after they were logged (RunObserver), and the counts of the loop only through
@@ -29,7 +31,7 @@ class Dashboard {
   /// Starts to listen and serve. @throws StageError, std::invalid_argument as DashboardServer.
   Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
             const ExperimentPlan& plan, const StageInfo& stage, const std::filesystem::path& log,
-            int runs_before);
+            int runs_before, std::optional<double> wanted_variance);
   Dashboard(const Dashboard&) = delete;
   Dashboard& operator=(const Dashboard&) = delete;
 
@@ -55,11 +57,13 @@ class Dashboard {
   using SteadyClock = std::chrono::steady_clock;
   void publish();
   std::string state_json() const;
+  nlohmann::json accuracy_json() const;
 
   DashboardContent content_;
   const char* state_ = "starting";  ///< starting, running, stopping, estimating, ended
   ExperimentProgress progress_;
-  int runs_before_;  ///< already complete in the log
+  int runs_before_;                        ///< already complete in the log
+  std::optional<double> wanted_variance_;  ///< of --until
   SteadyClock::time_point start_ = SteadyClock::now();
   double wall_s_ = 0.0;  ///< since the first cycle
   Levels shown_levels_;
@@ -70,6 +74,7 @@ class Dashboard {
   std::atomic<EventLog*> events_ = nullptr;
   std::atomic<bool> aborted_ = false;
   LiveLevels levels_;
+  LiveTraces traces_;
   LiveResponse response_;
   std::unique_ptr<DashboardServer> server_;  // last: its threads use all other members
 };

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <thread>
@@ -232,6 +233,12 @@ struct DashboardServer::State {
     });
     server.Get("/watch.json", [this](const httplib::Request&, httplib::Response& response) {
       response.set_content(content.history(), "application/json");
+    });
+    server.Get("/trace.json", [this](const httplib::Request& request, httplib::Response& response) {
+      const std::string text = request.get_param_value("channel");
+      int channel = -1;
+      std::from_chars(text.data(), text.data() + text.size(), channel);
+      response.set_content(content.trace(channel), "application/json");
     });
     server.Get("/metrics", [this](const httplib::Request&, httplib::Response& response) {
       const LatestText::Edition edition = content.state.get();

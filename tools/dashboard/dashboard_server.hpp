@@ -22,6 +22,8 @@ struct DashboardContent {
   LatestText state;     ///< the stream: one JSON object per line
   LatestText response;  ///< JSON of the newest FRF
   std::function<std::string()> history = [] { return "{}"; };  ///< JSON of what a watch has tracked
+  /// JSON of the last seconds of a channel, see LiveTraces.
+  std::function<std::string(int channel)> trace = [](int) { return "{}"; };
   std::function<void()> abort;            ///< called at the request of a watcher; must not block
   std::function<void()> watched = [] {};  ///< called when a watcher connects
   std::function<ActionReply(const std::string& body)> act = {};  ///< from any thread; empty: none
@@ -29,7 +31,7 @@ struct DashboardContent {
 };
 
 /// Serves a page, the stream of its state (server-sent events), the newest response, the abort, and actions:
-///   GET /   GET /events   GET /response.json   GET /watch.json   GET /metrics   POST /abort   POST /act
+///   GET /   GET /events   GET /response.json   GET /watch.json   GET /trace.json?channel=N   GET /metrics   POST /abort   POST /act
 ///
 /// It has its own threads of low priority and at most kWatchers streams at once (then 503). A watcher receives the
 /// newest state when it is ready to read; nothing is queued for slow watchers, and one that does not read for

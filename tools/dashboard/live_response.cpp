@@ -12,6 +12,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/plant/zippered_fit.hpp"
+#include "frf/response/confidence.hpp"
 #include "tools/report/report_json.hpp"
 #include "tools/terminal/exit_code.hpp"
 
@@ -87,6 +88,11 @@ std::string LiveResponse::status() const {
   return status_;
 }
 
+std::optional<LiveAccuracy> LiveResponse::accuracy() const {
+  const std::lock_guard lock(mutex_);
+  return accuracy_;
+}
+
 void LiveResponse::set_status(std::string status) {
   const std::lock_guard lock(mutex_);
   status_ = std::move(status);
@@ -119,6 +125,12 @@ void LiveResponse::update() {
   const FrfEstimate frf = estimate_plant_frf({log.get()}, options_);
   response_.publish(page_json(frf));
   realizations_ = complete;
+  const std::optional<double> variance = worst_relative_variance(frf);
+  {
+    const std::lock_guard lock(mutex_);
+    accuracy_.reset();
+    if (variance) accuracy_ = {*variance, frf.realizations};
+  }
   set_status(fmt::format("from {} of {}", counted(frf.realizations, "realization"),
                          counted(frf.periods, "period")));
 }

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -17,6 +18,12 @@ class LogReader;
 
 /// Number of complete realizations of a log: those with the largest number of different complete experiments.
 int complete_realizations(const LogReader& log);
+
+/// Of a response from the realizations so far.
+struct LiveAccuracy {
+  double variance = 0.0;  ///< mean relative, see worst_relative_variance()
+  int realizations = 0;
+};
 
 /// The frequency response and its CMIF during a measurement. Whenever one more realization is complete in the log,
 /// they are estimated from it by estimate_plant_frf(), as `stageid frf` does. Uses its own thread of lowest priority,
@@ -39,6 +46,8 @@ class LiveResponse final : public RunObserver {
   void catch_up();
   /// One line for people: the shown response, or why there is none.
   std::string status() const;
+  /// Of the shown response; none as long as its variance is unknown.
+  std::optional<LiveAccuracy> accuracy() const;
 
  private:
   void run();
@@ -55,6 +64,7 @@ class LiveResponse final : public RunObserver {
   int asked_ = 1;  ///< completed runs so far, plus one for those present at the start
   int done_ = 0;
   std::string status_ = "waiting for the first complete realization";
+  std::optional<LiveAccuracy> accuracy_;
   std::atomic<bool> stop_ = false;
   int realizations_ = 0;  // shown; only used by the thread itself
   std::thread thread_;

@@ -104,7 +104,7 @@ std::unique_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
                                           int runs_before, const Console& console) {
   if (!request.dashboard) return nullptr;
   auto dashboard = std::make_unique<Dashboard>(*request.dashboard, config, plan, stage, request.log,
-                                               runs_before);
+                                               runs_before, request.until);
   console.warning("dashboard: " + dashboard->url());
   return dashboard;
 }

@@ -57,11 +57,7 @@ void UntilVariance::look() {
   if (complete_realizations(*log) == 0) return;
   const FrfEstimate frf = estimate_plant_frf({log.get()}, options_);
   realizations_ = frf.realizations;
-  double variance = 0.0;
-  if (frf.noise_variance.size() > 0) variance = mean_relative_variance(frf, VarianceKind::noise);
-  if (frf.total_variance.size() > 0)
-    variance = std::max(variance, mean_relative_variance(frf, VarianceKind::total));
-  if (variance > 0.0) reached_ = variance;
+  reached_ = worst_relative_variance(frf);
 }
 
 }  // namespace stageid

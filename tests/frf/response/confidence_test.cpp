@@ -120,6 +120,19 @@ TEST(RelativeVariance, IsTheMeanOverLinesAndOutputs) {
                    ((0.1 + 0.03) / 2.0 + 1.0) / 2.0);
 }
 
+TEST(RelativeVariance, TheWorstOneIsTheLargerOfThoseThatAreKnown) {
+  FrfEstimate frf = small_frf();
+  const double noise = mean_relative_variance(frf, VarianceKind::noise);
+  EXPECT_DOUBLE_EQ(worst_relative_variance(frf).value(), noise);
+  frf.total_variance = 3.0 * frf.noise_variance;
+  EXPECT_DOUBLE_EQ(worst_relative_variance(frf).value(), 3.0 * noise);
+  frf.total_variance *= 0.1;
+  EXPECT_DOUBLE_EQ(worst_relative_variance(frf).value(), noise);
+  frf.noise_variance.resize(0, 0);
+  frf.total_variance.resize(0, 0);
+  EXPECT_FALSE(worst_relative_variance(frf));
+}
+
 TEST(RelativeVariance, DoesNotDependOnTheUnitOfAnOutput) {
   FrfEstimate frf = small_frf();
   const double before = mean_relative_variance(frf, VarianceKind::noise);

@@ -1,6 +1,7 @@
 // The server of the dashboard by itself: permissions, and watchers that do not read.
 #include "tools/dashboard/dashboard_server.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <httplib.h>
@@ -129,6 +130,15 @@ TEST_F(DashboardServerTest, ServesMetricsAndTheHistoryOfAWatch) {
               testing::StartsWith("text/plain; version=0.0.4"));
   EXPECT_THAT(metrics->body, testing::HasSubstr("\nstageid_cycles_total 7\n"));
   EXPECT_EQ(client().Get("/watch.json")->body, "{3}");
+}
+
+TEST_F(DashboardServerTest, ServesTheTraceOfAChannel) {
+  content_.trace = [](int channel) { return fmt::format("{{{}}}", channel); };
+  serve();
+  EXPECT_EQ(client().Get("/trace.json?channel=3")->body, "{3}");
+  for (const char* wrong : {"/trace.json", "/trace.json?channel=",
+                            "/trace.json?channel=99999999999", "/trace.json?channel=x"})
+    EXPECT_EQ(client().Get(wrong)->body, "{-1}") << wrong;
 }
 
 TEST_F(DashboardServerTest, ClientsThatTrickleTheirHeaderDoNotLockOthersOut) {

@@ -26,15 +26,26 @@ function showSupervisor(state) {
 function buildEvents() {
   const list = table([], [], '', 'events');
   side.events = list.querySelector('tbody');
-  section('events', 'Events', 'Events', 'Newest first. The event log next to the log contains all of them.').append(list);
+  section('events', 'Events', 'Events', 'The newest of each kind. The event log next to the log contains all of them.').append(list);
 }
 
 function showEvents(state) {
   const key = JSON.stringify(state.events[state.events.length - 1] || null) + state.events.length;
   if (side.key === key) return;
   side.key = key;
-  side.events.replaceChildren(...state.events.filter(Boolean).reverse().map((event) => tableRow(
-    [String(event.time_utc).slice(11, 23), String(event.event).replace(/_/g, ' '), element('td', { class: 'quiet' }, eventText(event))])));
+  side.events.replaceChildren(...eventGroups(state.events.filter(Boolean).reverse()).map(({ event, times }) => tableRow(
+    [String(event.time_utc).slice(11, 23), String(event.event).replace(/_/g, ' ') + (times > 1 ? ' \u00d7\u00a0' + times : ''), element('td', { class: 'quiet' }, eventText(event))])));
+}
+
+// Each kind as its newest event; changes of the stage each by itself.
+function eventGroups(events) {
+  const groups = [];
+  for (const event of events) {
+    const same = groups.find((group) => group.event.event === event.event);
+    if (same && event.event !== 'change') same.times++;
+    else groups.push({ event, times: 1 });
+  }
+  return groups;
 }
 
 const hiddenFields = new Set(['time_utc', 'event', 'measurement_id']);

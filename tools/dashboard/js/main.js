@@ -9,7 +9,7 @@ function showState(state) {
   showTiming(state);
   showSupervisor(state);
   showEvents(state);
-  const loaded = Promise.all([fetchResponse(state.response.edition), showWatch(state)]);
+  const loaded = Promise.all([fetchResponse(state.response.edition), showWatch(state), fetchTraces()]);
   if (state.state !== 'ended') return;
   ended = true;
   // The program waits for this page to disconnect, so fetch what is last first.
@@ -21,6 +21,7 @@ function showState(state) {
 
 buildProgress();
 buildLevels();
+buildTraces();
 buildTiming();
 buildEvents();
 

@@ -42,11 +42,22 @@ function showProgress(state) {
   head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
 }
 
+// Relative rms error of the response so far; with a wanted one, the time until it: the variance falls with the number of realizations.
+function accuracyFigures({ accuracy, runs_total: runs, runs_done: done, seconds_left: left }) {
+  if (!accuracy) return [];
+  const list = [['accuracy so far', percent(Math.sqrt(accuracy.variance)) + ' rms']];
+  if (accuracy.wanted === null) return list;
+  const needed = Math.ceil(accuracy.realizations * accuracy.variance / accuracy.wanted);
+  const when = accuracy.variance <= accuracy.wanted ? 'reached' : needed > shown.realizations ? 'not within ' + plural(shown.realizations, 'realization') : 'in ' + duration(left * (needed * runs / shown.realizations - done) / (runs - done));
+  return [...list, ['wanted ' + percent(Math.sqrt(accuracy.wanted)), when]];
+}
+
 function figures(state) {
   const list = [
     ['runs complete', state.runs_done + ' of ' + state.runs_total],
     ['time left', state.state === 'ended' ? '\u2013' : duration(state.seconds_left)],
     ['measured', duration(state.seconds_done)],
+    ...accuracyFigures(state),
     ['stage', state.state === 'ended' ? '\u2013' : state.node_state],
     ...['late', 'missing', 'marked', 'irregular'].map((name) => [name, flagged(state.health[name])]),
   ];
