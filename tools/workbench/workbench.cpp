@@ -92,7 +92,7 @@ Workbench::Workbench(const WorkbenchOptions& options)
   content_.secret = true;
   content_.act = [this](const std::string& body) { return act(body); };
   content_.abort = [this] { stopped_ = version_.load(); };
-  content_.state.publish(state_json());
+  show();
   server_ = std::make_unique<DashboardServer>(
       DashboardAddress{"127.0.0.1", options_.port, "--port"}, content_);
   thread_ = std::thread([this] { run(); });
@@ -136,7 +136,7 @@ ActionReply Workbench::act_locked(const Json& action) {
                                        : index >= 0.0 && index < FitHistory::kMost &&
                                              history_.go(static_cast<std::size_t>(index));
     if (!done) return {409, fmt::format("{}: there is no such fit", kind)};
-    changed();
+    change();
     return {200, "done"};
   }
   Edit edit = edited(action, editable());
@@ -144,7 +144,7 @@ ActionReply Workbench::act_locked(const Json& action) {
   state.what = std::move(edit.what);
   state.request = std::move(edit.request);
   history_.push(std::move(state));
-  changed();
+  change();
   return {200, "done"};
 }
 
@@ -174,7 +174,7 @@ ActionReply Workbench::save(const std::string& name) {
     return {409, fmt::format("{} exists; choose another name", file.string())};
   write_model(file, *state.model);
   state.saved = file;
-  changed();
+  show();
   return {200, file.string()};
 }
 
@@ -187,7 +187,7 @@ ActionReply Workbench::keep() {
                                 ? fmt::format("fit {}: {}", history_.index() + 1, state.what)
                                 : state.saved.filename().string();
   compared_.push_back(page_.compared({title, *state.model, std::nullopt}));
-  changed();
+  show();
   return {200, title};
 }
 
@@ -197,7 +197,7 @@ ActionReply Workbench::choose(const Json& action) {
     return {409, "compare: there is no such result"};
   chosen_.reset();
   if (index >= 0.0) chosen_ = static_cast<std::size_t>(index);
-  changed();
+  show();
   return {200, "done"};
 }
 
@@ -216,9 +216,9 @@ std::string Workbench::state_json() const {
 
 std::string Workbench::state_text() const {
   const FitState& current = history_.current();
-  Json json = {{"state", ending_                          ? "ended"
-                         : fitting_ || needs_fit(current) ? "fitting"
-                                                          : "ready"},
+  Json json = {{"state", ending_              ? "ended"
+                         : needs_fit(current) ? "fitting"
+                                              : "ready"},
                {"index", history_.index()},
                {"states", Json::array()},
                {"command", history_.index() == 0 && !current.model ? "" : command()},
@@ -241,54 +241,52 @@ std::string Workbench::state_text() const {
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
-/// The current state is another one, or is to be shown differently.
-void Workbench::changed() {
+/// Publishes the current state with its results, unless it has none yet.
+void Workbench::show() {
+  if (history_.current().stage != FitStage::waiting) {
+    content_.response.publish(page_.results(history_.current(), compared_, chosen_));
+    edition_ = content_.response.get().number;
+  }
+  content_.state.publish(state_text());
+}
+
+/// Another state is current: ends a running fit, and begins that of the state.
+void Workbench::change() {
   ++version_;
   error_.clear();
-  content_.state.publish(state_text());
+  show();
   wake_.notify_all();
 }
 
 bool Workbench::next(Work& work) {
   std::unique_lock lock(mutex_);
-  wake_.wait(lock, [&] { return ending_ || version_ != work.version; });
+  wake_.wait(
+      lock, [&] { return ending_ || (version_ != work.version && needs_fit(history_.current())); });
   if (ending_) return false;
   const std::size_t index = history_.index();
-  work = {version_, history_.current(), index > 0 ? history_.states()[index - 1].model : nullptr,
-          compared_, chosen_};
-  fitting_ = needs_fit(work.state);
+  work = {version_, history_.current(), index > 0 ? history_.states()[index - 1].model : nullptr};
   return true;
 }
 
 void Workbench::run() {
   Work work;
-  while (next(work)) {
-    if (work.state.model || work.state.stage != FitStage::waiting) store(work);
-    if (needs_fit(work.state)) fit(work);
-  }
+  while (next(work)) fit(work);
 }
 
-/// Shows the results so far, unless another state is current by now.
-void Workbench::store(Work& work) {
-  std::string results = page_.results(work.state, work.compared, work.chosen);
+/// Takes over the results so far, unless another state is current by now.
+void Workbench::store(const Work& work) {
   const std::lock_guard lock(mutex_);
   if (version_ != work.version) return;
-  FitState& current = history_.current();
-  current = work.state;
-  fitting_ = needs_fit(work.state);
-  content_.response.publish(std::move(results));
-  edition_ = content_.response.get().number;
-  content_.state.publish(state_text());
+  history_.current() = work.state;
+  show();
 }
 
 void Workbench::fail(const Work& work, const std::string& why) {
   const std::lock_guard lock(mutex_);
   if (version_ != work.version) return;
-  const std::string what = history_.current().what;
   history_.drop();
-  changed();
-  error_ = fmt::format("{}: {}", what, why);
-  fitting_ = false;
+  change();
+  error_ = fmt::format("{}: {}", work.state.what, why);
   content_.state.publish(state_text());
 }
 

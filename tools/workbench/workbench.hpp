@@ -52,12 +52,11 @@ class Workbench {
   std::string state_json() const;
 
  private:
+  /// A fit that the thread makes, and the results so far.
   struct Work {
     std::uint64_t version = 0;
     FitState state;
-    std::shared_ptr<const AdditiveModel> before;
-    std::vector<std::shared_ptr<const Compared>> compared;
-    std::optional<std::size_t> chosen;
+    std::shared_ptr<const AdditiveModel> before;  ///< model of the state before; null: none
   };
 
   ActionReply act_locked(const nlohmann::json& action);
@@ -67,12 +66,13 @@ class Workbench {
   FitRequest editable() const;
   std::string command() const;
   std::string state_text() const;
-  void changed();
+  void show();
+  void change();
   void run();
   bool next(Work& work);
   void preview(const FitSetup& setup, Work& work, const std::function<bool()>& is_over);
   void fit(Work& work);
-  void store(Work& work);
+  void store(const Work& work);
   void fail(const Work& work, const std::string& why);
   void tell_progress(const Work& work, double cost);
 
@@ -88,10 +88,10 @@ class Workbench {
   std::vector<std::shared_ptr<const Compared>> compared_;
   std::optional<std::size_t> chosen_;
   std::string error_;  ///< of the last fit
-  bool fitting_ = false;
   bool ending_ = false;
   std::uint64_t edition_ = 0;
-  std::atomic<std::uint64_t> version_ = 1;  ///< of what the thread has to show
+  std::atomic<std::uint64_t> version_ =
+      1;  ///< of the current state; another one ends a running fit
   std::atomic<std::uint64_t> stopped_ = 0;  ///< the version whose fit the user stopped
   std::chrono::steady_clock::time_point told_{};
 

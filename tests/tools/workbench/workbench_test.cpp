@@ -149,7 +149,7 @@ TEST_F(WorkbenchTest, ComparesWithFitsOfTheSession) {
   done({{"kind", "remove"}, {"frequency_hz", 181.15}});
   const int edition = state()["edition"];
   EXPECT_EQ(done({{"kind", "compare"}, {"index", 0}})["chosen"], 0);
-  for (int i = 0; i < 1000 && state()["edition"] == edition; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_GT(state()["edition"], edition) << "the page has to fetch the curves";
   httplib::Client client("127.0.0.1",
                          std::stoi(bench_->url().substr(bench_->url().find(':', 7) + 1)));
   const std::string token = bench_->url().substr(bench_->url().find('?'));

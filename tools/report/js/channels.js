@@ -65,10 +65,17 @@ function mapValues(values, apply) {
   return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value && apply(value)]));
 }
 
-// Over the lines with a response.
+// The first and the last line to which the model was fitted.
+function fittedLines() {
+  const [low, high] = content.model ? content.model.band_hz : [0, 0];
+  return high > low ? bandLines(low, high) : [0, content.frf.lines - 1];
+}
+
+// Over the fitted lines with a response.
 function relativeRms(errors, values) {
   let sum = 0, used = 0;
-  for (let k = 0; k < values.length; ++k) {
+  const [first, last] = fittedLines();
+  for (let k = first; k <= last; ++k) {
     if (!(values[k] > 0)) continue;
     sum += (errors[k] / values[k]) ** 2;
     ++used;
