@@ -2,9 +2,8 @@
 
 #include <chrono>
 #include <cstdio>
-#include <filesystem>
+#include <stdexcept>
 #include <thread>
-#include <vector>
 
 #include "tools/commands/command_line.hpp"
 #include "tools/commands/commands.hpp"
