@@ -17,6 +17,18 @@ function buildBench() {
     element('p', { class: 'plot-title' }, 'Command line that reproduces this fit'), session.command);
 }
 
+// Ctrl-Z and Ctrl-Y, or with the Command key, unless a text is edited.
+function undoKeys() {
+  document.addEventListener('keydown', (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.target.closest('input, select')) return;
+    const key = event.key.toLowerCase();
+    const kind = key === 'y' || (key === 'z' && event.shiftKey) ? 'redo' : key === 'z' ? 'undo' : null;
+    if (!kind) return;
+    event.preventDefault();
+    act({ kind });
+  });
+}
+
 function buildSave() {
   session.name = element('input', { id: 'save-name', maxlength: '64', pattern: '[A-Za-z0-9_\\-]+', required: '', placeholder: 'name', 'aria-label': 'Name of the model' });
   session.save = element('form', { class: 'entry-pick', id: 'save-form', onsubmit: (event) => {

@@ -9,6 +9,7 @@ readBlocks().then(() => {
   buildBench();
   buildSections();
   if (stability.figure) equipDiagram();
+  undoKeys();
   followPointer();
   tellProvenance();
   listen();
