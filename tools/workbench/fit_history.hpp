@@ -35,6 +35,10 @@ struct FitState {
   std::vector<double> cost = {};                         ///< of the refinement so far
   std::string message = {};                              ///< how the fit ended, or why it failed
   std::filesystem::path saved = {};                      ///< the model file; empty: not saved
+
+  bool needs_fit() const noexcept {
+    return stage == FitStage::waiting || stage == FitStage::linear || stage == FitStage::improved;
+  }
 };
 
 /// The fits of a session in their order, with undo and redo. Never empty.

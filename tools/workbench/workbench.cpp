@@ -9,8 +9,6 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
-#include "acquisition/files/json_members.hpp"
-#include "acquisition/files/json_text.hpp"
 #include "estimation/request/request_flags.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/problem_commands.hpp"
@@ -24,7 +22,6 @@ namespace {
 using namespace std::chrono_literals;
 using Json = nlohmann::json;
 
-constexpr std::size_t kLongestName = 64;
 constexpr auto kBetweenCosts = 100ms;
 constexpr auto kImprovement = 1s;  // of the second preview
 constexpr auto kFarewell = 2s;     // for pages to read the end
@@ -61,20 +58,10 @@ FitState first_state(const ReportInput& input) {
   return state;
 }
 
-bool is_plain_name(const std::string& name) {
-  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  return !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, plain);
-}
-
 int modes_in(const FitState& state) {
   if (!state.model) return static_cast<int>(state.request.modes.given.size());
   return static_cast<int>(
       std::ranges::count_if(state.model->submodels, [](const Submodel& s) { return s.is_mode(); }));
-}
-
-bool needs_fit(const FitState& state) {
-  return state.stage == FitStage::waiting || state.stage == FitStage::linear ||
-         state.stage == FitStage::improved;
 }
 
 }  // namespace
@@ -111,96 +98,6 @@ Workbench::~Workbench() {
   thread_.join();
 }
 
-ActionReply Workbench::act(const std::string& body) {
-  const auto action = parse_json<Json>(body);
-  if (!action.is_object()) return {400, "expected a JSON object"};
-  const std::lock_guard lock(mutex_);
-  try {
-    return act_locked(action);
-  } catch (const std::invalid_argument& error) {
-    return {400, error.what()};
-  } catch (const FileError& error) {
-    return {409, error.what()};
-  }
-}
-
-ActionReply Workbench::act_locked(const Json& action) {
-  const std::string kind = text_in(action, "kind");
-  if (kind == "save") return save(text_in(action, "name"));
-  if (kind == "keep") return keep();
-  if (kind == "compare") return choose(action);
-  if (kind == "undo" || kind == "redo" || kind == "go") {
-    const double index = number_in(action, "index").value_or(-1.0);
-    const bool done = kind == "undo"   ? history_.undo()
-                      : kind == "redo" ? history_.redo()
-                                       : index >= 0.0 && index < FitHistory::kMost &&
-                                             history_.go(static_cast<std::size_t>(index));
-    if (!done) return {409, fmt::format("{}: there is no such fit", kind)};
-    change();
-    return {200, "done"};
-  }
-  Edit edit = edited(action, editable());
-  FitState state;
-  state.what = std::move(edit.what);
-  state.request = std::move(edit.request);
-  history_.push(std::move(state));
-  change();
-  return {200, "done"};
-}
-
-/// The request that an edit changes: the current one, from the poles of its model.
-FitRequest Workbench::editable() const {
-  const FitState& state = history_.current();
-  if (state.model && !needs_fit(state))
-    return with_modes_of(*state.model, state.request, page_.frf().frequency_hz[0]);
-  FitRequest request = state.request;
-  if (request.modes.kind == ModesRequest::Kind::given) return request;
-  if (needs_fit(state) && request.modes.kind != ModesRequest::Kind::none)
-    throw std::invalid_argument("the search is not finished; wait for it, stop it, or undo");
-  request.modes = {ModesRequest::Kind::none, 0, {}};
-  return request;
-}
-
-ActionReply Workbench::save(const std::string& name) {
-  if (!options_.write) return {403, "the workbench is read-only; start it with --write to save"};
-  FitState& state = history_.current();
-  if (state.stage != FitStage::refined || !state.model)
-    return {409, "there is no finished fit to save; wait for it"};
-  if (!state.saved.empty()) return {409, fmt::format("already saved as {}", state.saved.string())};
-  if (!is_plain_name(name))
-    return {400, fmt::format("name: expected 1 to {} letters, digits, _ and -", kLongestName)};
-  const std::filesystem::path file = options_.directory / (name + ".json");
-  if (std::filesystem::exists(std::filesystem::symlink_status(file)))
-    return {409, fmt::format("{} exists; choose another name", file.string())};
-  write_model(file, *state.model);
-  state.saved = file;
-  show();
-  return {200, file.string()};
-}
-
-ActionReply Workbench::keep() {
-  const FitState& state = history_.current();
-  if (!state.model) return {409, "there is no model to compare with"};
-  if (compared_.size() >= kMostCompared)
-    return {409, fmt::format("at most {} results can be compared", kMostCompared)};
-  const std::string title = state.saved.empty()
-                                ? fmt::format("fit {}: {}", history_.index() + 1, state.what)
-                                : state.saved.filename().string();
-  compared_.push_back(page_.compared({title, *state.model, std::nullopt}));
-  show();
-  return {200, title};
-}
-
-ActionReply Workbench::choose(const Json& action) {
-  const double index = number_in(action, "index").value_or(-1.0);
-  if (index >= static_cast<double>(compared_.size()))
-    return {409, "compare: there is no such result"};
-  chosen_.reset();
-  if (index >= 0.0) chosen_ = static_cast<std::size_t>(index);
-  show();
-  return {200, "done"};
-}
-
 std::string Workbench::command() const {
   const FitState& state = history_.current();
   nlohmann::ordered_json flags = flags_of(state.request);
@@ -216,9 +113,9 @@ std::string Workbench::state_json() const {
 
 std::string Workbench::state_text() const {
   const FitState& current = history_.current();
-  Json json = {{"state", ending_              ? "ended"
-                         : needs_fit(current) ? "fitting"
-                                              : "ready"},
+  Json json = {{"state", ending_               ? "ended"
+                         : current.needs_fit() ? "fitting"
+                                               : "ready"},
                {"index", history_.index()},
                {"states", Json::array()},
                {"command", history_.index() == 0 && !current.model ? "" : command()},
@@ -260,8 +157,9 @@ void Workbench::change() {
 
 bool Workbench::next(Work& work) {
   std::unique_lock lock(mutex_);
-  wake_.wait(
-      lock, [&] { return ending_ || (version_ != work.version && needs_fit(history_.current())); });
+  wake_.wait(lock, [&] {
+    return ending_ || (version_ != work.version && history_.current().needs_fit());
+  });
   if (ending_) return false;
   const std::size_t index = history_.index();
   work = {version_, history_.current(), index > 0 ? history_.states()[index - 1].model : nullptr};
