@@ -78,6 +78,19 @@ std::vector<std::string> names_of(const TextLines& lines, const std::vector<std:
   return names;
 }
 
+/// Calls use(lines, fields, separator) for every line of the table; the first one determines the separator.
+template <typename Use>
+void for_each_row(const std::filesystem::path& file, const Use& use) {
+  TextLines lines(file);
+  std::optional<char> separator;
+  while (!lines.at_end()) {
+    const std::string_view line = lines.next();
+    if (trimmed(line).empty() || line.starts_with('#') || line.starts_with('%')) continue;
+    if (!separator) separator = separator_of(line);
+    use(lines, split(lines, line, *separator), *separator);
+  }
+}
+
 void append_row(const TextLines& lines, const std::vector<std::string>& fields, char separator,
                 std::size_t row, std::vector<std::vector<double>>& columns) {
   if (fields.size() > columns.size())
@@ -98,25 +111,21 @@ void append_row(const TextLines& lines, const std::vector<std::string>& fields, 
 }  // namespace
 
 ArrayList read_csv(const std::filesystem::path& file) {
-  TextLines lines(file);
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;
-  char separator = ',';
   std::size_t row = 0;
-  while (!lines.at_end()) {
-    const std::string_view line = lines.next();
-    if (trimmed(line).empty() || line.starts_with('#') || line.starts_with('%')) continue;
-    if (columns.empty()) separator = separator_of(line);
-    const std::vector<std::string> fields = split(lines, line, separator);
-    if (columns.empty()) {
-      columns.resize(fields.size());
-      const bool head = !all_numbers(fields, separator);
-      names = head ? names_of(lines, fields) : std::vector<std::string>(fields.size());
-      for (std::size_t c = 0; c < names.size() && !head; ++c) names[c] = fmt::format("{}", c + 1);
-      if (head) continue;
-    }
-    append_row(lines, fields, separator, row++, columns);
-  }
+  for_each_row(file,
+               [&](const TextLines& lines, const std::vector<std::string>& fields, char separator) {
+                 if (columns.empty()) {
+                   columns.resize(fields.size());
+                   const bool head = !all_numbers(fields, separator);
+                   names = head ? names_of(lines, fields) : std::vector<std::string>(fields.size());
+                   for (std::size_t c = 0; c < names.size() && !head; ++c)
+                     names[c] = fmt::format("{}", c + 1);
+                   if (head) return;
+                 }
+                 append_row(lines, fields, separator, row++, columns);
+               });
   if (row == 0)
     throw FormatError(file, "",
                       columns.empty()
@@ -130,25 +139,19 @@ ArrayList read_csv(const std::filesystem::path& file) {
 }
 
 TextTable read_text_table(const std::filesystem::path& file) {
-  TextLines lines(file);
   TextTable table;
-  char separator = ',';
-  while (!lines.at_end()) {
-    const std::string_view line = lines.next();
-    if (trimmed(line).empty() || line.starts_with('#') || line.starts_with('%')) continue;
+  for_each_row(file, [&](const TextLines& lines, std::vector<std::string> fields, char) {
     if (table.names.empty()) {
-      separator = separator_of(line);
-      table.names = names_of(lines, split(lines, line, separator));
-      continue;
+      table.names = names_of(lines, fields);
+      return;
     }
-    std::vector<std::string> fields = split(lines, line, separator);
     if (fields.size() != table.names.size())
       lines.fail(
           fmt::format("got {} fields; the header has {}", fields.size(), table.names.size()));
     for (std::string& field : fields) field = utf8_of_text(trimmed(field));
     table.rows.push_back(std::move(fields));
     table.lines.push_back(lines.line_number());
-  }
+  });
   return table;
 }
 
