@@ -30,6 +30,13 @@ std::vector<double> numbers_in(const Json& object, const char* key) {
   return numbers;
 }
 
+/// The same for a list of any values; empty if it is missing.
+template <class Json>
+Json list_in(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_array() ? *found : Json::array();
+}
+
 /// The same for text; empty if it is missing.
 template <class Json>
 std::string text_in(const Json& object, const char* key) {

@@ -64,8 +64,7 @@ std::vector<PoleEstimate> poles_of(const Submodel& s) {
 
 std::vector<std::string> texts_in(const Json& object, const char* key) {
   std::vector<std::string> texts;
-  if (!object.contains(key) || !object[key].is_array()) return texts;
-  for (const Json& text : object[key])
+  for (const Json& text : list_in(object, key))
     if (text.is_string()) texts.push_back(text.get<std::string>());
   return texts;
 }
@@ -114,11 +113,9 @@ std::vector<std::string> findings_beside_message(const FitResult& result) {
 }
 
 Distortion distortion_of(const AdditiveModel& model) {
-  const Json json = parse_json_object<Json>(model.provenance_json);
+  const Json bands = list_in(parse_json<Json>(model.provenance_json), "distortion");
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Distortion out;
-  if (!json.contains("distortion") || !json["distortion"].is_array()) return out;
-  const Json& bands = json["distortion"];
   const auto count = static_cast<Eigen::Index>(bands.size());
   out.band_hz.resize(count, 2);
   out.level.resize(channels, count);
@@ -134,7 +131,7 @@ Distortion distortion_of(const AdditiveModel& model) {
 }
 
 std::vector<std::string> decisions_of(const AdditiveModel& model) {
-  return texts_in(parse_json_object<Json>(model.provenance_json), "decisions");
+  return texts_in(parse_json<Json>(model.provenance_json), "decisions");
 }
 
 std::string relative_error_text(const FitRecord& fit) {

@@ -137,10 +137,8 @@ std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings
 }
 
 std::vector<Finding> health_of(const std::string& provenance_json) {
-  const Json provenance = parse_json_object<Json>(provenance_json);
   std::vector<Finding> findings;
-  if (!provenance.contains("health") || !provenance["health"].is_array()) return findings;
-  for (const Json& object : provenance["health"])
+  for (const Json& object : list_in(parse_json<Json>(provenance_json), "health"))
     if (object.is_object()) findings.push_back(finding_of(object));
   return findings;
 }

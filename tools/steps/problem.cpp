@@ -136,12 +136,9 @@ std::vector<Problem> problems_of(const FrfEstimate& frf) {
 
 std::vector<Problem> problems_of(const AdditiveModel& model) {
   std::vector<Problem> problems;
-  const Json json = parse_json_object<Json>(model.provenance_json);
-  if (json.contains("problems") && json["problems"].is_array())
-    for (const Json& one : json["problems"])
-      problems.push_back({text_in(one, "cause"),
-                          one.is_object() && one.contains("grave") && one["grave"] == true,
-                          text_in(one, "what"), text_in(one, "remedy")});
+  for (const Json& one : list_in(parse_json<Json>(model.provenance_json), "problems"))
+    problems.push_back({text_in(one, "cause"), one.contains("grave") && one["grave"] == true,
+                        text_in(one, "what"), text_in(one, "remedy")});
   for (const FitReason& reason : model.fit.why())
     problems.push_back({cause_of(reason), true, reason.what,
                         reason.remedy.empty() && reason.status == FitStatus::iteration_limit

@@ -75,9 +75,9 @@ class Commands {
       : files_(std::move(files)), frf_(frf), model_(model) {
     if (model != nullptr) {
       fit_ = parse_json_object<Json>(model->provenance_json);
-      if (files_.frf.empty() && fit_.contains("inputs") && fit_["inputs"].is_array() &&
-          !fit_["inputs"].empty())
-        files_.frf = beside(files_, text_in(fit_["inputs"][0], "file"));
+      const Json inputs = list_in(fit_, "inputs");
+      if (files_.frf.empty() && !inputs.empty())
+        files_.frf = beside(files_, text_in(inputs[0], "file"));
     }
     if (files_.log.empty()) files_.log = beside(files_, log_name());
   }
@@ -101,38 +101,32 @@ class Commands {
 
  private:
   std::string log_name() const {
-    if (!frf_.contains("logs") || !frf_["logs"].is_array() || frf_["logs"].empty()) return {};
-    return frf_["logs"][0].is_string() ? frf_["logs"][0].get<std::string>() : "";
+    const Json logs = list_in(frf_, "logs");
+    return !logs.empty() && logs[0].is_string() ? logs[0].get<std::string>() : "";
   }
 
   std::string experiment_name() const {
-    if (!frf_.contains("experiments") || !frf_["experiments"].is_array() ||
-        frf_["experiments"].empty())
-      return {};
-    return text_in(frf_["experiments"][0], "configuration_file");
+    const Json experiments = list_in(frf_, "experiments");
+    return experiments.empty() ? "" : text_in(experiments[0], "configuration_file");
   }
 
   double iterations() const {
-    const auto options = fit_.find("options");
-    return options == fit_.end()
-               ? FitRequest().max_iterations
-               : number_in(*options, "max_iterations").value_or(FitRequest().max_iterations);
+    return number_in(fit_.value("options", Json()), "max_iterations")
+        .value_or(FitRequest().max_iterations);
   }
 
   std::string refit(const std::string& flags) const {
     if (files_.frf.empty() || files_.model.empty()) return {};
-    const auto options = fit_.find("options");
-    const Json asked =
-        options != fit_.end() && options->contains("flags") ? (*options)["flags"] : Json::object();
+    const Json options = fit_.value("options", Json());
+    const Json asked = options.contains("flags") ? options["flags"] : Json::object();
     return fit_command_line(files_.frf, files_.model, asked, flags);
   }
 
   std::string estimate(const std::string& flags) const {
     if (files_.log.empty() || files_.frf.empty()) return {};
     std::vector<int> realizations;  // counted from 1
-    if (frf_.contains("realizations") && frf_["realizations"].is_array())
-      for (const Json& one : frf_["realizations"])
-        if (one.is_number_integer()) realizations.push_back(one.get<int>() + 1);
+    for (const Json& one : list_in(frf_, "realizations"))
+      if (one.is_number_integer()) realizations.push_back(one.get<int>() + 1);
     const std::string some =
         realizations.empty() ? "" : fmt::format(" --realizations {}", fmt::join(realizations, ","));
     return fmt::format("stageid frf {} -o {}{} {}", in_shell(files_.log), in_shell(files_.frf),
@@ -164,7 +158,7 @@ class Commands {
   ResultFiles files_;
   const Json& frf_;
   const AdditiveModel* model_;
-  Json fit_;
+  Json fit_ = Json::object();
 };
 
 void add_all_commands(std::vector<Problem>& problems, ResultFiles files, const Json& frf,
