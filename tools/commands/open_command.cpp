@@ -19,13 +19,14 @@ void open_workbench(const WorkbenchOptions& flags, Console& console) {
   if (!flags.write && !flags.directory.empty())
     throw std::invalid_argument("--output: the workbench is read-only; add --write");
   if (!flags.directory.empty()) require_directory(flags.directory);
-  const ControlledStop ends_in_order;
-  const Workbench workbench(flags);
+  Workbench workbench(flags);
+  const CleanedUpAtInterrupt tells_the_pages([&workbench] { workbench.end(); });
+  say_at_interrupt("saved models are kept");
   console.result(fmt::format("workbench: {}", workbench.url()));
   console.result({{"url", workbench.url()}});
   std::fflush(stdout);  // programs that wait for the page read this line
   console.message("open this address in a browser; SIGINT or SIGTERM ends it");
-  while (!interrupt_flag()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  while (true) std::this_thread::sleep_for(std::chrono::hours(1));  // a signal ends the program
 }
 
 }  // namespace

@@ -15,9 +15,4 @@ bool FitHistory::go(std::size_t index) {
   return true;
 }
 
-void FitHistory::drop() {
-  states_.erase(states_.begin() + static_cast<std::ptrdiff_t>(index_));
-  --index_;
-}
-
 }  // namespace stageid

@@ -54,8 +54,6 @@ class FitHistory {
   bool go(std::size_t index);
   bool undo() { return index_ > 0 && go(index_ - 1); }
   bool redo() { return go(index_ + 1); }
-  /// Removes the current state, which must not be the first; that before it becomes current.
-  void drop();
 
   std::size_t index() const noexcept { return index_; }
   const std::vector<FitState>& states() const noexcept { return states_; }

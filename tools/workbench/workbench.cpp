@@ -39,7 +39,7 @@ ReportInput input_of(const std::vector<std::filesystem::path>& files) {
 }
 
 /// A model, if there is one, is the first fit; weights that it names are beside the FRF.
-FitState first_state(const ReportInput& input) {
+FitState first_state(const ReportInput& input, const FrfEstimate& frf) {
   FitState state;
   state.what = "opened";
   state.stage = FitStage::refined;
@@ -48,6 +48,10 @@ FitState first_state(const ReportInput& input) {
     return state;
   }
   auto model = std::make_shared<const AdditiveModel>(read_model(input.model));
+  if (model->inputs.names != frf.inputs.names || model->outputs.names != frf.outputs.names)
+    throw std::invalid_argument(
+        fmt::format("{}: its channels are not those of {}; open a model of this response",
+                    input.model.string(), input.frf.string()));
   state.request = request_of(*model);
   std::filesystem::path& weights = state.request.weight_file;
   if (!weights.empty() && weights.is_relative()) weights = input.frf.parent_path() / weights;
@@ -71,7 +75,7 @@ Workbench::Workbench(const WorkbenchOptions& options)
       input_(input_of(options.inputs)),
       page_(read_report_data(input_)),
       fingerprint_(fingerprint_of_file(input_.frf)),
-      history_(first_state(input_)) {
+      history_(first_state(input_, page_.frf())) {
   if (options_.directory.empty()) options_.directory = input_.frf.parent_path();
   for (const std::filesystem::path& file : options_.compare)
     compared_.push_back(page_.compared(read_compared({file})));
@@ -86,16 +90,21 @@ Workbench::Workbench(const WorkbenchOptions& options)
 }
 
 Workbench::~Workbench() {
+  end();
+  server_.reset();
+  thread_.join();
+}
+
+void Workbench::end() {
   {
     const std::lock_guard lock(mutex_);
+    if (ending_) return;
     ending_ = true;
     ++version_;
     content_.state.publish(state_text());
   }
   wake_.notify_all();
   server_->finish(kFarewell);
-  server_.reset();
-  thread_.join();
 }
 
 std::string Workbench::command() const {
@@ -122,7 +131,6 @@ std::string Workbench::state_text() const {
                {"cost", current.cost},
                {"message", current.message},
                {"controls", controls_json(current.request)},
-               {"error", error_},
                {"writable", options_.write},
                {"directory", options_.directory.string()},
                {"compared", Json::array()},
@@ -150,7 +158,6 @@ void Workbench::show() {
 /// Another state is current: ends a running fit, and begins that of the state.
 void Workbench::change() {
   ++version_;
-  error_.clear();
   show();
   wake_.notify_all();
 }
@@ -161,8 +168,7 @@ bool Workbench::next(Work& work) {
     return ending_ || (version_ != work.version && history_.current().needs_fit());
   });
   if (ending_) return false;
-  const std::size_t index = history_.index();
-  work = {version_, history_.current(), index > 0 ? history_.states()[index - 1].model : nullptr};
+  work = {version_, history_.current()};
   return true;
 }
 
@@ -179,13 +185,10 @@ void Workbench::store(const Work& work) {
   show();
 }
 
-void Workbench::fail(const Work& work, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  if (version_ != work.version) return;
-  history_.drop();
-  change();
-  error_ = fmt::format("{}: {}", work.state.what, why);
-  content_.state.publish(state_text());
+void Workbench::fail(Work& work, const std::string& why) {
+  work.state.stage = FitStage::failed;
+  work.state.message = why;
+  store(work);
 }
 
 void Workbench::tell_progress(const Work& work, double cost) {
@@ -198,32 +201,30 @@ void Workbench::tell_progress(const Work& work, double cost) {
   content_.state.publish(state_text());
 }
 
-/// Two answers that do not wait for the fit: the numerators at once, then what a second of iterations gives.
-void Workbench::preview(const FitSetup& setup, Work& work, const std::function<bool()>& is_over) {
-  const auto show = [&](FitStage stage, AdditiveModel model) {
-    work.state.model = std::make_shared<const AdditiveModel>(std::move(model));
-    work.state.stage = stage;
-    store(work);
-  };
-  show(FitStage::linear, warm_start(setup, work.before.get()));
-  const auto end = std::chrono::steady_clock::now() + kImprovement;
-  show(FitStage::improved, improved(setup, *work.state.model, [&] {
-         return is_over() || std::chrono::steady_clock::now() > end;
-       }));
+FitSetup Workbench::setup_of(FitRequest request) const {
+  request.threads = options_.threads;
+  FitSetup setup = make_fit_setup(request, page_.frf());
+  setup.options.response_variance = false;
+  return setup;
 }
 
-/// The previews, then the fit of `stageid fit`.
+/// The second preview: what a second of iterations gives.
+void Workbench::improve(const FitSetup& setup, Work& work, const std::function<bool()>& is_over) {
+  const auto end = std::chrono::steady_clock::now() + kImprovement;
+  work.state.model = std::make_shared<const AdditiveModel>(improved(setup, *work.state.model, [&] {
+    return is_over() || std::chrono::steady_clock::now() > end;
+  }));
+  work.state.stage = FitStage::improved;
+  store(work);
+}
+
+/// The second preview, then the fit of `stageid fit`.
 void Workbench::fit(Work& work) {
-  using Modes = ModesRequest::Kind;
   FitState& state = work.state;
   try {
-    FitRequest request = state.request;
-    request.threads = options_.threads;
-    FitSetup setup = make_fit_setup(request, page_.frf());
-    setup.options.response_variance = false;
+    const FitSetup setup = setup_of(state.request);
     const auto is_over = [&] { return version_ != work.version || stopped_ == work.version; };
-    if (request.modes.kind == Modes::given || request.modes.kind == Modes::none)
-      preview(setup, work, is_over);
+    if (state.stage == FitStage::linear) improve(setup, work, is_over);
     FitOptions options = setup.options;
     options.progress = [&](int, double cost) { tell_progress(work, cost); };
     options.interrupted = is_over;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "tools/dashboard/dashboard_server.hpp"
+#include "tools/workbench/edit.hpp"
 #include "tools/workbench/fit_history.hpp"
 #include "tools/workbench/workbench_page.hpp"
 
@@ -30,7 +31,7 @@ struct WorkbenchOptions {
 };
 
 /// A page in the browser that edits a fit: modes, band and options, with undo and redo. Each edit is answered by previews,
-/// see warm_start.hpp, then by the fit that `stageid fit` would make, with the command line for it. Files are written by the action
+/// see warm_start.hpp, the first of them with the action, then by the fit that `stageid fit` would make, with the command line for it. Files are written by the action
 /// "save" only.
 ///
 /// Actions, POST /act, JSON: those of edited(); {"kind": "undo"}, "redo", {"kind": "go", "index"}; {"kind": "save",
@@ -48,10 +49,12 @@ class Workbench {
   Workbench& operator=(const Workbench&) = delete;
 
   const std::string& url() const noexcept { return server_->url(); }
+  /// Tells the pages that the program ends, and stops to serve. A running fit is not waited for. From any thread, once.
+  void end();
   /// What POST /act does. From any thread.
   ActionReply act(const std::string& body);
   /// What the stream tells: {"state": ready | fitting | ended, "index", "states": [{what, stage, modes, cost, saved}],
-  /// "command", "cost", "message", "controls", "error", "writable", "directory", "compared": titles, "chosen",
+  /// "command", "cost", "message", "controls", "writable", "directory", "compared": titles, "chosen",
   /// "edition": number of the newest results}.
   std::string state_json() const;
 
@@ -60,7 +63,6 @@ class Workbench {
   struct Work {
     std::uint64_t version = 0;
     FitState state;
-    std::shared_ptr<const AdditiveModel> before;  ///< model of the state before; null: none
   };
 
   ActionReply act_locked(const nlohmann::json& action);
@@ -68,16 +70,18 @@ class Workbench {
   ActionReply keep();
   ActionReply choose(const nlohmann::json& action);
   FitRequest editable() const;
+  FitSetup setup_of(FitRequest request) const;
+  FitState begun(Edit edit) const;
   std::string command() const;
   std::string state_text() const;
   void show();
   void change();
   void run();
   bool next(Work& work);
-  void preview(const FitSetup& setup, Work& work, const std::function<bool()>& is_over);
+  void improve(const FitSetup& setup, Work& work, const std::function<bool()>& is_over);
   void fit(Work& work);
   void store(const Work& work);
-  void fail(const Work& work, const std::string& why);
+  void fail(Work& work, const std::string& why);
   void tell_progress(const Work& work, double cost);
 
   WorkbenchOptions options_;
@@ -91,7 +95,6 @@ class Workbench {
   FitHistory history_;
   std::vector<std::shared_ptr<const Compared>> compared_;
   std::optional<std::size_t> chosen_;
-  std::string error_;  ///< of the last fit
   bool ending_ = false;
   std::uint64_t edition_ = 0;
   std::atomic<std::uint64_t> version_ =

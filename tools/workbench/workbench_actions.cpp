@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "acquisition/files/json_text.hpp"
 #include "tools/workbench/edit.hpp"
 #include "tools/workbench/model_request.hpp"
+#include "tools/workbench/warm_start.hpp"
 #include "tools/workbench/workbench.hpp"
 
 namespace stageid {
@@ -53,11 +55,7 @@ ActionReply Workbench::act_locked(const nlohmann::json& action) {
     change();
     return {200, "done"};
   }
-  Edit edit = edited(action, editable());
-  FitState state;
-  state.what = std::move(edit.what);
-  state.request = std::move(edit.request);
-  history_.push(std::move(state));
+  history_.push(begun(edited(action, editable())));
   change();
   return {200, "done"};
 }
@@ -73,6 +71,21 @@ FitRequest Workbench::editable() const {
     throw std::invalid_argument("the search is not finished; wait for it, stop it, or undo");
   request.modes = {ModesRequest::Kind::none, 0, {}};
   return request;
+}
+
+/// The first answer to an edit; what cannot be fitted is refused.
+FitState Workbench::begun(Edit edit) const {
+  using Modes = ModesRequest::Kind;
+  FitState state;
+  state.what = std::move(edit.what);
+  state.request = std::move(edit.request);
+  const FitSetup setup = setup_of(state.request);
+  if (state.request.modes.kind != Modes::given && state.request.modes.kind != Modes::none)
+    return state;
+  state.model =
+      std::make_shared<const AdditiveModel>(warm_start(setup, history_.current().model.get()));
+  state.stage = FitStage::linear;
+  return state;
 }
 
 ActionReply Workbench::save(const std::string& name) {

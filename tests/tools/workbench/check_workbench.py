@@ -233,7 +233,7 @@ def main():
         check_widths(bench, work)
         expect(bench.browser.problems == [], f"the browser complains: {bench.browser.problems}")
         expect(bench.get(f"{PAGE}.errors") == [], f"errors on the page: {bench.get(PAGE + '.errors')}")
-        expect(running.interrupt() == 0, "it did not end in order")
+        expect(running.interrupt() == 130, "it did not end in order")
         expect(bench.browser.wait_for("document.getElementById('status').textContent.includes('ended')"), "the page did not see the end")
         expect(sorted(file.name for file in (work / "saved").iterdir()) == ["edited.json"], "other files were written")
     finally:

@@ -29,15 +29,6 @@ TEST(FitHistory, UndoAndRedoWalkAndAPushForgetsTheUndone) {
   EXPECT_FALSE(history.go(2));
 }
 
-TEST(FitHistory, ADroppedStateLeavesTheOneBefore) {
-  FitHistory history(named("opened"));
-  history.push(named("a"));
-  history.push(named("bad"));
-  history.drop();
-  EXPECT_EQ(history.current().what, "a");
-  EXPECT_EQ(history.states().size(), 2U);
-}
-
 TEST(FitHistory, KeepsTheFirstAndTheNewest) {
   FitHistory history(named("opened"));
   const std::size_t pushed = FitHistory::kMost + 5;

@@ -99,7 +99,7 @@ def main():
         body = b'{"kind": "remove", "frequency_hz": 422.2}'
         expect(exchange(running, f"{good}Content-Length: {len(body)}\r\n\r\n".encode() + body) == 200, "the page is refused too")
         expect(len(running.settled()["states"]) == 2, "the page's own action has no effect")
-        expect(running.interrupt() == 0, "it did not end in order")
+        expect(running.interrupt() == 130, "it did not end in order")
     finally:
         running.close()
     return verdict()

@@ -109,14 +109,23 @@ TEST_F(WorkbenchTest, WithoutAModelItBeginsWithTheFirstMode) {
   EXPECT_GE(current(searched)["modes"], 4);
 }
 
-TEST_F(WorkbenchTest, AnImpossibleFitLeavesTheOneBefore) {
+TEST_F(WorkbenchTest, RefusesWhatCannotBeFitted) {
   make_model();
   open(false);
-  const Json before = settled();
-  const Json after = done({{"kind", "band"}, {"low_hz", 1e6}, {"high_hz", 2e6}});
-  EXPECT_EQ(after["index"], before["index"]);
-  EXPECT_EQ(after["command"], before["command"]);
-  EXPECT_THAT(after["error"].get<std::string>(), HasSubstr("band"));
+  refused({{"kind", "band"}, {"low_hz", 1e6}, {"high_hz", 2e6}}, 400, "band");
+  refused({{"kind", "refit"}, {"modes", "500"}}, 400, "too many");
+  refused({{"kind", "refit"}, {"rigid_body", "suspension:1e6"}}, 400, "suspension");
+}
+
+TEST_F(WorkbenchTest, AnEditIsAnsweredWithItsFirstPreview) {
+  make_model();
+  open(false);
+  const int edition = state()["edition"];
+  EXPECT_EQ(act({{"kind", "remove"}, {"frequency_hz", 422.22}}).status, 200);
+  const Json now = state();
+  EXPECT_NE(current(now)["stage"], "waiting");
+  EXPECT_FALSE(current(now)["cost"].is_null());
+  EXPECT_GT(now["edition"], edition);
 }
 
 TEST_F(WorkbenchTest, ReadOnlyItWritesNothing) {
@@ -181,8 +190,15 @@ TEST_F(WorkbenchTest, EveryRequestNeedsTheTokenAndAnActionTheHeader) {
     EXPECT_EQ(bench_->act(body).status, 400) << body;
 }
 
-TEST_F(WorkbenchTest, NeedsAnFrf) {
+TEST_F(WorkbenchTest, NeedsAnFrfAndAModelOfIt) {
   make_model();
+  test::write_bytes(at("other.json"),
+                    test::replaced(test::read_bytes(at("model.json")), "\"a1\"", "\"b1\""));
+  EXPECT_THAT(
+      [&] {
+        open(false, {at("frf.h5"), at("other.json")});
+      },
+      testing::ThrowsMessage<std::invalid_argument>(HasSubstr("channels")));
   EXPECT_THAT([&] { open(false, {at("model.json")}); },
               testing::ThrowsMessage<std::invalid_argument>(HasSubstr("contains no FRF")));
 }

@@ -47,7 +47,6 @@ function showState(state) {
   session.redo.disabled = index + 1 >= states.length;
   session.stop.disabled = !running;
   session.status.textContent = statusText(state);
-  if (state.error) tellAnswer(null, { good: false, text: state.error });
   session.command.textContent = state.command || 'none: there is no model yet';
   session.list.replaceChildren(...states.map((one, i) => element('li', null, element('button', {
     type: 'button', class: 'plain fit', 'aria-current': i === index ? 'true' : null, onclick: () => act({ kind: 'go', index: i }),
@@ -67,7 +66,7 @@ function statusText({ state, states, index, cost, message }) {
   const { stage } = states[index];
   const newest = cost.length ? ', cost ' + number(cost[cost.length - 1], 5) : '';
   if (state === 'fitting') return (stage === 'waiting' ? 'fitting' : 'preview; fitting') + newest;
-  return (stage === 'stopped' ? 'stopped' : 'ready') + newest + (message ? ': ' + message : '');
+  return (stage === 'refined' ? 'ready' : stage) + newest + (message ? ': ' + message : '');
 }
 
 function fitText({ modes, cost, stage, saved }) {

@@ -7,7 +7,7 @@ const modelKeys = ['verdict', 'model', 'modes', 'shapes', 'shape_channels', 'geo
 
 const previews = {
   linear: 'Preview: the numerators are fitted, poles and delays not yet', improved: 'Preview after a second of iterations; the fit is running',
-  stopped: 'The fit was stopped: this is the best model so far',
+  stopped: 'The fit was stopped: this is the best model so far', failed: 'The fit failed; undo, or change it',
 };
 
 // Sends an action; the program answers with a text. Only this page can set the header.
