@@ -295,8 +295,8 @@ DashboardServer::DashboardServer(const DashboardAddress& address, DashboardConte
   state.url = fmt::format("http://{}:{}/?token={}", host_in_url(state.address.host),
                           state.address.port, state.token);
   state.thread = std::thread([&state] {
-    // The threads that it starts inherit this.
-    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+    // A measurement goes first. The threads that this one starts inherit its priority.
+    if (!state.content.act) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
     state.server.listen_after_bind();
   });
   while (!state.server.is_running()) std::this_thread::yield();  // an earlier stop() would be lost

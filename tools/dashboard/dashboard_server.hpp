@@ -33,9 +33,10 @@ struct DashboardContent {
 /// Serves a page, the stream of its state (server-sent events), the newest response, the abort, and actions:
 ///   GET /   GET /events   GET /response.json   GET /watch.json   GET /trace.json?channel=N   GET /metrics   POST /abort   POST /act
 ///
-/// It has its own threads of low priority and at most kWatchers streams at once (then 503). A watcher receives the
-/// newest state when it is ready to read; nothing is queued for slow watchers, and one that does not read for
-/// kPatience_s, or whose request takes longer, is disconnected. Other threads of the program never wait for the server.
+/// It has its own threads, of low priority unless there are actions, and at most kWatchers streams at once (then 503). A
+/// watcher receives the newest state when it is ready to read; nothing is queued for slow watchers, and one that does not
+/// read for kPatience_s, or whose request takes longer, is disconnected. Other threads of the program never wait for the
+/// server.
 ///
 /// If other machines can reach it, a token is required (?token=...). On loopback, only requests addressed to this
 /// machine are answered, and watching needs no token unless the content is secret. An abort or an action always needs the

@@ -231,8 +231,11 @@ void Workbench::fit(Work& work) {
     FitResult result = complete_fit(setup, options, input_.frf.filename().string(), fingerprint_);
     state.message = fmt::format("{}: {}", to_string(result.status()), result.message());
     state.cost = result.cost;
-    state.stage = result.status() == FitStatus::interrupted ? FitStage::stopped : FitStage::refined;
-    state.model = std::make_shared<const AdditiveModel>(std::move(result.model));
+    const bool stopped = result.status() == FitStatus::interrupted;
+    state.stage = stopped ? FitStage::stopped : FitStage::refined;
+    // A fit that was stopped early may be worse than its preview.
+    if (!stopped || !state.model || result.model.fit.cost < state.model->fit.cost)
+      state.model = std::make_shared<const AdditiveModel>(std::move(result.model));
     store(work);
   } catch (const std::invalid_argument& error) {
     fail(work, error.what());
