@@ -53,7 +53,7 @@ function axisText(value) {
 function drawTrend(context, width, height, kind) {
   const rows = trendRows(kind);
   if (!rows.length) return;
-  const area = { x: 62, y: 8, w: width - 74, h: height - 34 };
+  const area = { x: 74, y: 8, w: width - 86, h: height - 34 };
   const most = Math.max(1e-6, ...rows.map((row) => Math.abs(row.value) + row.half)) * 1.1;
   const x = (i) => area.x + area.w * (i + 0.5) / rows.length;
   const y = (value) => area.y + area.h * (0.5 - 0.5 * value / most);
