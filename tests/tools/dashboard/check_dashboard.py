@@ -57,7 +57,7 @@ def check_levels(browser):
     state = browser.evaluate("window.stageidDashboard.state")
     expect(all(v > 0 for v in state["levels"]["largest_peak"]), "a channel that never moved")
     expect(state["timing"]["lateness"]["bins"], "no timing")
-    drawn = browser.evaluate("traces.pickers.map((t) => [t.data.low.length, t.data.high[0] >= t.data.low[0], t.unit])")
+    drawn = browser.evaluate("window.stageidDashboard.traces().map((t) => [t.data.low.length, t.data.high[0] >= t.data.low[0], t.unit])")
     expect(all(bins > 10 and ordered for bins, ordered, _ in drawn) and [unit for *_, unit in drawn] == ["N", "m"], f"traces: {drawn}")
     expect(browser.evaluate("document.querySelectorAll('.histogram .step-bar > span').length") > 2, "no histogram")
     expect(browser.evaluate("document.querySelectorAll('.events tr').length") > 2, "no events")

@@ -33,4 +33,4 @@ stream.onerror = () => {
   head.text.textContent = 'connection to the program lost; reconnecting';
 };
 window.addEventListener('pagehide', () => stream.close());
-Object.assign(window.stageidDashboard, { shown, array, channelCurves, content: () => content, edition: () => link.edition });
+Object.assign(window.stageidDashboard, { shown, array, channelCurves, content: () => content, edition: () => link.edition, traces: () => liveTraces.pickers });

@@ -1,6 +1,6 @@
 // The last two seconds of one actuator and one sensor.
 
-const traces = { pickers: [], pending: null };
+const liveTraces = { pickers: [], pending: null };
 
 function buildTraces() {
   const body = section('traces', 'Traces', 'Forces and motions', 'The last two seconds of an actuator and of a sensor.');
@@ -11,7 +11,7 @@ function buildTraces() {
       ...list.map((channel, i) => element('option', { value: first + i }, channel.name)));
     trace.figure = canvasFigure('trace-figure-' + title, 'Last two seconds of the ' + title, (context, width, height) => drawTrace(context, width, height, trace), 'trace');
     all.append(element('div', null, element('label', { for: 'trace-' + title }, title + ' ', trace.pick), trace.figure.node));
-    traces.pickers.push(trace);
+    liveTraces.pickers.push(trace);
   };
   add('actuator', shown.actuators, 0);
   add('sensor', shown.sensors, shown.actuators.length);
@@ -19,13 +19,13 @@ function buildTraces() {
 }
 
 function fetchTraces() {
-  traces.pending = traces.pending || loadTraces().finally(() => { traces.pending = null; });
-  return traces.pending;
+  liveTraces.pending = liveTraces.pending || loadTraces().finally(() => { liveTraces.pending = null; });
+  return liveTraces.pending;
 }
 
 async function loadTraces() {
   try {
-    for (const trace of traces.pickers) {
+    for (const trace of liveTraces.pickers) {
       const place = Number(trace.pick.value);
       const answer = await fetch('trace.json' + (link.search ? link.search + '&' : '?') + 'channel=' + place);
       trace.data = await answer.json();
