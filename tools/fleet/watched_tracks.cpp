@@ -60,9 +60,8 @@ std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
       .run(log.stage);
   Statement add = database.prepare(
       "INSERT INTO watched_property VALUES ((SELECT id FROM stage WHERE name = ?), ?, ?, ?, ?, ?, "
-      "?) "
-      "ON CONFLICT DO UPDATE SET value = excluded.value, change = excluded.change, "
-      "deviation = excluded.deviation");
+      "?) ON CONFLICT (stage_id, property, time_utc) DO UPDATE SET value = excluded.value, "
+      "change = excluded.change, deviation = excluded.deviation");
   std::size_t rows = 0;
   for (std::size_t t = 0; t < tracks.time_s.size(); ++t)
     for (std::size_t p = 0; p < tracks.names.size(); ++p, ++rows) {
