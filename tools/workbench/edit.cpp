@@ -69,8 +69,7 @@ Edit set_band(const Json& action, FitRequest request) {
   const double high_hz = require_number(action, "high_hz", low_hz, 1e9);
   const auto rounded = [](double value) { return std::stod(fmt::format("{:.6g}", value)); };
   request.band_hz = {rounded(low_hz), rounded(high_hz)};
-  return {std::move(request),
-          fmt::format("band {:.6g} to {:.6g} Hz", (*request.band_hz)[0], (*request.band_hz)[1])};
+  return {std::move(request), fmt::format("band {:.6g} to {:.6g} Hz", low_hz, high_hz)};
 }
 
 /// The words of a request, without those that name files or that the page does not change.
@@ -118,8 +117,8 @@ Edit refit(const Json& action, FitRequest request) {
     words.*member = word;
     what += fmt::format("{}{}: {}", what.empty() ? "" : ", ", key, word.empty() ? "default" : word);
   }
-  if (words.weighting != "" && (!from_word<Weighting>(words.weighting) ||
-                                from_word<Weighting>(words.weighting) == Weighting::user))
+  if (!words.weighting.empty() && (!from_word<Weighting>(words.weighting) ||
+                                   from_word<Weighting>(words.weighting) == Weighting::user))
     throw std::invalid_argument(fmt::format("weighting: '{}' is unknown", words.weighting));
   FitRequest parsed;
   parse_fit_words(words, parsed);
