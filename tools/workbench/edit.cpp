@@ -91,16 +91,13 @@ constexpr std::pair<const char*, std::string FitWords::*> kControls[] = {
     {"residue_rank", &FitWords::residue_rank}, {"delay", &FitWords::delay},
     {"rigid_body", &FitWords::rigid_body},     {"direct_term", &FitWords::direct_term}};
 
-/// A count or a search instead of the given modes.
-void set_modes(const std::string& word, FitRequest& request) {
-  if (word.empty()) return;
-  if (word == "auto") {
-    request.modes = {Modes::search, 0, {}};
-    return;
-  }
-  if (word.find_first_not_of("0123456789") != std::string::npos || word.size() > 4)
+/// A count or a search instead of the given modes; not a file.
+std::string modes_word(const Json& action) {
+  std::string word = text_in(action, "modes");
+  const bool number = word.find_first_not_of("0123456789") == std::string::npos && word.size() <= 4;
+  if (word != "auto" && !number)
     throw std::invalid_argument("modes: expected auto or a number of modes");
-  request.modes = {Modes::count, std::stoi(word), {}};
+  return word;
 }
 
 Edit refit(const Json& action, FitRequest request) {
@@ -120,6 +117,7 @@ Edit refit(const Json& action, FitRequest request) {
   if (!words.weighting.empty() && (!from_word<Weighting>(words.weighting) ||
                                    from_word<Weighting>(words.weighting) == Weighting::user))
     throw std::invalid_argument(fmt::format("weighting: '{}' is unknown", words.weighting));
+  words.modes = modes_word(action);
   FitRequest parsed;
   parse_fit_words(words, parsed);
   if (request.weighting != Weighting::user || !words.weighting.empty())
@@ -129,9 +127,9 @@ Edit refit(const Json& action, FitRequest request) {
   request.residue_rank = parsed.residue_rank;
   request.general_damping = parsed.general_damping;
   request.direct_term = parsed.direct_term;
-  if (const std::string modes = text_in(action, "modes"); !modes.empty()) {
-    set_modes(modes, request);
-    what += fmt::format("{}modes: {}", what.empty() ? "" : ", ", modes);
+  if (!words.modes.empty()) {
+    request.modes = parsed.modes;
+    what += fmt::format("{}modes: {}", what.empty() ? "" : ", ", words.modes);
   }
   return {std::move(request), what.empty() ? "fitted again" : what};
 }

@@ -1,16 +1,14 @@
 // The controls: mode by number, band, and the options of the fit with the sentence of the user guide beside each.
 
-const words = (...list) => ({ words: list });
-
 // [key of the action, label, choices, sentence of docs/guide.md]
 const fitOptions = [
-  ['weighting', 'Weighting', words('', 'noise_variance', 'total_variance', 'likelihood', 'relative', 'inverse_magnitude', 'unit'),
+  ['weighting', 'Weighting', ['', 'noise_variance', 'total_variance', 'likelihood', 'relative', 'inverse_magnitude', 'unit'],
     'If the plant is nonlinear, use the total variance; if sensor noise is correlated, the likelihood.'],
-  ['damping', 'Damping', words('', 'proportional', 'general'), 'General damping suits modes with non-proportional damping.'],
-  ['residue_rank', 'Rank of a mode', words('', '1'), 'Rank 1 suits mechanical modes, and gives a small state space.'],
-  ['delay', 'Delay', words('', 'estimate', 'per_channel'), 'Use a delay per channel if each channel has its own anti-alias filter.'],
-  ['rigid_body', 'Rigid body', words('', 'auto', 'full', 'none', 'suspension'), 'A suspension replaces the rigid body if springs or gravity compensators carry it.'],
-  ['direct_term', 'Direct term', words('', 'full', 'none'), 'The direct term represents modes above the band.'],
+  ['damping', 'Damping', ['', 'proportional', 'general'], 'General damping suits modes with non-proportional damping.'],
+  ['residue_rank', 'Rank of a mode', ['', '1'], 'Rank 1 suits mechanical modes, and gives a small state space.'],
+  ['delay', 'Delay', ['', 'estimate', 'per_channel'], 'Use a delay per channel if each channel has its own anti-alias filter.'],
+  ['rigid_body', 'Rigid body', ['', 'auto', 'full', 'none', 'suspension'], 'A suspension replaces the rigid body if springs or gravity compensators carry it.'],
+  ['direct_term', 'Direct term', ['', 'full', 'none'], 'The direct term represents modes above the band.'],
 ];
 
 const controls = { nodes: {} };
@@ -31,7 +29,7 @@ function buildControls() {
     fitBand(value('band-low'), value('band-high'));
   } }, field('band-low', 'Band of the fit [Hz]', { required: '' }), field('band-high', 'to', { required: '' }), submitButton('Set band'),
     plainButton('All lines', () => fitBand(null, null)), plainButton('Visible band', () => fitBand(...shownBand())));
-  const options = element('div', { class: 'fit-options' }, ...fitOptions.map(([key, label, { words: list }, sentence]) => {
+  const options = element('div', { class: 'fit-options' }, ...fitOptions.map(([key, label, list, sentence]) => {
     const select = element('select', { id: 'option-' + key, 'aria-describedby': 'why-' + key, onchange: () => act({ kind: 'refit', [key]: select.value }) },
       ...list.map((word) => element('option', { value: word }, word.replace(/_/g, ' ') || 'default')));
     controls.nodes[key] = select;

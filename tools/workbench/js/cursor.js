@@ -24,7 +24,7 @@ function followPointer() {
   });
 }
 
-// Places the line in every figure; the values of the chosen element are told beside it.
+// Draws the cursor in every figure, and shows the values of the chosen element at that frequency.
 function showCursor(hz) {
   bench.cursor = hz;
   const [low, high] = shownBand();

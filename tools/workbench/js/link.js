@@ -1,6 +1,6 @@
 // The link to the program: a stream of states, results that replace those of the page, and actions.
 
-const bench = { state: null, stage: null, trends: [], edition: 0, loading: false, listeners: [] };
+const bench = { state: null, stage: null, trends: [], edition: 0, loading: false };
 
 // Sections that depend on the model, in resultParts; 'trends' is that of the workbench.
 const modelKeys = ['verdict', 'model', 'modes', 'shapes', 'shape_channels', 'geometry', 'decisions', 'cost', 'comparison', 'validation'];
