@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "estimation/tracking/tracked_parameters.hpp"
+#include "tools/fleet/fleet_schema.hpp"
 #include "tools/fleet/fleet_time.hpp"
 #include "tools/watch/track_file.hpp"
 
@@ -17,23 +18,6 @@ namespace {
 
 constexpr double kHour_s = 3600.0;
 constexpr double kDay_s = 86400.0;
-
-/// Beside the tables of the identifications; a store from before gets them with its first watched log.
-constexpr const char* kTables = R"sql(
-CREATE TABLE IF NOT EXISTS watched_property (
-  stage_id INTEGER NOT NULL REFERENCES stage (id),
-  time_utc TEXT NOT NULL,
-  property TEXT NOT NULL,
-  kind TEXT NOT NULL,
-  value DOUBLE PRECISION NOT NULL,
-  change DOUBLE PRECISION NOT NULL,
-  deviation DOUBLE PRECISION NOT NULL,
-  PRIMARY KEY (stage_id, property, time_utc)
-) WITHOUT ROWID;
-CREATE VIEW IF NOT EXISTS watched AS
-  SELECT s.name AS stage, w.time_utc, w.property, w.kind, w.value, w.change, w.deviation
-  FROM watched_property w JOIN stage s ON s.id = w.stage_id;
-)sql";
 
 std::string utc_of(double days) {
   const auto seconds = std::chrono::seconds(std::llround(days * kDay_s));
@@ -55,7 +39,7 @@ std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
   const double start = start_of(log, tracks);
   const Database& database = store.database();
   Transaction transaction(database);
-  database.execute(kTables);
+  database.execute(kWatchedSchema);
   database.prepare("INSERT INTO stage (name, changed) VALUES (?, 0) ON CONFLICT DO NOTHING")
       .run(log.stage);
   Statement add = database.prepare(
