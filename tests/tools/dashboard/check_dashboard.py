@@ -40,16 +40,6 @@ def show(program, config, log, pace, *flags):
     return log, running, browser
 
 
-def check_widths(browser, work, what):
-    for width, dark in ((1280, False), (1280, True), (390, False)):
-        browser.resize(width, 1600, dark)
-        browser.evaluate("new Promise((f) => setTimeout(f, 400))")
-        overflow = browser.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        expect(overflow <= 0, f"{what}: at {width} pixels the page is {overflow} pixels too wide")
-        browser.screenshot(work / f"{what}_{width}{'_dark' if dark else ''}.png")
-    browser.resize(1280, 1600)
-
-
 def check_levels(browser):
     levels = browser.evaluate("Array.from(document.querySelectorAll('.level-value'), (e) => e.textContent)")
     expect(len(levels) == 5, f"{len(levels)} levels instead of 3 actuators and 2 sensors")
@@ -118,14 +108,14 @@ def watch_one(program, configs, work):
         expect(browser.wait_for("window.stageidDashboard.edition() >= 1"), "no response came")
         expect(browser.evaluate("window.stageidDashboard.state.state") == "running", "the first response came after the end only")
         check_levels(browser)
-        check_widths(browser, work, "running")
+        browser.check_widths(work, "running", 1600)
         expect(browser.wait_for("window.stageidDashboard.left"), "the page did not see the end")
         code, out = running.wait()
         expect(code in (0, 3), f"exit code {code}: {out}")
         expect(browser.evaluate("window.stageidDashboard.state.exit_code") == code, "the page knows another exit code")
         file = estimate(program, log)
         seen = browser.evaluate(RESPONSE)
-        check_widths(browser, work, "ended")
+        browser.check_widths(work, "ended", 1600)
         check_numbers(file, seen)
         expect(browser.problems == [], f"the browser complains: {browser.problems}")
         expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
@@ -197,7 +187,7 @@ def watch_a_change(program, configs, work):
         expect(len(seen["red"]) == 1 and "frequency of the mode at 181." in seen["red"][0], f"red lights: {seen['red']}")
         expect(seen["lit"] == seen["cards"] - 1, f"{seen['lit']} of {seen['cards']} lights are on")
         expect(len(seen["ribbons"]) == seen["cards"] - 2 and all(seen["ribbons"]), "a ribbon was not drawn")
-        check_widths(browser, work, "watched")
+        browser.check_widths(work, "watched", 1600)
         expect(browser.problems == [], f"the browser complains: {browser.problems}")
         expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
     finally:

@@ -184,17 +184,6 @@ def check_sentences(bench, guide):
         expect(sentence in text, f"not in the guide: {sentence}")
 
 
-def check_widths(bench, work):
-    browser = bench.browser
-    for width, dark in ((1280, False), (1280, True), (390, False), (390, True)):
-        browser.resize(width, 1000, dark)
-        browser.evaluate("new Promise((f) => setTimeout(f, 500))")
-        overflow = browser.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        expect(overflow <= 0, f"at {width} pixels the page is {overflow} pixels too wide")
-        browser.screenshot(work / f"workbench_{width}{'_dark' if dark else ''}.png")
-    browser.resize(1280, 1000)
-
-
 def check_save(program, bench, work):
     bench.place("#save-name")
     bench.get("document.getElementById('save-name').value = 'edited'")
@@ -230,7 +219,7 @@ def main():
         check_cursor_and_provenance(bench)
         check_sentences(bench, guide)
         check_save(program, bench, work)
-        check_widths(bench, work)
+        bench.browser.check_widths(work, "workbench", 1000)
         expect(bench.browser.problems == [], f"the browser complains: {bench.browser.problems}")
         expect(bench.get(f"{PAGE}.errors") == [], f"errors on the page: {bench.get(PAGE + '.errors')}")
         expect(running.interrupt() == 130, "it did not end in order")
