@@ -52,7 +52,7 @@ std::string LiveTraces::json(Eigen::Index channel) const {
       high.push_back(high_(channel, bin % kBins));
     }
   }
-  return nlohmann::json{{"bin_s", bin_s_}, {"low", low}, {"high", high}}.dump();
+  return nlohmann::json{{"bin_s", bin_s_}, {"bins", kBins}, {"low", low}, {"high", high}}.dump();
 }
 
 }  // namespace stageid

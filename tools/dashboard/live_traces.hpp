@@ -21,8 +21,8 @@ class LiveTraces final : public RunObserver {
   void rows(std::span<const double> rows, std::size_t words) noexcept override;
   void end_run(const LogRun&) noexcept override {}
 
-  /// {"bin_s": length of a bin, "low": [...], "high": [...]} of a channel in SI, oldest first; empty lists before the
-  /// first bin and for unknown channels.
+  /// {"bin_s": length of a bin, "bins": kBins, "low": [...], "high": [...]} of a channel in SI, oldest first; empty lists
+  /// before the first bin and for unknown channels.
   std::string json(Eigen::Index channel) const;
 
  private:

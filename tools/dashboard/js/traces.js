@@ -32,23 +32,21 @@ async function loadTraces() {
       trace.unit = [...shown.actuators, ...shown.sensors][place].unit;
       trace.figure.redraw();
     }
-  } catch { /* the stream tells that the program does not answer */ }
+  } catch { /* the head of the page reports a lost connection */ }
 }
 
 function drawTrace(context, width, height, { data, unit }) {
   if (!data || data.low.length < 2) return;
-  const { low, high, bin_s: step } = data;
+  const { low, high, bins, bin_s: step } = data;
   const area = { x: 66, y: 6, w: width - 74, h: height - 28 };
   const least = Math.min(...low), range = Math.max(...high) - least || 1;
-  const x = (i) => area.x + area.w * (i + 1 - low.length + traceBins) / traceBins;
+  const x = (i) => area.x + area.w * (i + 1 - low.length + bins) / bins;
   const y = (value) => area.y + area.h * (1 - (value - least) / range);
   const colours = palette();
   context.fillStyle = colours.curves[0];
-  const slice = Math.max(1, area.w / traceBins);
+  const slice = Math.max(1, area.w / bins);
   low.forEach((value, i) => context.fillRect(x(i) - slice, y(high[i]) - 0.5, slice, Math.max(1, y(value) - y(high[i]) + 1)));
   for (const value of [least, least + range]) drawText(context, quantity(value, unit), area.x - 6, y(value), { align: 'right', base: 'middle' });
-  drawText(context, '\u2212' + number(traceBins * step, 2) + '\u00a0s', area.x, height - 4, { base: 'bottom' });
+  drawText(context, '\u2212' + number(bins * step, 2) + '\u00a0s', area.x, height - 4, { base: 'bottom' });
   drawText(context, 'now', area.x + area.w, height - 4, { align: 'right', base: 'bottom' });
 }
-
-const traceBins = 500;
