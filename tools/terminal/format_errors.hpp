@@ -46,7 +46,7 @@ class FormatErrorList {
   }
 
  private:
-  /// A group of keys may be read twice.
+  /// A node with YAML aliases is read at each of them, and its errors are the same.
   void add(const FormatError& error) {
     const auto same = [&](const FormatError& other) {
       return std::string_view(other.what()) == error.what();
