@@ -4,8 +4,10 @@
 #include <sqlite3.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
@@ -15,6 +17,18 @@ namespace stageid {
 namespace {
 
 constexpr int kPatience_ms = 60000;
+
+/// SQLite does not wait where two processes make one new file a WAL file: it refuses one of them at once.
+int enter_wal_mode(sqlite3* database) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + std::chrono::milliseconds(kPatience_ms);
+  while (true) {
+    const int code =
+        ::sqlite3_exec(database, "PRAGMA journal_mode = WAL", nullptr, nullptr, nullptr);
+    if ((code & 0xFF) != SQLITE_BUSY || Clock::now() > end) return code;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
 
 }  // namespace
 
@@ -101,10 +115,12 @@ Database::Database(std::filesystem::path file, Access access) : file_(std::move(
   // A process may end at any time without losing a committed transaction; after a power failure the last ones may be
   // missing, and their jobs run again.
   execute("PRAGMA cache_size = -65536; PRAGMA trusted_schema = OFF");
-  if (access != Access::read)
-    execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON");
-  else
+  if (access == Access::read) {
     execute("PRAGMA query_only = ON");
+    return;
+  }
+  if (const int wal_code = enter_wal_mode(handle); wal_code != SQLITE_OK) fail(wal_code);
+  execute("PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON");
 }
 
 Statement Database::prepare(const std::string& sql) const {

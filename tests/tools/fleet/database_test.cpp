@@ -1,0 +1,37 @@
+#include "tools/fleet/database.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/process/temporary_directory.hpp"
+
+namespace stageid {
+namespace test_database {
+
+TEST(Database, SeveralWritersMayCreateOneFileAtTheSameInstant) {
+  const test::TemporaryDirectory directory;
+  constexpr int kFiles = 200, kWriters = 4;
+  std::vector<std::string> errors(kFiles * kWriters);
+  for (int file = 0; file < kFiles; ++file) {
+    std::vector<std::jthread> writers;
+    for (int writer = 0; writer < kWriters; ++writer)
+      writers.emplace_back([&, &error = errors[file * kWriters + writer]] {
+        try {
+          const Database database(directory / fmt::format("{}.db", file), Database::Access::create);
+          Transaction transaction(database);
+          database.execute("CREATE TABLE IF NOT EXISTS a (b)");
+          transaction.commit();
+        } catch (const std::exception& thrown) {
+          error = thrown.what();
+        }
+      });
+  }
+  for (const std::string& error : errors) EXPECT_EQ(error, "");
+}
+
+}  // namespace test_database
+}  // namespace stageid
