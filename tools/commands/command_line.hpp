@@ -68,6 +68,12 @@ inline void add_threads(CLI::App& command, int& threads) {
       ->capture_default_str();
 }
 
+inline void add_force(CLI::App& command, bool& force) {
+  command.add_flag(
+      "--force", force,
+      "measure even if the design predicts that a limit is exceeded; limits still stop the run");
+}
+
 /// An option whose value is a word of the enumeration.
 template <HasWords Enum>
 void add_choice(CLI::App& command, const std::string& name, Enum& value, const std::string& help) {

@@ -128,6 +128,7 @@ void write_limited(const DesignFlags& flags, Console& console, const ExperimentC
 void design_watch(const DesignFlags& flags, Console& console, const ExperimentConfig& config) {
   require_ending(flags.output, "an experiment", {".yaml", ".yml"});
   require_writable(flags.output, {flags.config, flags.watch.model, flags.watch.frf});
+  require_stable_loop(config, console);
   if (config.stage.spec.controller.by_peer)
     console.warning(
         "the stage closes the loop itself; the effect of its controller on the forces is "
@@ -174,14 +175,11 @@ void design(const DesignFlags& flags, Console& console) {
                       "--accuracy: needs the noise of a prior; set 'level: {limits: {prior: "
                       "FILE}}' in the experiment file");
   const ExperimentPlan plan = make_plan(config);
-  const DesignPrediction prediction =
-      predict_closed_loop(plan, config.stage.spec, config.stage.plant);
-  warn_of_prediction(config, console);
+  const DesignPrediction prediction = predict_signals(config, plan, console);
   const bool written = flags.force || prediction.violations().empty();
   if (written) write_experiment_plan(flags.output, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console.result(line);
-  if (!written) require_within_limits(config, prediction);
-  for (const std::string& line : prediction.violations()) console.warning("forced: " + line);
+  require_within_limits(config, prediction, flags.force, console);
   console.result(fmt::format("wrote {}", flags.output.string()));
   console.result(design_json(config, plan, prediction));
 }

@@ -20,7 +20,6 @@
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/formats/open_log.hpp"
-#include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "estimation/modal/validation.hpp"
@@ -139,15 +138,10 @@ class Identification {
       finish_step("design", seconds_since(start), "up to date");
       return;
     }
-    // Within limits it was designed from the knowledge of a pilot; the plant in the stage file must not be used.
-    const DesignPrediction prediction =
-        config_.limits ? DesignPrediction{}
-                       : predict_closed_loop(plan_, config_.stage.spec, config_.stage.plant);
-    if (!config_.limits) warn_of_prediction(config_, console_);
-    if (!flags_.force) require_within_limits(config_, prediction);
+    require_within_limits(config_, predict_signals(config_, plan_, console_), flags_.force,
+                          console_);
     require_directory(flags_.output);
     write_experiment_plan(path("excitation.h5"), plan_);
-    for (const std::string& line : prediction.violations()) console_.warning("forced: " + line);
     finish_step("design", seconds_since(start),
                 fmt::format("{}, {:.1f} min of stage time, {}", counted(plan_.runs().size(), "run"),
                             plan_.duration_s() / 60.0, counted(plan_.grid().size(), "line")));
@@ -379,9 +373,7 @@ void identify_command(CLI::App& app, Console& console) {
   command.add_option("-o,--output", flags.output, "directory for all results")->required();
   command.add_flag("--resume", flags.resume,
                    "continue an interrupted identification; steps that are up to date are kept");
-  command.add_flag(
-      "--force", flags.force,
-      "measure even if the design predicts that a limit is exceeded; limits still stop the run");
+  add_force(command, flags.force);
   add_threads(command, flags.threads);
 }
 

@@ -31,6 +31,7 @@ struct RunFlags {
   std::filesystem::path excitation;
   std::string backend;
   std::string dashboard;
+  bool force = false;
   WatchOptions watch;
   MeasurementRequest request;
 };
@@ -49,6 +50,8 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   if (request.backend != Backend::replay) require_stable_loop(config, console);
   const ExperimentPlan plan =
       flags.excitation.empty() ? make_plan(config) : read_plan_of(config, flags.excitation);
+  if (request.backend != Backend::replay)
+    require_within_limits(config, predict_signals(config, plan, console), flags.force, console);
   if (!flags.dashboard.empty()) request.dashboard = parse_dashboard_address(flags.dashboard);
   if (!flags.watch.model.empty()) request.watch = flags.watch;
   const MeasurementResult result = measure(config, plan, request, console);
@@ -128,6 +131,7 @@ void run_command(CLI::App& app, Console& console) {
       command.add_option("--watch", flags.watch.model,
                          "model.json: report how the stage differs from this model during the run");
   for (CLI::Option* const option : add_watch_options(command, flags.watch)) option->needs(watch);
+  add_force(command, flags.force);
   command.add_flag("--reset-fault", flags.request.reset_fault,
                    "clear a fault of the node or plant before the first run");
 }

@@ -209,23 +209,29 @@ void require_stable_loop(const ExperimentConfig& config, const Console& console)
   judge(config.limits ? config.limits->prior : config.stage.file, check_loop(config), console);
 }
 
-void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction) {
+DesignPrediction predict_signals(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                 const Console& console) {
+  if (config.limits) return {};
+  if (const std::string reason = why_unpredictable(config.stage.spec, config.stage.plant);
+      !reason.empty())
+    console.warning(
+        fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "
+                    "are enforced by stopping the run. Begin with a low level",
+                    config.stage.file.string(), reason));
+  return predict_closed_loop(plan, config.stage.spec, config.stage.plant);
+}
+
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction,
+                           bool forced, const Console& console) {
   const std::vector<std::string> violations = prediction.violations();
-  if (violations.empty()) return;
+  if (forced)
+    for (const std::string& violation : violations) console.warning("forced: " + violation);
+  if (forced || violations.empty()) return;
   const std::string more =
       violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
   throw FormatError(
       config.file, "",
       fmt::format("{}{}; lower the level, or override with --force", violations.front(), more));
-}
-
-void warn_of_prediction(const ExperimentConfig& config, const Console& console) {
-  const std::string reason = why_unpredictable(config.stage.spec, config.stage.plant);
-  if (reason.empty()) return;
-  console.warning(
-      fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "
-                  "are enforced by stopping the run. Begin with a low level",
-                  config.stage.file.string(), reason));
 }
 
 }  // namespace stageid

@@ -27,10 +27,14 @@ LoopCheck check_loop(const ExperimentConfig& config);
 void require_stable_loop(const ExperimentConfig& config, const Console& console);
 void require_stable_loop(const StageConfig& stage, const Console& console);
 
-/// Warns if the signals of the stage cannot be predicted, see why_unpredictable().
-void warn_of_prediction(const ExperimentConfig& config, const Console& console);
+/// The signals of the stage during the experiment; empty if the multisines were designed within limits, from a prior.
+/// Warns if they cannot be predicted, see why_unpredictable().
+DesignPrediction predict_signals(const ExperimentConfig& config, const ExperimentPlan& plan,
+                                 const Console& console);
 
-/// @throws FormatError naming the first limit that would be exceeded, and the number of others.
-void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction);
+/// To be called before the experiment is performed; if `forced`, only warns of every limit that would be exceeded.
+/// @throws FormatError naming the first one, and the number of others.
+void require_within_limits(const ExperimentConfig& config, const DesignPrediction& prediction,
+                           bool forced, const Console& console);
 
 }  // namespace stageid

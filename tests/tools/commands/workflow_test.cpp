@@ -179,7 +179,7 @@ TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
 
 TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
-  ends({"run", loud, "-o", "loud.slog"}, 4, "|u|");
+  ends({"run", loud, "--force", "-o", "loud.slog"}, 4, "|u|");
   const json info = tell({"log", "info", "loud.slog"});
   ASSERT_EQ(info["runs"].size(), 1U);
   EXPECT_FALSE(info["runs"][0]["complete"]);

@@ -168,14 +168,17 @@ TEST_F(BadRequest, WhatACanBusCannotCarry) {
   wrong("mode: residential, buses: [{interface: can0}]", "did you mean 'resident'?");
 }
 
-TEST_F(BadRequest, AnExperimentPastTheLimitsIsNotDesigned) {
+TEST_F(BadRequest, AnExperimentPastTheLimitsIsNeitherDesignedNorRun) {
   const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
   fail({"identify", loud, "-o", "dir"}, 2, "|u| would be");
+  fail({"run", loud, "-o", "loud.slog"}, 2, "|u| would be");
+  EXPECT_FALSE(std::filesystem::exists(at("loud.slog")));
   const ProgramResult design = ends({"design", loud, "-o", "e.h5"}, 2);
   EXPECT_THAT(design.out, testing::HasSubstr("EXCEEDED"));
   EXPECT_FALSE(std::filesystem::exists(at("e.h5")));
   succeed({"design", loud, "-o", "e.h5", "--force"});
   EXPECT_TRUE(std::filesystem::exists(at("e.h5")));
+  fail({"run", loud, "--excitation", "e.h5", "-o", "loud.slog"}, 2, "|u| would be");
 }
 
 TEST_F(BadRequest, AnExistingLogIsNotOverwritten) {
