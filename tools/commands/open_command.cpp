@@ -47,6 +47,8 @@ void open_command(CLI::App& app, Console& console) {
   command.add_flag("--write", flags.write, "permit to save models; default: read-only");
   command.add_option("-o,--output", flags.directory,
                      "directory for saved models; default: that of the FRF");
+  command.add_option("--controller-view", flags.stage,
+                     "stage file (.yaml): show the loop of each fit with its controller");
   command
       .add_option("--port", flags.port,
                   "port on this machine, which others cannot reach; 0: any free one")

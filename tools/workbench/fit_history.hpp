@@ -13,6 +13,8 @@
 
 namespace stageid {
 
+struct FitDetails;
+
 /// How far a fit of the workbench is.
 enum class FitStage : std::uint8_t {
   waiting,
@@ -35,6 +37,7 @@ struct FitState {
   std::vector<double> cost = {};                         ///< of the refinement so far
   std::string message = {};                              ///< how the fit ended, or why it failed
   std::filesystem::path saved = {};                      ///< the model file; empty: not saved
+  std::shared_ptr<const FitDetails> details = nullptr;   ///< null: none yet
 
   bool needs_fit() const noexcept {
     return stage == FitStage::waiting || stage == FitStage::linear || stage == FitStage::improved;

@@ -13,6 +13,7 @@
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/problem_commands.hpp"
 #include "tools/workbench/edit.hpp"
+#include "tools/workbench/fit_details.hpp"
 #include "tools/workbench/model_request.hpp"
 #include "tools/workbench/warm_start.hpp"
 
@@ -29,8 +30,6 @@ constexpr auto kFarewell = 2s;     // for pages to read the end
 ReportInput input_of(const std::vector<std::filesystem::path>& files) {
   ReportInput input = report_input(files);
   input.all_lines = true;
-  input.controller_view.clear();  // of one model
-  input.model_h5.clear();
   if (input.frf.empty())
     throw std::invalid_argument(
         fmt::format("{}: contains no FRF; add the FRF to which the model is fitted",
@@ -38,8 +37,19 @@ ReportInput input_of(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
+/// Without what belongs to one model only.
+ReportData response_of(ReportInput input) {
+  input.controller_view.clear();
+  input.model_h5.clear();
+  return read_report_data(input);
+}
+
+std::optional<StageConfig> stage_of(const std::filesystem::path& file) {
+  return file.empty() ? std::nullopt : std::optional(load_stage_config(file));
+}
+
 /// A model, if there is one, is the first fit; weights that it names are beside the FRF.
-FitState first_state(const ReportInput& input, const FrfEstimate& frf) {
+FitState first_state(const ReportInput& input, const FrfEstimate& frf, const StageConfig* stage) {
   FitState state;
   state.what = "opened";
   state.stage = FitStage::refined;
@@ -57,9 +67,15 @@ FitState first_state(const ReportInput& input, const FrfEstimate& frf) {
   if (!weights.empty() && weights.is_relative()) weights = input.frf.parent_path() / weights;
   state.cost = model->cost_history;
   state.message = model->fit.message;
+  state.details = details_of_files(input, *model, frf, stage);
   state.model = std::move(model);
   state.saved = input.model;
   return state;
+}
+
+std::string message_of(const FitState& state) {
+  if (!state.details || state.details->problem.empty()) return state.message;
+  return fmt::format("{}; {}", state.message, state.details->problem);
 }
 
 int modes_in(const FitState& state) {
@@ -72,10 +88,11 @@ int modes_in(const FitState& state) {
 
 Workbench::Workbench(const WorkbenchOptions& options)
     : options_(options),
+      stage_(stage_of(options.stage)),
       input_(input_of(options.inputs)),
-      page_(read_report_data(input_)),
+      page_(response_of(input_)),
       fingerprint_(fingerprint_of_file(input_.frf)),
-      history_(first_state(input_, page_.frf())) {
+      history_(first_state(input_, page_.frf(), stage())) {
   if (options_.directory.empty()) options_.directory = input_.frf.parent_path();
   for (const std::filesystem::path& file : options_.compare)
     compared_.push_back(page_.compared(read_compared({file})));
@@ -129,7 +146,7 @@ std::string Workbench::state_text() const {
                {"states", Json::array()},
                {"command", history_.index() == 0 && !current.model ? "" : command()},
                {"cost", current.cost},
-               {"message", current.message},
+               {"message", message_of(current)},
                {"controls", controls_json(current.request)},
                {"writable", options_.write},
                {"directory", options_.directory.string()},
@@ -218,7 +235,16 @@ void Workbench::improve(const FitSetup& setup, Work& work, const std::function<b
   store(work);
 }
 
-/// The second preview, then the fit of `stageid fit`.
+/// Adds the details of a fit to the current state, unless another one is current by now.
+void Workbench::detail(const FitSetup& setup, const Work& work, FitResult result) {
+  const auto details = details_of_fit(setup, std::move(result), page_.frf(), stage());
+  const std::lock_guard lock(mutex_);
+  if (version_ != work.version) return;
+  history_.current().details = details;
+  show();
+}
+
+/// The second preview, then the fit of `stageid fit`, then its details.
 void Workbench::fit(Work& work) {
   FitState& state = work.state;
   try {
@@ -235,8 +261,9 @@ void Workbench::fit(Work& work) {
     state.stage = stopped ? FitStage::stopped : FitStage::refined;
     // A fit that was stopped early may be worse than its preview.
     if (!stopped || !state.model || result.model.fit.cost < state.model->fit.cost)
-      state.model = std::make_shared<const AdditiveModel>(std::move(result.model));
+      state.model = std::make_shared<const AdditiveModel>(result.model);
     store(work);
+    if (state.stage == FitStage::refined) detail(setup, work, std::move(result));
   } catch (const std::invalid_argument& error) {
     fail(work, error.what());
   } catch (const FileError& error) {

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "tools/config/stage_config.hpp"
 #include "tools/dashboard/dashboard_server.hpp"
 #include "tools/workbench/edit.hpp"
 #include "tools/workbench/fit_history.hpp"
@@ -26,13 +27,14 @@ struct WorkbenchOptions {
   std::vector<std::filesystem::path> compare;  ///< results to compare with, one per entry
   bool write = false;                          ///< whether models may be saved
   std::filesystem::path directory;             ///< for saved models; empty: that of the FRF
+  std::filesystem::path stage;                 ///< whose controller closes the loop; empty: unknown
   int port = 0;                                ///< on loopback; 0: any free one
   int threads = 0;                             ///< of a fit
 };
 
 /// A page in the browser that edits a fit: modes, band and options, with undo and redo. Each edit is answered by previews,
-/// see warm_start.hpp, the first of them with the action, then by the fit that `stageid fit` would make, with the command line for it. Files are written by the action
-/// "save" only.
+/// see warm_start.hpp, the first of them with the action, then by the fit that `stageid fit` would make, with the command
+/// line for it, then by its 95 % band and the loop with a controller. Files are written by the action "save" only.
 ///
 /// Actions, POST /act, JSON: those of edited(); {"kind": "undo"}, "redo", {"kind": "go", "index"}; {"kind": "save",
 /// "name"}; {"kind": "keep"}: compare with the current model from now on; {"kind": "compare", "index"}: show the curves of
@@ -80,11 +82,14 @@ class Workbench {
   bool next(Work& work);
   void improve(const FitSetup& setup, Work& work, const std::function<bool()>& is_over);
   void fit(Work& work);
+  void detail(const FitSetup& setup, const Work& work, FitResult result);
+  const StageConfig* stage() const noexcept { return stage_ ? &*stage_ : nullptr; }
   void store(const Work& work);
   void fail(Work& work, const std::string& why);
   void tell_progress(const Work& work, double cost);
 
   WorkbenchOptions options_;
+  std::optional<StageConfig> stage_;
   ReportInput input_;
   WorkbenchPage page_;
   std::string fingerprint_;  ///< of the FRF's file

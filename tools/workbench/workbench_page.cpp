@@ -9,6 +9,7 @@
 #include "tools/report/report_encoding.hpp"
 #include "tools/report/report_json.hpp"
 #include "tools/steps/fit_step.hpp"
+#include "tools/workbench/fit_details.hpp"
 
 namespace stageid {
 namespace {
@@ -40,10 +41,14 @@ std::string encoded(const Eigen::MatrixXcd& values, int order) {
   return values.size() == 0 ? "" : report::encode_complex_block16(values, {nullptr, order}).text;
 }
 
-void add_array(const char* name, const std::string& text, int order, Json& json) {
+void add_array(const char* name, const std::string& text, const Json& about, Json& json) {
   if (text.empty()) return;
-  json["arrays"][name] = {{"type", "c40"}, {"order", order}};
+  json["arrays"][name] = about;
   json["blocks"][name] = text;
+}
+
+void add_complex(const char* name, const std::string& text, int order, Json& json) {
+  add_array(name, text, {{"type", "c40"}, {"order", order}}, json);
 }
 
 }  // namespace
@@ -78,8 +83,14 @@ std::string WorkbenchPage::results(const FitState& state,
     data.model = *state.model;
     if (data_.validation_frf && state.stage == FitStage::refined)
       data.validation = validate(*state.model, *data_.validation_frf, distortion_of(*state.model));
-    add_array("model_response", encoded(response_like(*state.model, *data_.frf), kSmooth), kSmooth,
-              more);
+    add_complex("model_response", encoded(response_like(*state.model, *data_.frf), kSmooth),
+                kSmooth, more);
+  }
+  if (state.details) {
+    const report::LogBytes& deviation = state.details->deviation;
+    add_array("model_deviation", deviation.text,
+              {{"type", "log8"}, {"low", deviation.low}, {"step", deviation.step}}, more);
+    data.controller_view = state.details->loop;
   }
   for (const auto& other : all) {
     data.comparison = other->result;
@@ -88,8 +99,8 @@ std::string WorkbenchPage::results(const FitState& state,
   data.comparison.reset();
   if (chosen) {
     data.comparison = all[*chosen]->result;
-    add_array("other_response", all[*chosen]->response, 0, more);
-    add_array("other_model", all[*chosen]->model_response, kSmooth, more);
+    add_complex("other_response", all[*chosen]->response, 0, more);
+    add_complex("other_model", all[*chosen]->model_response, kSmooth, more);
   }
   std::string text = more.dump(-1, ' ', true, Json::error_handler_t::replace);
   text.back() = ',';

@@ -143,6 +143,17 @@ def check_numbers(bench):
     expect(errors[0] == 0 and errors[1] > 100 and 0 < errors[2] < 0.2, f"residual, lines, error: {errors}")
 
 
+def check_band_and_loop(bench):
+    """What follows from the covariance of a fit comes after the fit itself."""
+    def text(selector):
+        return bench.get(f"(document.querySelector('{selector}') || {{ textContent: '' }}).textContent")
+    expect(bench.browser.wait_for(f"{PAGE}.channelCurves(0).modelDeviation && /\u00b1/.test(document.querySelector('#loop').textContent)"),
+           f"no band of the model, or no discs of the loop: {text('#loop')[:200]}")
+    radius = bench.get(f"{PAGE}.content.loop.loops[0].phase_margin_deg.radius_95")
+    expect(radius > 0, f"the phase margin has the radius {radius}")
+    expect("model" in text("#entry-legend"), "the model is not in the legend")
+
+
 def check_comparison(bench):
     rows = bench.get("document.querySelectorAll('#trend-table tbody tr').length")
     expect(rows == 2, f"{rows} rows of trends instead of the other day and this fit")
@@ -210,11 +221,13 @@ def main():
     work.mkdir(parents=True)
     for seed in (1, 2):
         identify(program, configs, work / f"day{seed}", seed)
-    running = OpenProgram(program, work / "day1", "--compare", work / "day2", "--write", "-o", work / "saved")
+    running = OpenProgram(program, work / "day1", "--compare", work / "day2", "--write", "-o", work / "saved",
+                          "--controller-view", configs / "stage/small_stage.yaml")
     bench = Workbench(running.url)
     try:
         check_edits(bench)
         check_numbers(bench)
+        check_band_and_loop(bench)
         check_comparison(bench)
         check_cursor_and_provenance(bench)
         check_sentences(bench, guide)

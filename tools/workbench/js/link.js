@@ -3,7 +3,7 @@
 const bench = { state: null, stage: null, trends: [], edition: 0, loading: false };
 
 // Sections that depend on the model, in resultParts; 'trends' is that of the workbench.
-const modelKeys = ['verdict', 'model', 'modes', 'shapes', 'shape_channels', 'geometry', 'decisions', 'cost', 'comparison', 'validation'];
+const modelKeys = ['verdict', 'model', 'modes', 'shapes', 'shape_channels', 'geometry', 'decisions', 'cost', 'comparison', 'validation', 'loop'];
 
 const previews = {
   linear: 'Preview: the numerators are fitted, poles and delays not yet', improved: 'Preview after a second of iterations; the fit is running',
@@ -45,7 +45,7 @@ async function fetchResults(edition) {
 async function takeResults(fresh) {
   array('response');  // decoded with the arrays that it was packed with
   const unpacked = await unpackAll(fresh.blocks);
-  for (const id of ['model_response', 'other_response', 'other_model', 'residual']) {
+  for (const id of ['model_response', 'model_deviation', 'other_response', 'other_model', 'residual']) {
     delete content.arrays[id];
     delete decoded[id];
   }

@@ -24,7 +24,7 @@ function rebuild(parts, place) {
   document.querySelector('#contents a[href="#' + next.id + '"]').before(document.querySelector('#contents a[href="#' + id + '"]'));
 }
 
-const changingParts = new Set(['modes', 'shapes', 'comparison', 'trends', 'validation', 'cost', 'decisions', 'provenance']);
+const changingParts = new Set(['modes', 'shapes', 'loop', 'comparison', 'trends', 'validation', 'cost', 'decisions', 'provenance']);
 
 function showResults() {
   const top = window.scrollY;
