@@ -44,7 +44,7 @@ Eigen::Index window_lines(Eigen::Index k, Eigen::Index reach, Eigen::Index N) {
 double expected_power(double power, double n, double nu) {
   const double share = power / n;
   if (!(nu + share > 0.0)) return 1.0;  // infinite: a single line with one degree of freedom
-  return std::exp(n * (std::lgamma(nu + share) - std::lgamma(nu) - share * std::log(nu)));
+  return std::exp(n * (log_gamma(nu + share) - log_gamma(nu) - share * std::log(nu)));
 }
 
 /// v^power for power 1 or -1, v the geometric mean over neighbouring lines, which does not spread a resonance of the

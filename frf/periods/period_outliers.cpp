@@ -256,7 +256,7 @@ Eigen::MatrixXd record_of(const ComparedPeriods& periods, Index channel) {
 double log_choices(Index P, std::size_t n) {
   const auto in = static_cast<double>(n);
   const auto all = static_cast<double>(P);
-  return std::lgamma(all + 1.0) - std::lgamma(in + 1.0) - std::lgamma(all - in + 1.0) +
+  return log_gamma(all + 1.0) - log_gamma(in + 1.0) - log_gamma(all - in + 1.0) +
          std::log(all - in);
 }
 

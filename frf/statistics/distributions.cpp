@@ -55,6 +55,11 @@ double tail_of_chi_square(double x, double n) {
 
 double tail_of_normal(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 
+double log_gamma(double x) noexcept {
+  int sign = 0;
+  return ::lgamma_r(x, &sign);
+}
+
 double mean_of_log_power(double dof) { return boost::math::digamma(dof, Quiet()) - std::log(dof); }
 
 double variance_of_log_power(double dof) { return boost::math::trigamma(dof, Quiet()); }

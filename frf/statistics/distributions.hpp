@@ -21,6 +21,9 @@ double tail_of_chi_square(double x, double n);
 /// P(Z > z) of a standard normal variable.
 double tail_of_normal(double z);
 
+/// ln |Gamma(x)|. From any thread: std::lgamma() writes the sign to a global variable.
+double log_gamma(double x) noexcept;
+
 /// Mean and variance of the logarithm of a mean power of complex Gaussian noise whose true value is 1,
 /// with dof > 0 complex degrees of freedom: psi(dof) - ln dof and psi'(dof).
 double mean_of_log_power(double dof);

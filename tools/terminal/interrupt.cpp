@@ -39,10 +39,10 @@ AtInterrupt& at_interrupt() {
 
 [[noreturn]] void end_program() {
   ending = true;
-  remove_unfinished_files();
   AtInterrupt& shared = at_interrupt();
   const std::lock_guard lock(shared.mutex);
-  if (shared.clean_up) shared.clean_up();
+  if (shared.clean_up) shared.clean_up();  // may wait for an output that is being written
+  remove_unfinished_files();               // from here on, none can be begun
   const std::string message = fmt::format("stageid: interrupted; {}\n", shared.what_is_left);
   static_cast<void>(!::write(STDERR_FILENO, message.data(), message.size()));
   ::_exit(kInterrupted);

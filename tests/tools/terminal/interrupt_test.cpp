@@ -1,0 +1,32 @@
+#include "tools/terminal/interrupt.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "acquisition/files/output_file.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tools/terminal/exit_code.hpp"
+
+namespace stageid {
+namespace test_interrupt {
+
+/// Ends by the signal; a file is being written, and the function for the end writes another one.
+[[noreturn]] void end_while_writing(const test::TemporaryDirectory& directory) {
+  catch_signals();
+  const OutputFile unfinished(directory / "unfinished");
+  const CleanedUpAtInterrupt clean_up([&] { write_text_file(directory / "farewell", "end"); });
+  ::kill(::getpid(), SIGINT);
+  for (;;) ::pause();
+}
+
+TEST(InterruptDeathTest, WhatIsDoneAtTheEndMayWaitForAnOutput) {
+  const test::TemporaryDirectory directory;
+  EXPECT_EXIT(end_while_writing(directory), testing::ExitedWithCode(kInterrupted),
+              "stageid: interrupted; nothing was written");
+}
+
+}  // namespace test_interrupt
+}  // namespace stageid
