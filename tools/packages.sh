@@ -5,7 +5,7 @@
 build_packages="g++ cmake ninja-build pkg-config
   libeigen3-dev libfftw3-dev libhdf5-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
   libfmt-dev libxxhash-dev libcpp-httplib-dev libmodbus-dev libzmq3-dev libmatio-dev zlib1g-dev libjs-dygraphs
-  libboost-math-dev libutfcpp-dev libzip-dev libsqlite3-dev gnuplot-nox"
+  libboost-math-dev libutfcpp-dev libzip-dev libsqlite3-dev libpq-dev gnuplot-nox"
 
 # Additional packages for the tests: the references in Python, the report in a browser, the format, the C++ reference,
 # the documentation site, a kernel with CAN, the stageid packages.

@@ -6,6 +6,7 @@
 After every fault, the same command completes the work: each job is in the store exactly once.
 """
 import contextlib
+import json
 import os
 import pathlib
 import random
@@ -117,12 +118,34 @@ class FleetTest(unittest.TestCase):
     def test_two_processes_share_the_work(self):
         both = [subprocess.Popen([self.program, "--verbosity", "quiet", "fleet", "fleet.yaml", "--json"], cwd=self.work,
                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)]
-        errors = [process.communicate()[1] for process in both]
-        for process, error in zip(both, errors):
-            if process.returncode != 0:  # it ended first
-                self.assertRegex(error, r"^stageid: fleet\.db: \d+ jobs? (is|are) run by another process; ")
-        self.call("fleet", "fleet.yaml")
+        outputs = [process.communicate() for process in both]
+        self.assertEqual([(process.returncode, errors) for process, (_, errors) in zip(both, outputs)], [(0, "")] * 2)
+        self.assertEqual(sum(json.loads(text)["done"] for text, _ in outputs), LOGS)
         self.expect_every_job_once()
+
+    def test_a_process_takes_over_the_jobs_of_a_killed_one(self):
+        command = [self.program, "--verbosity", "quiet", "fleet", "fleet.yaml", "--workers", "1"]
+        killed = subprocess.Popen(command, cwd=self.work, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        children = pathlib.Path(f"/proc/{killed.pid}/task/{killed.pid}/children")
+        while not children.read_text():
+            time.sleep(0.001)
+        os.kill(killed.pid, signal.SIGSTOP)
+        other = subprocess.Popen(command, cwd=self.work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while self.done() < LOGS - 1:
+            time.sleep(0.01)
+        time.sleep(0.5)
+        self.assertIsNone(other.poll(), "it does not wait for the job of the other process")
+        killed.kill()
+        killed.wait()
+        self.assertEqual(other.communicate()[1], "")
+        self.assertEqual(other.returncode, 0)
+        self.expect_every_job_once()
+
+    def done(self):
+        try:
+            return self.rows("SELECT COUNT(*) FROM identification")[0][0]
+        except sqlite3.OperationalError:  # no tables yet
+            return 0
 
     def call_limited(self, most_bytes):
         """Files end there, as with a quota."""

@@ -59,18 +59,13 @@ void run_jobs(const FleetFlags& flags, Console& console) {
                   {"done_before", summary.done_before},
                   {"done", summary.done},
                   {"not_trustworthy", summary.not_trustworthy},
-                  {"failed", summary.failed},
-                  {"elsewhere", summary.elsewhere}});
-  if (summary.elsewhere > 0)
-    console.warning(
-        fmt::format("{}: {} run by another process; run the command again when it has ended",
-                    config.store.string(), counted(summary.elsewhere, "job is", "jobs are")));
+                  {"failed", summary.failed}});
   if (summary.failed > 0)
     console.warning(fmt::format("{}: {} failed; remove the cause and run the command again",
                                 config.store.string(), counted(summary.failed, "job")));
-  console.exit_code = summary.failed > 0 || summary.elsewhere > 0 ? kWorldFailed
-                      : summary.not_trustworthy > 0               ? kNotTrustworthy
-                                                                  : kDone;
+  console.exit_code = summary.failed > 0            ? kWorldFailed
+                      : summary.not_trustworthy > 0 ? kNotTrustworthy
+                                                    : kDone;
 }
 
 /// stageid fleet job FLEET.yaml LOG
@@ -152,14 +147,11 @@ bool is_name(const std::string& text) {
 }
 
 void require_table(const Database& database, const std::string& name) {
-  std::vector<std::string> tables;
-  Statement rows = database.prepare(
-      "SELECT name FROM sqlite_master WHERE type IN ('table', 'view') ORDER BY name");
-  while (rows.step()) tables.push_back(rows.text(0));
+  const std::vector<std::string> tables = database.tables();
   if (std::ranges::find(tables, name) == tables.end())
     throw std::invalid_argument(
-        fmt::format("{}: unknown table '{}'; use one of {}, or an SQL statement",
-                    database.file().string(), name, fmt::join(tables, ", ")));
+        fmt::format("{}: unknown table '{}'; use one of {}, or an SQL statement", database.name(),
+                    name, fmt::join(tables, ", ")));
 }
 
 Json value_of(const Statement& row, int column) {

@@ -5,6 +5,7 @@
 
 #include "tools/config/config_reader.hpp"
 #include "tools/config/yaml_document.hpp"
+#include "tools/database/database.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/fit/fit_words.hpp"
 
@@ -40,7 +41,9 @@ void describe_fleet(ConfigVisitor& v, FleetFile& file) {
          "log may be omitted, all others are tags");
   v.require(!config.logs.empty() || !file.table.empty(), "format",
             "no logs: write 'logs: [PATTERN, ...]' or 'table: FILE.csv'");
-  v.text("store", file.store, kOptional, "database of the results, relative to this file");
+  v.text(
+      "store", file.store, kOptional,
+      "database of the results: a file, relative to this one, or postgresql://USER@HOST/DATABASE");
   v.text("results", file.results, kOptional, "folder of models and reports, relative to this file");
   choose(v, "stage_name", config.stage_name, kOptional,
          "name of a stage that the table does not name: log: the one in its log, folder: that of "
@@ -90,7 +93,8 @@ FleetConfig load_fleet_config(const std::filesystem::path& path) {
   const std::filesystem::path folder = escaped(path.parent_path().string());
   for (std::string& pattern : config.logs) pattern = (folder / pattern).lexically_normal().string();
   if (!file.table.empty()) config.table = beside(file.table);
-  config.store = beside(file.store);
+  config.store =
+      is_database_url(file.store) ? std::filesystem::path(file.store) : beside(file.store);
   config.results = beside(file.results);
   const YamlNode* identification = document.value(document.root(), "identification");
   config.identification =

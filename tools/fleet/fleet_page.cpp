@@ -37,9 +37,9 @@ class FleetPage {
     if (count_ == 0)
       throw std::invalid_argument(
           fmt::format("{}: contains no identification of this time; change --since and --until",
-                      database_.file().string()));
+                      database_.name()));
     Json content = {{"version", version()},
-                    {"title", database_.file().stem().string()},
+                    {"title", title()},
                     {"stages", stages},
                     {"track_keys",
                      {"mode", "frequency_hz", "spread_hz", "damping_ratio", "deviation", "seen",
@@ -47,11 +47,14 @@ class FleetPage {
                     {"outliers", outliers_},
                     {"folders", folder_links()}};
     const std::vector<report::Block> blocks = series_.blocks(content["arrays"]);
-    return html_page(HtmlPage::fleet, fmt::format("{}: fleet", database_.file().stem().string()),
+    return html_page(HtmlPage::fleet, fmt::format("{}: fleet", title()),
                      script_safe(json_line(content)), blocks);
   }
 
  private:
+  /// The name of the file or the database.
+  std::string title() const { return std::filesystem::path(database_.name()).stem().string(); }
+
   std::vector<std::pair<std::string, std::int64_t>> chosen_stages() const {
     std::vector<std::pair<std::string, std::int64_t>> out;
     std::vector<std::string> names;
@@ -68,7 +71,7 @@ class FleetPage {
             nearest_word(wanted, names).empty()
                 ? ""
                 : fmt::format(", did you mean '{}'?", nearest_word(wanted, names)),
-            database_.file().string()));
+            database_.name()));
     return out;
   }
 
@@ -99,7 +102,7 @@ class FleetPage {
       return std::filesystem::absolute(file).lexically_normal().parent_path();
     };
     for (const std::string& results : folders_)
-      links.push_back((of(database_.file()) / results)
+      links.push_back((of(database_.name()) / results)
                           .lexically_normal()
                           .lexically_proximate(of(request_.output))
                           .generic_string());
@@ -129,7 +132,7 @@ class FleetPage {
         throw std::invalid_argument(fmt::format(
             "{}: more than {} identifications are too many for one page; choose some with --stage, "
             "--since and --until",
-            database_.file().string(), kMostOnPage));
+            database_.name(), kMostOnPage));
     }
     return {{"name", name},          {"first", first},      {"count", count_ - first},
             {"doubtful", counts[1]}, {"failed", counts[2]}, {"tracks", tracks(id, place)}};

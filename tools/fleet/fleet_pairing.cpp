@@ -47,7 +47,7 @@ std::size_t names_in(const std::string& list) {
 double positive_number(const Statement& row, int column, const Database& database) {
   const double number = row.number(column);
   if (!std::isfinite(number) || number <= 0.0)
-    throw FormatError(database.file(), "",
+    throw FormatError(database.name(), "",
                       fmt::format("contains the frequency {} Hz; restore a copy", number));
   return number;
 }
@@ -186,7 +186,8 @@ std::vector<StageTrack> read_tracks(const Database& database) {
   Statement rows = database.prepare(
       "SELECT t.stage_id, t.track, t.frequency_hz, t.shape FROM track t "
       "JOIN stage s ON s.id = t.stage_id "
-      "WHERE t.seen >= ? * (SELECT COUNT(*) FROM identification i WHERE i.stage_id = t.stage_id "
+      "WHERE t.seen >= CAST(? AS DOUBLE PRECISION) * (SELECT COUNT(*) FROM identification i WHERE "
+      "i.stage_id = t.stage_id "
       "AND i.is_current = 1 AND i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
   rows.bind(kLeastShare);
   while (rows.step()) {

@@ -1,18 +1,17 @@
 #include "tools/fleet/fleet_run.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <deque>
 #include <map>
 #include <set>
 #include <string>
+#include <thread>
 
-#include "acquisition/files/file_descriptor.hpp"
+#include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
-#include "acquisition/files/system_reason.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "tools/fleet/child_pool.hpp"
 #include "tools/fleet/fleet_store.hpp"
@@ -23,40 +22,14 @@
 namespace stageid {
 namespace {
 
-/// Claims of jobs among processes: one byte each of the file STORE-claims, locked.
-class Claims {
- public:
-  explicit Claims(const std::filesystem::path& store)
-      : path_(store.string() + "-claims"),
-        file_(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (file_.get() < 0) throw FileError(fmt::format("{}: {}", path_, system_reason(errno)));
-  }
-  /// @returns false if another process has it   @throws FileError if the file system cannot lock
-  bool claim(const std::string& job) {
-    if (set(job, F_WRLCK)) return true;
-    if (errno == EAGAIN || errno == EACCES) return false;
-    throw FileError(fmt::format("{}: cannot be locked: {}; put the store on a local disk", path_,
-                                system_reason(errno)));
-  }
-  void release(const std::string& job) { static_cast<void>(set(job, F_UNLCK)); }
-
- private:
-  bool set(const std::string& job, short kind) {
-    struct flock lock {};
-    lock.l_type = kind;
-    lock.l_whence = SEEK_SET;
-    lock.l_start = std::stoll(job.substr(0, 15), nullptr, 16);
-    lock.l_len = 1;
-    return ::fcntl(file_.get(), F_OFD_SETLK, &lock) == 0;
-  }
-  std::string path_;
-  FileDescriptor file_;
-};
+/// How often jobs of other processes are looked at.
+constexpr std::chrono::milliseconds kLook{200};
 
 struct Job {
   FleetLog log;
   std::string fingerprint;
   std::string id;
+  std::int64_t claim() const { return std::stoll(id.substr(0, 15), nullptr, 16); }
 };
 
 std::vector<std::string> arguments_of(const Job& job, const FleetConfig& config) {
@@ -76,17 +49,19 @@ class FleetRun {
       : config_(config),
         console_(console),
         store_(config.store, Database::Access::create),
-        claims_(config.store),
         progress_(console, "fleet", "jobs") {}
 
   FleetSummary run(const std::vector<FleetLog>& logs, std::size_t workers) {
     find_jobs(logs);
-    std::size_t next = 0;
-    while (next < jobs_.size() || pool_.size() > 0) {
+    for (std::size_t i = 0; i < jobs_.size(); ++i) open_.push_back(i);
+    while (!open_.empty() || pool_.size() > 0) {
       throw_if_interrupted();
-      while (pool_.size() < workers && next < jobs_.size()) start(next++);
-      if (pool_.size() > 0) finish(pool_.wait());
-      progress_.update(static_cast<double>(summary_.done + summary_.failed),
+      start_jobs(workers);
+      if (pool_.size() > 0)
+        finish(pool_.wait());
+      else if (!open_.empty())
+        wait_for_others();
+      progress_.update(static_cast<double>(jobs_.size() - open_.size() - pool_.size()),
                        static_cast<double>(jobs_.size()));
     }
     return summary_;
@@ -94,20 +69,22 @@ class FleetRun {
 
  private:
   void find_jobs(const std::vector<FleetLog>& logs) {
-    const std::map<std::string, bool> done = store_.done_jobs();
+    const std::map<std::string, JobState> stored = store_.jobs();
     std::set<std::string> known;
     for (const FleetLog& log : logs) {
       try {
         Job job{log, log_fingerprint(store_, log.file), ""};
         job.id = job_id(job.fingerprint, config_);
         if (!known.insert(job.id).second) continue;  // a copy of another log
-        const auto found = done.find(job.id);
-        if (found == done.end()) {
+        const auto found = stored.find(job.id);
+        const JobState state = found == stored.end() ? JobState::none : found->second;
+        if (state == JobState::failed) failed_before_.insert(job.id);
+        if (state == JobState::none || state == JobState::failed) {
           jobs_.push_back(std::move(job));
           continue;
         }
         ++summary_.done_before;
-        if (!found->second) store_.make_current(job.id);  // options that were used before
+        if (state == JobState::superseded) store_.make_current(job.id);  // options used before
       } catch (const FileError& error) {
         ++summary_.failed;
         console_.warning(error.what());
@@ -116,16 +93,35 @@ class FleetRun {
     summary_.jobs = known.size() + summary_.failed;
   }
 
-  void start(std::size_t index) {
-    const Job& job = jobs_[index];
-    if (!claims_.claim(job.id)) {
-      ++summary_.elsewhere;
-    } else if (store_.is_done(job.id)) {  // by another process, since find_jobs()
-      ++summary_.done_before;
-      claims_.release(job.id);
-    } else {
-      pool_.start(index, arguments_of(job, config_));
+  /// Starts jobs while there are workers. Those that other processes run remain open, in case these end early.
+  void start_jobs(std::size_t workers) {
+    for (std::size_t left = open_.size(); left > 0 && pool_.size() < workers; --left) {
+      const std::size_t index = open_.front();
+      open_.pop_front();
+      const Job& job = jobs_[index];
+      if (!store_.database().claim(job.claim())) {
+        open_.push_back(index);
+        continue;
+      }
+      // Other processes may have run it since find_jobs().
+      const JobState state = store_.state_of(job.id);
+      const bool done = state == JobState::current || state == JobState::superseded;
+      const bool failed = state == JobState::failed && !failed_before_.contains(job.id);
+      if (done || failed) {
+        ++(done ? summary_.done_before : summary_.failed);
+        store_.database().release(job.claim());
+      } else {
+        pool_.start(index, arguments_of(job, config_));
+      }
     }
+  }
+
+  void wait_for_others() {
+    if (!waiting_)
+      console_.message(fmt::format("{} by other processes; waiting for them",
+                                   counted(open_.size(), "job is run", "jobs are run")));
+    waiting_ = true;
+    std::this_thread::sleep_for(kLook);
   }
 
   void finish(const ChildEnd& end) {
@@ -141,7 +137,7 @@ class FleetRun {
       store_.add(failed);
       console_.warning(failed.reasons);
     }
-    claims_.release(job.id);
+    store_.database().release(job.claim());
   }
 
   static std::string reason_of(const ChildEnd& end, const Job& job) {
@@ -159,9 +155,12 @@ class FleetRun {
   const FleetConfig& config_;
   const Console& console_;
   FleetStore store_;
-  Claims claims_;
   Progress progress_;
   std::vector<Job> jobs_;
+  std::set<std::string> failed_before_;
+  std::deque<std::size_t>
+      open_;  ///< jobs that are neither run by this process nor known to be done
+  bool waiting_ = false;
   ChildPool pool_;
   FleetSummary summary_;
 };

@@ -15,13 +15,12 @@ struct FleetSummary {
   std::size_t done_before = 0;
   std::size_t done = 0;             ///< by this call
   std::size_t not_trustworthy = 0;  ///< of these
-  std::size_t failed = 0;
-  std::size_t elsewhere = 0;  ///< are run by another process
+  std::size_t failed = 0;           ///< also in other processes meanwhile
 };
 
 /// Identifies every log of a fleet that is not in its store, each in a process of its own, so that a damaged log ends one job
 /// only. A failed job is stored with its error and runs again next time. Several processes may run the same fleet:
-/// each job is claimed by a lock that the system releases when its process ends.
+/// each job is claimed by a lock that ends with its process, and each process ends when all jobs have ended.
 /// @param workers processes at a time; 0: one per core
 /// @throws FileError, FormatError, std::invalid_argument: nothing more can be stored, or nothing can be read
 FleetSummary run_fleet(const FleetConfig& config, const std::vector<FleetLog>& logs, int workers,

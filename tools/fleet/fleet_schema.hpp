@@ -4,8 +4,7 @@ namespace stageid {
 
 inline constexpr int kFleetSchemaVersion = 1;
 
-/// The tables of a store, described for users in docs/formats.md. Only types and clauses that PostgreSQL has under the
-/// same or another name: BLOB is BYTEA, INTEGER PRIMARY KEY counts by itself, WITHOUT ROWID is left out.
+/// The tables of a store, described for users in docs/formats.md, in the words of SQLite that Database::create() translates.
 inline constexpr const char* kFleetSchema = R"sql(
 CREATE TABLE store (format TEXT NOT NULL, schema_version INTEGER NOT NULL);
 CREATE TABLE stage (

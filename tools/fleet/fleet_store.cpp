@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <complex>
 #include <cstring>
 
@@ -17,6 +18,10 @@ namespace {
 
 constexpr const char* kStoreFormat = "stageid-fleet-store";
 
+/// The number of a JobState.
+constexpr const char* kState =
+    "CASE WHEN verdict = 'failed' THEN 1 WHEN is_current = 0 THEN 2 ELSE 3 END";
+
 using ComplexFloat = std::complex<float>;
 
 std::vector<ComplexFloat> shape_floats(const StoredMode& mode) {
@@ -30,15 +35,11 @@ std::optional<std::string> filled(const std::string& text) {
   return text.empty() ? std::nullopt : std::optional(text);
 }
 
-bool is_empty(const Database& database) {
-  return !database.prepare("SELECT 1 FROM sqlite_master").step();
-}
-
 void create_tables(const Database& database) {
-  if (!is_empty(database)) return;  // without waiting for other writers
+  if (!database.tables().empty()) return;  // without waiting for other writers
   Transaction transaction(database);
-  if (is_empty(database)) {
-    database.execute(kFleetSchema);
+  if (database.tables().empty()) {
+    database.create(kFleetSchema);
     database.prepare("INSERT INTO store VALUES (?, ?)")
         .run(std::string(kStoreFormat), kFleetSchemaVersion);
   }
@@ -46,28 +47,25 @@ void create_tables(const Database& database) {
 }
 
 void require_store(const Database& database) {
-  Statement table = database.prepare("SELECT name FROM sqlite_master WHERE name = 'store'");
-  if (!table.step())
-    throw FormatError(database.file(), "",
-                      "is not a store of 'stageid fleet'; choose another file");
+  const FormatError none(database.name(), "",
+                         "is not a store of 'stageid fleet'; choose another one");
+  if (std::ranges::count(database.tables(), "store") == 0) throw none;
   Statement store = database.prepare("SELECT format, schema_version FROM store");
-  if (!store.step() || store.text(0) != kStoreFormat)
-    throw FormatError(database.file(), "",
-                      "is not a store of 'stageid fleet'; choose another file");
+  if (!store.step() || store.text(0) != kStoreFormat) throw none;
   if (store.integer(1) != kFleetSchemaVersion)
-    throw FormatError(database.file(), "",
+    throw FormatError(database.name(), "",
                       fmt::format("has schema version {}; this program supports version {}",
                                   store.integer(1), kFleetSchemaVersion));
 }
 
 }  // namespace
 
-FleetStore::FleetStore(const std::filesystem::path& file, Database::Access access)
-    : database_(file, access) {
-  note_own_file(file);
+FleetStore::FleetStore(const std::filesystem::path& place, Database::Access access)
+    : database_(place, access) {
+  if (!is_database_url(place)) note_own_file(place);
   if (access == Database::Access::create) create_tables(database_);
   require_store(database_);
-  done_ = database_.prepare("SELECT 1 FROM identification WHERE job = ? AND verdict <> 'failed'");
+  state_ = database_.prepare(fmt::format("SELECT {} FROM identification WHERE job = ?", kState));
   add_stage_ = database_.prepare(
       "INSERT INTO stage (name, changed) VALUES (?, 1) ON CONFLICT (name) DO UPDATE SET changed = "
       "1");
@@ -80,7 +78,7 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
       "relative_rms_error, health, log, log_fingerprint, version, configuration_id, channels_id, "
       "results) VALUES (1, ?, (SELECT id FROM stage WHERE name = ?), ?, ?, ?, ?, ?, ?, ?, ?, "
       "(SELECT id FROM configuration WHERE text = ?), "
-      "(SELECT id FROM channels WHERE outputs = ? AND inputs = ?), ?)");
+      "(SELECT id FROM channels WHERE outputs = ? AND inputs = ?), ?) RETURNING id");
   add_mode_ = database_.prepare(
       "INSERT INTO mode (identification_id, number, frequency_hz, frequency_std_hz, "
       "damping_ratio, damping_ratio_std, modal_mass, shape_std, shape) "
@@ -98,12 +96,15 @@ FleetStore::FleetStore(const std::filesystem::path& file, Database::Access acces
       of_log + ")");
 }
 
-std::map<std::string, bool> FleetStore::done_jobs() const {
-  std::map<std::string, bool> jobs;
-  Statement rows =
-      database_.prepare("SELECT job, is_current FROM identification WHERE verdict <> 'failed'");
-  while (rows.step()) jobs[rows.text(0)] = rows.integer(1) != 0;
+std::map<std::string, JobState> FleetStore::jobs() const {
+  std::map<std::string, JobState> jobs;
+  Statement rows = database_.prepare(fmt::format("SELECT job, {} FROM identification", kState));
+  while (rows.step()) jobs[rows.text(0)] = static_cast<JobState>(rows.integer(1));
   return jobs;
+}
+
+JobState FleetStore::state_of(const std::string& job) {
+  return static_cast<JobState>(state_->first(job).value_or(0));
 }
 
 void FleetStore::supersede(const std::string& log_fingerprint) {
@@ -119,7 +120,10 @@ void FleetStore::make_current(const std::string& job) {
   transaction.commit();
 }
 
-bool FleetStore::is_done(const std::string& job) { return done_->found(job); }
+bool FleetStore::is_done(const std::string& job) {
+  const JobState state = state_of(job);
+  return state == JobState::superseded || state == JobState::current;
+}
 
 bool FleetStore::add(const Identification& result) {
   Transaction transaction(database_);
@@ -133,12 +137,13 @@ bool FleetStore::add(const Identification& result) {
   add_stage_->run(result.stage);
   add_configuration_->run(result.configuration);
   if (!failed) add_channels_->run(outputs, inputs);
-  add_identification_->run(result.job, result.stage, result.time_utc, to_string(result.verdict),
-                           filled(result.reasons), result.relative_rms_error,
-                           filled(result.health_json), result.log.string(), result.log_fingerprint,
-                           std::string(version()), result.configuration, outputs, inputs,
-                           filled(result.results));
-  const std::int64_t id = database_.last_id();
+  const std::int64_t id =
+      add_identification_
+          ->first(result.job, result.stage, result.time_utc, to_string(result.verdict),
+                  filled(result.reasons), result.relative_rms_error, filled(result.health_json),
+                  result.log.string(), result.log_fingerprint, std::string(version()),
+                  result.configuration, outputs, inputs, filled(result.results))
+          .value();
   std::size_t number = 0;
   for (const StoredMode& mode : result.modes)
     add_mode_->run(id, ++number, mode.frequency_hz, mode.frequency_std_hz, mode.damping_ratio,

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "excitation/words/words.hpp"
-#include "tools/fleet/database.hpp"
+#include "tools/database/database.hpp"
 
 namespace stageid {
 
@@ -53,18 +53,22 @@ struct Identification {
   std::vector<StoredMode> modes;
 };
 
+/// What a store knows of a job; superseded: another result of its log is shown.
+enum class JobState : std::uint8_t { none, failed, superseded, current };
+
 /// The database of a fleet, docs/formats.md. Each function that writes is one transaction.
 class FleetStore {
  public:
-  /// @param access create: also the file and its tables @throws FileError, FormatError
-  FleetStore(const std::filesystem::path& file, Database::Access access);
+  /// @param place a file, or the URL of a PostgreSQL database
+  /// @param access create: also the file and the tables @throws FileError, FormatError
+  FleetStore(const std::filesystem::path& place, Database::Access access);
   FleetStore(const FleetStore&) = delete;
   FleetStore& operator=(const FleetStore&) = delete;
 
   const Database& database() const noexcept { return database_; }
-  /// Jobs whose identification is stored and did not fail, and whether it is the current one of its log.
-  std::map<std::string, bool> done_jobs() const;
-  bool is_done(const std::string& job);
+  std::map<std::string, JobState> jobs() const;
+  JobState state_of(const std::string& job);
+  bool is_done(const std::string& job);  ///< superseded or current
   /// Does nothing if the job is done; replaces a failed one of the same job or log. @returns whether it was added
   /// A result becomes the current one of its log: others, of other options or versions, are kept, but not shown.
   bool add(const Identification& identification);
@@ -83,7 +87,7 @@ class FleetStore {
 
   Database database_;
   // Empty until the tables exist.
-  std::optional<Statement> done_, add_stage_, add_configuration_, add_channels_,
+  std::optional<Statement> state_, add_stage_, add_configuration_, add_channels_,
       add_identification_, add_mode_, add_tag_, remove_failed_, remove_tags_, supersede_,
       change_stages_;
 };

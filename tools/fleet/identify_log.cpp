@@ -114,9 +114,11 @@ Identification described_job(const FleetConfig& config, const FleetLog& log,
   job.log = std::filesystem::absolute(log.file).lexically_normal();
   job.log_fingerprint = fingerprint;
   job.configuration = config.identification;
-  job.results = std::filesystem::absolute(config.results)
-                    .lexically_proximate(std::filesystem::absolute(config.store).parent_path())
-                    .string();
+  const std::filesystem::path results = std::filesystem::absolute(config.results);
+  job.results =
+      is_database_url(config.store)
+          ? results.lexically_normal()
+          : results.lexically_proximate(std::filesystem::absolute(config.store).parent_path());
   job.tags = config.tags;
   for (const auto& tag : log.tags) {
     std::erase_if(job.tags, [&](const auto& other) { return other.first == tag.first; });

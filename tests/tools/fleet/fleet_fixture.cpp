@@ -1,5 +1,10 @@
 #include "tests/tools/fleet/fleet_fixture.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+
 namespace stageid::test {
 
 Identification identification(const std::string& job, const std::string& stage,
@@ -27,6 +32,19 @@ Identification identification(const std::string& job, const std::string& stage,
     out.modes.push_back(mode);
   }
   return out;
+}
+
+bool stores_are_files() { return std::getenv("STAGEID_TEST_POSTGRES") == nullptr; }
+
+std::filesystem::path store_place(const TemporaryDirectory& folder, const std::string& name) {
+  if (stores_are_files()) return folder / (name + ".db");
+  const std::string database = std::getenv("STAGEID_TEST_POSTGRES");
+  std::string schema = folder.path().filename().string() + "_" + name;
+  std::replace(schema.begin(), schema.end(), '-', '_');
+  Database(database, Database::Access::create)
+      .execute(fmt::format("CREATE SCHEMA IF NOT EXISTS \"{}\"", schema));
+  return fmt::format("{}{}options=-csearch_path%3D%22{}%22", database,
+                     database.find('?') == std::string::npos ? '?' : '&', schema);
 }
 
 std::int64_t count_in(const FleetStore& store, const std::string& table) {

@@ -6,6 +6,7 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
+#include "tests/tools/fleet/fleet_fixture.hpp"
 #include "tools/fleet/fleet_time.hpp"
 
 namespace stageid {
@@ -97,7 +98,7 @@ TEST_F(FleetJobsTest, IdentifiesAJobByLogAndOptions) {
 }
 
 TEST_F(FleetJobsTest, FingerprintsAChangedLogAgain) {
-  FleetStore store(folder_ / "fleet.db", Database::Access::create);
+  FleetStore store(test::store_place(folder_), Database::Access::create);
   const std::filesystem::path log = write("a.slog", "one");
   const std::string before = log_fingerprint(store, log);
   EXPECT_EQ(log_fingerprint(store, log), before);

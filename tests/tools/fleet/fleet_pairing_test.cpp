@@ -38,9 +38,10 @@ std::vector<Identification> small_fleet(int stages) {
 class FleetPairingTest : public testing::Test {
  protected:
   FleetStore store_of(const std::string& name, const std::vector<Identification>& all) const {
-    FleetStore store(folder_ / name, Database::Access::create);
+    const std::filesystem::path place = test::store_place(folder_, name);
+    FleetStore store(place, Database::Access::create);
     for (const Identification& one : all) store.add(one);
-    return {folder_ / name, Database::Access::write};
+    return {place, Database::Access::write};
   }
   static std::vector<std::string> rows(const FleetStore& store, const std::string& sql) {
     std::vector<std::string> out;
@@ -112,11 +113,12 @@ TEST_F(FleetPairingTest, GivesRareModesNoNumber) {
   all[3].modes.push_back(identification("x", "s", "", {77.0}).modes[0]);
   FleetStore store = store_of("a.db", all);
   pair_fleet(store);
-  EXPECT_EQ(rows(store, "SELECT frequency_hz FROM modes WHERE mode IS NULL"),
-            std::vector<std::string>{"77.0|"});
+  EXPECT_EQ(rows(store, "SELECT CAST(frequency_hz AS INTEGER) FROM modes WHERE mode IS NULL"),
+            std::vector<std::string>{"77|"});
 }
 
 TEST_F(FleetPairingTest, EndsOnADamagedStore) {
+  if (!test::stores_are_files()) GTEST_SKIP() << "PostgreSQL keeps the types of columns";
   FleetStore store = store_of("a.db", small_fleet(2));
   store.database().execute(
       "UPDATE mode SET frequency_std_hz = 9e999, shape = X'0000C07F00' WHERE number = 2");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <fstream>
 #include <stdexcept>
 #include <thread>
@@ -16,11 +17,12 @@ namespace {
 
 using test::count_in;
 using test::identification;
+using namespace std::chrono_literals;
+using States = std::map<std::string, JobState>;
 
 class FleetStoreTest : public testing::Test {
  protected:
-  std::filesystem::path file() const { return folder_ / "fleet.db"; }
-  FleetStore open() const { return {file(), Database::Access::create}; }
+  FleetStore open() const { return {test::store_place(folder_), Database::Access::create}; }
   test::TemporaryDirectory folder_;
 };
 
@@ -30,7 +32,7 @@ TEST_F(FleetStoreTest, StoresAJobOnce) {
   EXPECT_FALSE(store.add(identification("a", "s", "2026-01-01", {100.0, 200.0})));
   EXPECT_EQ(count_in(store, "identification"), 1);
   EXPECT_EQ(count_in(store, "mode"), 2);
-  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", true}}));
+  EXPECT_EQ(store.jobs(), (States{{"a", JobState::current}}));
 }
 
 TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
@@ -39,7 +41,8 @@ TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
   failed.verdict = IdentificationVerdict::failed;
   failed.log = "/data/x.slog";
   EXPECT_TRUE(store.add(failed));
-  EXPECT_FALSE(store.is_done("a"));
+  EXPECT_EQ(store.state_of("a"), JobState::failed);
+  EXPECT_EQ(store.state_of("b"), JobState::none);
   EXPECT_TRUE(store.add(failed)) << "it failed again";
   EXPECT_EQ(count_in(store, "identification"), 1);
   // The log was repaired: another fingerprint, so another job.
@@ -58,11 +61,11 @@ TEST_F(FleetStoreTest, ShowsTheNewestResultOfALogAndKeepsTheOthers) {
   one.job = "b";
   one.configuration = "other options";
   store.add(one);
-  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", false}, {"b", true}}));
+  EXPECT_EQ(store.jobs(), (States{{"a", JobState::superseded}, {"b", JobState::current}}));
   EXPECT_EQ(count_in(store, "modes"), 1);
   EXPECT_EQ(count_in(store, "mode"), 2);
   store.make_current("a");
-  EXPECT_EQ(store.done_jobs(), (std::map<std::string, bool>{{"a", true}, {"b", false}}));
+  EXPECT_EQ(store.jobs(), (States{{"a", JobState::current}, {"b", JobState::superseded}}));
 }
 
 TEST_F(FleetStoreTest, KeepsWhatWasStored) {
@@ -70,7 +73,7 @@ TEST_F(FleetStoreTest, KeepsWhatWasStored) {
   given.modes[0].frequency_std_hz = std::nullopt;
   given.tags = {{"temperature", "21.5"}, {"site", "north"}};
   open().add(given);
-  const FleetStore store(file(), Database::Access::read);
+  const FleetStore store(test::store_place(folder_), Database::Access::read);
   Statement mode = store.database().prepare(
       "SELECT frequency_hz, frequency_std_hz, shape, damping_ratio_std FROM mode");
   ASSERT_TRUE(mode.step());
@@ -89,12 +92,43 @@ TEST_F(FleetStoreTest, KeepsWhatWasStored) {
 }
 
 TEST_F(FleetStoreTest, ShowsBytesAsHexadecimalDigits) {
-  const FleetStore store = open();
-  Statement row = store.database().prepare("SELECT X'00ff1b', 'text', X''; -- a comment");
+  FleetStore store = open();
+  store.add(identification("a", "s", "2026-01-01", {100.0}));
+  Statement row = store.database().prepare("SELECT shape, 'text' FROM mode; -- a comment");
   ASSERT_TRUE(row.step());
-  EXPECT_EQ(row.text(0), "00ff1b");
+  EXPECT_EQ(row.text(0).substr(0, 16), "0000803f00000000");  // float32 1 + 0j
+  EXPECT_EQ(row.text(0).size(), 2U * row.bytes(0).size());
   EXPECT_EQ(row.text(1), "text");
-  EXPECT_EQ(row.text(2), "");
+}
+
+TEST_F(FleetStoreTest, ReadersCannotWrite) {
+  open();
+  const FleetStore store(test::store_place(folder_), Database::Access::read);
+  EXPECT_THROW(store.database().execute("DELETE FROM stage"), std::exception);
+}
+
+TEST_F(FleetStoreTest, TakesAnyBytesAsTheNameOfALog) {
+  FleetStore store = open();
+  Identification odd = identification("a", "s", "2026-01-01", {100.0});
+  odd.log = "/data/\xff\xfe'\"?.slog";
+  EXPECT_TRUE(store.add(odd));
+  EXPECT_EQ(count_in(store, "identification WHERE log LIKE '%?.slog'"), 1);
+}
+
+TEST_F(FleetStoreTest, AJobIsClaimedByOneOfSeveral) {
+  const FleetStore one = open();
+  EXPECT_TRUE(one.database().claim(7));
+  {
+    const FleetStore other = open();
+    EXPECT_FALSE(other.database().claim(7));
+    EXPECT_TRUE(other.database().claim(8));
+    one.database().release(7);
+    EXPECT_TRUE(other.database().claim(7));
+  }
+  bool claimed = false;  // a server needs a moment to see the end
+  for (int i = 0; i < 500 && !claimed; ++i, std::this_thread::sleep_for(10ms))
+    claimed = one.database().claim(7);
+  EXPECT_TRUE(claimed) << "claims end with their owner";
 }
 
 TEST_F(FleetStoreTest, RefusesASecondStatement) {
@@ -121,6 +155,7 @@ TEST_F(FleetStoreTest, HasEveryJobOnceWithTwoWriters) {
 }
 
 TEST_F(FleetStoreTest, StoresAllOfAJobOrNothingOnAFullDisk) {
+  if (!test::stores_are_files()) GTEST_SKIP() << "by a limit of SQLite";
   FleetStore store = open();
   store.database().execute("PRAGMA max_page_count = 40");  // SQLITE_FULL, as from a full disk
   const std::vector<double> modes(50, 100.0);
@@ -146,8 +181,9 @@ TEST_F(FleetStoreTest, StoresAllOfAJobOrNothingOnAFullDisk) {
 }
 
 TEST_F(FleetStoreTest, RefusesOtherFiles) {
-  std::ofstream(file()) << "not a database, but a text that is long enough to have a header\n";
-  EXPECT_THROW(open(), FormatError);
+  const std::filesystem::path text = folder_ / "text.db";
+  std::ofstream(text) << "not a database, but a text that is long enough to have a header\n";
+  EXPECT_THROW(FleetStore(text, Database::Access::create), FormatError);
   EXPECT_THROW(FleetStore(folder_ / "missing.db", Database::Access::read), FileError);
   const std::filesystem::path foreign = folder_ / "foreign.db";
   Database(foreign, Database::Access::create).execute("CREATE TABLE x (y INTEGER)");

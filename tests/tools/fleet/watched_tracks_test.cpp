@@ -9,6 +9,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_matrices.hpp"
 #include "tests/support/process/directory_test.hpp"
+#include "tests/tools/fleet/fleet_fixture.hpp"
 
 namespace stageid {
 namespace test_watched_tracks {
@@ -40,7 +41,7 @@ class WatchedTracksTest : public test::DirectoryTest {
   }
 
   std::filesystem::path tracks_ = directory_ / "watch.h5";
-  FleetStore store_{directory_ / "fleet.db", Database::Access::create};
+  FleetStore store_{test::store_place(directory_), Database::Access::create};
 };
 
 TEST_F(WatchedTracksTest, StoresTheValuesAtTheEndOfEachHour) {

@@ -1,4 +1,4 @@
-#include "tools/fleet/database.hpp"
+#include "tools/database/database.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

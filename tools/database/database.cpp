@@ -1,0 +1,57 @@
+#include "tools/database/database.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <regex>
+
+namespace stageid {
+
+std::string Statement::text(int column) const {
+  if (engine_->kind(column) != SqlKind::bytes) return engine_->text(column);
+  std::string digits;
+  for (const std::byte byte : engine_->bytes(column))
+    digits += fmt::format("{:02x}", std::to_integer<unsigned>(byte));
+  return digits;
+}
+
+SqlValue Statement::sql_value(double value) {
+  return std::isfinite(value) ? SqlValue(value) : SqlValue();
+}
+
+SqlValue Statement::sql_value(const std::vector<std::complex<float>>& value) {
+  return value.empty() ? SqlValue() : SqlValue(std::as_bytes(std::span(value)));
+}
+
+bool is_database_url(const std::filesystem::path& place) {
+  return place.native().starts_with("postgresql://") || place.native().starts_with("postgres://");
+}
+
+std::string shown_url(const std::string& url) {
+  static const std::regex password("(://[^/?@:]*):[^/?@]*@|([?&])password=[^&]*");
+  return std::regex_replace(url, password, "$1$2@");
+}
+
+Database::Database(const std::filesystem::path& place, Access access)
+    : name_(is_database_url(place) ? shown_url(place.string()) : place.string()),
+      engine_(is_database_url(place) ? make_postgres_engine(place.string(), access)
+                                     : make_sqlite_engine(place, access)) {}
+
+Transaction::Transaction(const Database& database) : database_(database) {
+  database_.engine_->begin();
+}
+
+Transaction::~Transaction() {
+  if (!open_) return;
+  try {
+    database_.execute("ROLLBACK");
+  } catch (...) {  // after a full disk, SQLite has rolled back already
+  }
+}
+
+void Transaction::commit() {
+  database_.execute("COMMIT");
+  open_ = false;
+}
+
+}  // namespace stageid

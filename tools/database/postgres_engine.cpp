@@ -1,0 +1,258 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <libpq-fe.h>
+
+#include <array>
+#include <charconv>
+#include <cstdlib>
+#include <optional>
+#include <stdexcept>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/database/database.hpp"
+#include "tools/terminal/unicode.hpp"
+
+namespace stageid {
+namespace {
+
+constexpr const char* kSettings =
+    "SET client_min_messages = warning; SET lock_timeout = '60s'; SET extra_float_digits = 1; "
+    "SET bytea_output = 'hex'; SET client_encoding = 'UTF8'; SET application_name = 'stageid'";
+/// The first of the two numbers of a lock; the second is that of the schema.
+constexpr int kWriterLock = 0x57A6E1D;
+
+// Types of columns, from pg_type.
+constexpr Oid kBytea = 17, kInt8 = 20, kInt2 = 21, kInt4 = 23, kFloat4 = 700, kFloat8 = 701,
+              kNumeric = 1700;
+
+struct Clear {
+  void operator()(PGresult* result) const noexcept { ::PQclear(result); }
+};
+using Result = std::unique_ptr<PGresult, Clear>;
+
+struct Connection {
+  struct Close {
+    void operator()(PGconn* connection) const noexcept { ::PQfinish(connection); }
+  };
+  std::string name;
+  std::unique_ptr<PGconn, Close> handle = {};
+  long statements = 0;
+  bool reads_only = false;
+
+  [[noreturn]] void fail(const PGresult* result) const {
+    const char* state = result == nullptr ? "" : ::PQresultErrorField(result, PG_DIAG_SQLSTATE);
+    const char* primary =
+        result == nullptr ? nullptr : ::PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
+    std::string message = primary != nullptr ? primary : ::PQerrorMessage(handle.get());
+    message = message.substr(0, message.find('\n'));
+    const std::string kind = std::string(state == nullptr ? "" : state).substr(0, 2);
+    if (state != nullptr && std::string_view(state) == "55P03")
+      throw FileError(fmt::format(
+          "{}: another process has been writing for 60 s; run the command again when it has ended",
+          name));
+    if (::PQstatus(handle.get()) == CONNECTION_BAD)
+      throw FileError(
+          fmt::format("{}: no connection to the database: {}; check the address and "
+                      "the server, then run the command again",
+                      name, message));
+    // 22, 23, 42: the statement is at fault; 25: it would have changed something.
+    if (kind == "22" || kind == "23" || kind == "25" || kind == "42")
+      throw std::invalid_argument(fmt::format("{}: {}", name, message));
+    throw FileError(fmt::format("{}: {}", name, message));
+  }
+  Result checked(PGresult* raw) const {
+    Result result(raw);
+    const ExecStatusType status = ::PQresultStatus(raw);
+    if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) fail(raw);
+    return result;
+  }
+};
+
+/// With $1, $2, ... for every ? outside of quotes.
+std::string numbered(const std::string& sql) {
+  std::string out;
+  int parameters = 0;
+  char quote = 0;
+  for (const char c : sql) {
+    if (quote == 0 && c == '?') {
+      out += fmt::format("${}", ++parameters);
+      continue;
+    }
+    if (quote == 0 && (c == '\'' || c == '"'))
+      quote = c;
+    else if (c == quote)
+      quote = 0;
+    out += c;
+  }
+  return out;
+}
+
+int digit(char c) { return c <= '9' ? c - '0' : c - 'a' + 10; }
+
+class PostgresStatement final : public StatementEngine {
+ public:
+  PostgresStatement(Connection& connection, const std::string& sql)
+      : connection_(connection), statement_(fmt::format("s{}", ++connection.statements)) {
+    connection.checked(
+        ::PQprepare(handle(), statement_.c_str(), numbered(sql).c_str(), 0, nullptr));
+    described_ = connection.checked(::PQdescribePrepared(handle(), statement_.c_str()));
+  }
+  ~PostgresStatement() override {
+    const Result ignored(::PQexec(handle(), ("DEALLOCATE " + statement_).c_str()));
+  }
+  PostgresStatement(const PostgresStatement&) = delete;
+  PostgresStatement& operator=(const PostgresStatement&) = delete;
+
+  void start(std::span<const SqlValue> parameters) override {
+    const std::size_t count = parameters.size();
+    std::vector<std::string> texts(count);
+    std::vector<const char*> values(count, nullptr);
+    std::vector<int> sizes(count, 0), formats(count, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      const SqlValue& value = parameters[i];
+      if (const auto* bytes = std::get_if<std::span<const std::byte>>(&value)) {
+        values[i] = reinterpret_cast<const char*>(bytes->data());
+        sizes[i] = static_cast<int>(bytes->size());
+        formats[i] = 1;
+      } else if (value.index() != 0) {
+        texts[i] = text_of(value);
+        values[i] = texts[i].c_str();
+      }
+    }
+    rows_ =
+        connection_.checked(::PQexecPrepared(handle(), statement_.c_str(), static_cast<int>(count),
+                                             values.data(), sizes.data(), formats.data(), 0));
+    row_ = -1;
+  }
+  bool step() override {
+    if (!rows_) start({});
+    return ++row_ < ::PQntuples(rows_.get());
+  }
+  void finish() override { rows_.reset(); }
+  bool changes_nothing() const override { return connection_.reads_only; }  // the server refuses
+  int columns() const override { return ::PQnfields(described_.get()); }
+  std::string name(int column) const override { return ::PQfname(described_.get(), column); }
+  SqlKind kind(int column) const override {
+    if (::PQgetisnull(rows_.get(), row_, column) != 0) return SqlKind::null;
+    switch (::PQftype(rows_.get(), column)) {
+      case kBytea:
+        return SqlKind::bytes;
+      case kInt2:
+      case kInt4:
+      case kInt8:
+        return SqlKind::integer;
+      case kFloat4:
+      case kFloat8:
+      case kNumeric:
+        return SqlKind::real;
+      default:
+        return SqlKind::text;
+    }
+  }
+  double number(int column) const override { return std::strtod(value(column), nullptr); }
+  std::int64_t integer(int column) const override {
+    return std::strtoll(value(column), nullptr, 10);
+  }
+  std::string text(int column) const override { return value(column); }
+  std::span<const std::byte> bytes(int column) const override {
+    const std::string_view hex = value(column);  // \x00ff...
+    bytes_.clear();
+    for (std::size_t i = 2; i + 1 < hex.size(); i += 2)
+      bytes_.push_back(static_cast<std::byte>(16 * digit(hex[i]) + digit(hex[i + 1])));
+    return bytes_;
+  }
+
+ private:
+  PGconn* handle() const { return connection_.handle.get(); }
+  const char* value(int column) const { return ::PQgetvalue(rows_.get(), row_, column); }
+
+  static std::string text_of(const SqlValue& value) {
+    if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
+    if (const auto* integer = std::get_if<std::int64_t>(&value)) return fmt::format("{}", *integer);
+    // PostgreSQL takes well-formed UTF-8 without zeros; names of files may be anything.
+    std::string text = utf8_of_text(std::get<std::string_view>(value));
+    std::erase(text, '\0');
+    return text;
+  }
+
+  Connection& connection_;
+  std::string statement_;
+  Result described_, rows_;
+  int row_ = -1;
+  mutable std::vector<std::byte> bytes_;
+};
+
+class PostgresEngine final : public DatabaseEngine {
+ public:
+  PostgresEngine(const std::string& url, DatabaseAccess access) {
+    connection_.name = shown_url(url);
+    connection_.reads_only = access == DatabaseAccess::read;
+    connection_.handle.reset(::PQconnectdb(url.c_str()));
+    if (::PQstatus(handle()) != CONNECTION_OK) connection_.fail(nullptr);
+    execute(kSettings);
+    if (connection_.reads_only) execute("SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY");
+  }
+
+  std::unique_ptr<StatementEngine> prepare(const std::string& sql) override {
+    return std::make_unique<PostgresStatement>(connection_, sql);
+  }
+  void execute(const std::string& sql) override {
+    connection_.checked(::PQexec(handle(), sql.c_str()));
+  }
+  void create(const std::string& schema) override {
+    std::string sql = schema;
+    constexpr std::array<std::pair<const char*, const char*>, 6> kWords = {{
+        {" INTEGER PRIMARY KEY", " BIGINT GENERATED BY DEFAULT AS IDENTITY PRIMARY KEY"},
+        {" INTEGER", " BIGINT"},
+        {" BLOB", " BYTEA"},
+        {" TEXT", " TEXT COLLATE \"C\""},  // the order of SQLite
+        {" WITHOUT ROWID", ""},
+        {"CREATE VIEW IF NOT EXISTS", "CREATE OR REPLACE VIEW"},
+    }};
+    for (const auto& [here, there] : kWords)
+      for (std::size_t at = sql.find(here); at != std::string::npos;
+           at = sql.find(here, at + std::string_view(there).size()))
+        sql.replace(at, std::string_view(here).size(), there);
+    execute(sql);
+  }
+  void begin() override {
+    execute("BEGIN");
+    try {
+      execute(
+          fmt::format("SELECT pg_advisory_xact_lock({}, hashtext(current_schema()))", kWriterLock));
+    } catch (...) {
+      const Result ignored(::PQexec(handle(), "ROLLBACK"));
+      throw;
+    }
+  }
+  std::vector<std::string> tables() override {
+    std::vector<std::string> out;
+    const auto rows = prepare(
+        "SELECT table_name FROM information_schema.tables WHERE table_schema = current_schema() "
+        "ORDER BY table_name");
+    while (rows->step()) out.push_back(rows->text(0));
+    return out;
+  }
+  /// A lock of this session, which ends with the process.
+  bool claim(std::int64_t number) override {
+    const Result row = connection_.checked(
+        ::PQexec(handle(), fmt::format("SELECT pg_try_advisory_lock({})", number).c_str()));
+    return std::string_view(::PQgetvalue(row.get(), 0, 0)) == "t";
+  }
+  void release(std::int64_t number) override {
+    execute(fmt::format("SELECT pg_advisory_unlock({})", number));
+  }
+
+ private:
+  PGconn* handle() const { return connection_.handle.get(); }
+  Connection connection_;
+};
+
+}  // namespace
+
+std::unique_ptr<DatabaseEngine> make_postgres_engine(const std::string& url,
+                                                     DatabaseAccess access) {
+  return std::make_unique<PostgresEngine>(url, access);
+}
+
+}  // namespace stageid
