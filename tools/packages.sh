@@ -8,11 +8,12 @@ build_packages="g++ cmake ninja-build pkg-config
   libboost-math-dev libutfcpp-dev libzip-dev libsqlite3-dev libpq-dev gnuplot-nox"
 
 # Additional packages for the tests: the references in Python, the report in a browser, the format, the C++ reference,
-# the documentation site, a kernel with CAN, the stageid packages.
+# the documentation site, a database server and a cluster, a kernel with CAN, the stageid packages.
 test_packages="libgtest-dev libgmock-dev libbenchmark-dev
   python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py python3-xarray chromium
   clang-format
   doxygen mkdocs python3-pygments libjs-katex groff-base git zsh lintian mypy
+  postgresql slurm-wlm munge
   mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 

@@ -119,7 +119,7 @@ void time_query(const Database& database, const char* what, const std::string& s
 
 int study(int argc, char** argv) {
   if (argc != 5 && argc != 7) {
-    fmt::print(stderr, "usage: fleet_study STORE.db STAGES DAYS MODES [PAGE.html PAGE_STAGES]\n");
+    fmt::print(stderr, "usage: fleet_study STORE STAGES DAYS MODES [PAGE.html PAGE_STAGES]\n");
     return 2;
   }
   const std::filesystem::path file = argv[1];
@@ -151,8 +151,16 @@ int study(int argc, char** argv) {
                pairing, all / pairing, processor_seconds() - processor);
   }
   const Database& database = store.database();
-  database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
-  const auto bytes = static_cast<double>(std::filesystem::file_size(file));
+  double bytes = 0.0;
+  if (is_database_url(file)) {
+    Statement size = database.prepare(
+        "SELECT SUM(pg_total_relation_size(oid)) FROM pg_class "
+        "WHERE relnamespace = current_schema()::regnamespace AND relkind = 'r'");
+    if (size.step()) bytes = size.number(0);
+  } else {
+    database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
+    bytes = static_cast<double>(std::filesystem::file_size(file));
+  }
   fmt::print("size: {:.2f} GB, {:.0f} bytes per identification\n", bytes / 1e9,
              bytes / (static_cast<double>(stages) * days));
   time_query(database, "one stage's modes",

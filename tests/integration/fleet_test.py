@@ -5,7 +5,6 @@
 
 After every fault, the same command completes the work: each job is in the store exactly once.
 """
-import contextlib
 import json
 import os
 import pathlib
@@ -14,7 +13,6 @@ import re
 import resource
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -33,6 +31,8 @@ LOGS = 5
 class FleetTest(unittest.TestCase):
     program = configs = work = None
     kills = 3
+    store = "fleet.db"
+    fleet = FLEET
 
     @classmethod
     def setUpClass(cls):
@@ -47,7 +47,8 @@ class FleetTest(unittest.TestCase):
     def setUp(self):
         for path in self.work.glob("fleet*"):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        (self.work / "fleet.yaml").write_text(FLEET)
+        self.clear_store()
+        (self.work / "fleet.yaml").write_text(self.fleet)
         (self.work / "logs" / "corrupt.slog").unlink(missing_ok=True)
 
     @classmethod
@@ -58,15 +59,20 @@ class FleetTest(unittest.TestCase):
             raise AssertionError(f"{words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
         return done
 
+    def clear_store(self):
+        """A file is removed with the others."""
+
     def rows(self, sql):
-        with contextlib.closing(sqlite3.connect(self.work / "fleet.db")) as store:
-            return store.execute(sql).fetchall()
+        return [tuple(row.values()) for row in json.loads(self.call("fleet", "query", self.store, sql, "--json").stdout)["rows"]]
+
+    def expect_whole_store(self):
+        self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
 
     def expect_every_job_once(self, jobs=LOGS):
-        self.assertEqual(self.rows("SELECT COUNT(*), COUNT(DISTINCT job), COUNT(DISTINCT log) FROM identification "
+        self.assertEqual(self.rows("SELECT COUNT(*) AS a, COUNT(DISTINCT job) AS b, COUNT(DISTINCT log) AS c FROM identification "
                                    "WHERE verdict = 'trustworthy'"), [(jobs, jobs, jobs)])
         self.assertEqual(self.rows("SELECT COUNT(*) FROM mode GROUP BY identification_id HAVING COUNT(*) <> 4"), [])
-        self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
+        self.expect_whole_store()
         for job, results in self.rows("SELECT job, results FROM identification WHERE verdict <> 'failed'"):
             folder = self.work / results / job[:2] / job[:12]
             self.assertEqual(sorted(path.name for path in folder.iterdir()),
@@ -78,7 +84,7 @@ class FleetTest(unittest.TestCase):
         for repetition in range(2):
             error = self.call("fleet", "fleet.yaml", wanted=1).stderr.splitlines()
             self.assertIn("stageid: logs/corrupt.slog: damaged at byte", error[0])
-            self.assertEqual(error[1:], ["stageid: fleet.db: 1 job failed; remove the cause and run the command again"])
+            self.assertEqual(error[1:], [f"stageid: {self.store}: 1 job failed; remove the cause and run the command again"])
             self.expect_every_job_once()
             self.assertEqual(self.rows("SELECT COUNT(*) FROM identification WHERE verdict = 'failed'"), [(1,)])
         # Repaired: a copy of another log is the same job.
@@ -87,15 +93,16 @@ class FleetTest(unittest.TestCase):
 
     def test_runs_again_after_a_change_of_options_only(self):
         self.call("fleet", "fleet.yaml")
-        (self.work / "fleet.yaml").write_text(FLEET + "# a comment\nstage_name: folder\n")
+        (self.work / "fleet.yaml").write_text(self.fleet + "# a comment\nstage_name: folder\n")
         self.assertIn("5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
-        (self.work / "fleet.yaml").write_text(FLEET.replace("direct_term: full", "direct_term: full, max_iterations: 90"))
+        (self.work / "fleet.yaml").write_text(self.fleet.replace("direct_term: full", "direct_term: full, max_iterations: 90"))
         self.assertIn("0 done before, 5 done now", self.call("fleet", "fleet.yaml").stdout)
-        current = "SELECT COUNT(*), MAX(configuration_id) FROM identification WHERE is_current = 1"
-        self.assertEqual(self.rows(current), [(5, 2)])
-        (self.work / "fleet.yaml").write_text(FLEET)
+        current = ("SELECT COUNT(*) AS a, COUNT(CASE WHEN c.text LIKE '%max_iterations%' THEN 1 END) AS b FROM identification i "
+                   "JOIN configuration c ON c.id = i.configuration_id WHERE i.is_current = 1")
+        self.assertEqual(self.rows(current), [(5, 5)])
+        (self.work / "fleet.yaml").write_text(self.fleet)
         self.assertIn("5 done before, 0 done now", self.call("fleet", "fleet.yaml").stdout)
-        self.assertEqual(self.rows(current), [(5, 1)])
+        self.assertEqual(self.rows(current), [(5, 0)])
 
     def test_completes_the_work_after_kill(self):
         start = time.monotonic()
@@ -144,7 +151,7 @@ class FleetTest(unittest.TestCase):
     def done(self):
         try:
             return self.rows("SELECT COUNT(*) FROM identification")[0][0]
-        except sqlite3.OperationalError:  # no tables yet
+        except AssertionError:  # no tables yet
             return 0
 
     def call_limited(self, most_bytes):
@@ -196,32 +203,35 @@ class FleetTest(unittest.TestCase):
         job = ("fleet", "job", "fleet.yaml", "logs/0.slog", "--stage", "x", "--time", "2026-01-01", "--tag", "bench=3")
         self.assertRegex(self.call(*job).stdout, r"^fleet_results/../.{12}: done\n$")
         self.assertRegex(self.call(*job).stdout, r": was done before\n$")
-        self.assertEqual(self.rows("SELECT s.name, i.time_utc, t.name, t.number FROM identification i JOIN stage s ON "
+        self.assertEqual(self.rows("SELECT s.name, i.time_utc, t.name AS tag, t.number FROM identification i JOIN stage s ON "
                                    "s.id = i.stage_id JOIN tag t ON t.identification_id = i.id ORDER BY t.name"),
                          [("x", "2026-01-01", "bench", 3.0), ("x", "2026-01-01", "site", None)])
-        self.call("fleet", "report", "fleet.db", "-o", "fleet.html")  # pairs the modes first
+        self.call("fleet", "report", self.store, "-o", "fleet.html")  # pairs the modes first
         self.assertEqual(self.rows("SELECT COUNT(*) FROM modes WHERE mode IS NULL"), [(0,)])
         self.assertIn("5 jobs: 1 done before, 4 done now", self.call("fleet", "fleet.yaml").stdout)
 
     def test_a_table_names_stages_times_and_tags(self):
         (self.work / "fleet.csv").write_text("log,stage,time_utc,temperature\n" + "".join(
             f"logs/{i}.slog,stage {i % 2},2026-01-0{i + 1},{20 + i}\n" for i in range(LOGS)) + "logs/missing.slog,x,,\n")
-        (self.work / "fleet.yaml").write_text(FLEET.replace('logs: ["logs/*.slog"]', "table: fleet.csv"))
+        (self.work / "fleet.yaml").write_text(self.fleet.replace('logs: ["logs/*.slog"]', "table: fleet.csv"))
         error = self.call("fleet", "fleet.yaml", wanted=1).stderr
         self.assertIn("stageid: logs/missing.slog: cannot be read: No such file", error)
         self.expect_every_job_once()
         self.assertEqual(self.rows("SELECT s.name, i.time_utc, t.number FROM identification i JOIN stage s ON "
                                    "s.id = i.stage_id JOIN tag t ON t.identification_id = i.id WHERE t.name = "
                                    "'temperature' ORDER BY 2")[1], ("stage 1", "2026-01-02", 21.0))
-        table = self.call("fleet", "query", "fleet.db", "SELECT stage, COUNT(*) AS n FROM modes WHERE "
+        table = self.call("fleet", "query", self.store, "SELECT stage, COUNT(*) AS n FROM modes WHERE "
                           "frequency_hz > 400 GROUP BY stage ORDER BY stage", "--csv", "fleet_modes.csv")
         self.assertEqual(table.stdout, "wrote fleet_modes.csv: 2 rows\n")
         self.assertEqual((self.work / "fleet_modes.csv").read_text(), "stage,n\nstage 0,9\nstage 1,6\n")
 
 
+def prepare(program, configs, work):
+    FleetTest.program, FleetTest.configs, FleetTest.work = program, pathlib.Path(configs).resolve(), pathlib.Path(work).resolve()
+
+
 if __name__ == "__main__":
-    FleetTest.program, FleetTest.configs = sys.argv[1], pathlib.Path(sys.argv[2]).resolve()
-    FleetTest.work = pathlib.Path(sys.argv[3]).resolve()
+    prepare(*sys.argv[1:4])
     if len(sys.argv) > 4:
         FleetTest.kills = int(sys.argv[4])
     unittest.main(argv=sys.argv[:1])

@@ -20,6 +20,7 @@
 #include "tools/fleet/fleet_run.hpp"
 #include "tools/fleet/fleet_time.hpp"
 #include "tools/fleet/identify_log.hpp"
+#include "tools/fleet/slurm.hpp"
 #include "tools/fleet/watched_tracks.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -40,12 +41,34 @@ void require_time(const char* flag, const std::string& text) {
 struct FleetFlags {
   std::filesystem::path config;
   int workers = 0;
+  int slurm_tasks = 0;  ///< 0: run here
 };
+
+/// Submits the jobs that are not done. @returns false if all are
+bool submit_jobs(const FleetFlags& flags, const FleetConfig& config,
+                 const std::vector<FleetLog>& logs, Console& console) {
+  const std::size_t jobs = open_jobs(config, logs, console);
+  if (jobs == 0) return false;
+  const int tasks = static_cast<int>(std::min<std::size_t>(jobs, flags.slurm_tasks));
+  const std::string number = submit_fleet(config, tasks, flags.workers);
+  if (!is_database_url(config.store))
+    console.message(
+        fmt::format("{}: this kind of store needs all tasks on the machine of its "
+                    "disk; for several machines, set 'store: postgresql://...'",
+                    config.store.string()));
+  console.result(fmt::format(
+      "Slurm job {}: {} share {}; 'squeue -j {}' shows them. When they have ended, run the command "
+      "again for the result",
+      number, counted(tasks, "task"), counted(jobs, "job"), number));
+  console.result({{"slurm_job", number}, {"tasks", tasks}, {"open_jobs", jobs}});
+  return true;
+}
 
 void run_jobs(const FleetFlags& flags, Console& console) {
   const FleetConfig config = load_fleet_config(flags.config);
   const std::vector<FleetLog> logs = fleet_logs(config, console);
   require_directory(config.results, fmt::format("change 'results' in {}", config.file.string()));
+  if (flags.slurm_tasks > 0 && submit_jobs(flags, config, logs, console)) return;
   say_at_interrupt("finished jobs are stored; run the command again to continue");
   const FleetSummary summary = run_fleet(config, logs, flags.workers, console);
   FleetStore store(config.store, Database::Access::write);
@@ -224,6 +247,12 @@ void fleet_command(CLI::App& app, Console& console) {
       ->type_name("COUNT")
       ->check(kNotNegative)
       ->capture_default_str();
+  fleet
+      .add_option("--slurm", flags->slurm_tasks,
+                  "submit this many tasks to Slurm, which share the jobs; sbatch reads its options "
+                  "from SBATCH_... in the environment")
+      ->type_name("TASKS")
+      ->check(kPositive);
 
   auto [job, job_flags] =
       add_command(fleet, console, "job",

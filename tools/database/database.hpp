@@ -21,19 +21,15 @@ class Statement {
   /// Takes the parameters in order and is ready for step(). Numbers that are not finite are null.
   template <typename... Values>
   Statement& bind(const Values&... values) {
-    const std::array<SqlValue, sizeof...(Values)> all{sql_value(values)...};
-    engine_->start(all);
+    engine_->start(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
     return *this;
   }
   /// The next row; false after the last one. @throws as Database
   bool step() { return engine_->step(); }
-  /// For a statement without rows.
+  /// For a statement without rows. Within a Transaction, an error may be thrown later, at the latest by commit().
   template <typename... Values>
   void run(const Values&... values) {
-    bind(values...);
-    while (step()) {
-    }
-    engine_->finish();
+    engine_->run(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
   }
   /// The number in the first column of the first row; none if there is no row.
   template <typename... Values>

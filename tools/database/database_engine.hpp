@@ -27,6 +27,8 @@ class StatementEngine {
   /// Ready for step() with these parameters, which it does not need any more afterwards.
   virtual void start(std::span<const SqlValue> parameters) = 0;
   virtual bool step() = 0;
+  /// For a statement without rows. Within a transaction, an error may be thrown later, at the latest at its end.
+  virtual void run(std::span<const SqlValue> parameters) = 0;
   /// Gives up the rows that were not read.
   virtual void finish() = 0;
   virtual bool changes_nothing() const = 0;

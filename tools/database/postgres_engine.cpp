@@ -30,6 +30,9 @@ struct Clear {
 };
 using Result = std::unique_ptr<PGresult, Clear>;
 
+/// Statements that a transaction sends before it reads how the first one ended. Their answers must fit in the buffers.
+constexpr int kMostPending = 200;
+
 struct Connection {
   struct Close {
     void operator()(PGconn* connection) const noexcept { ::PQfinish(connection); }
@@ -38,6 +41,9 @@ struct Connection {
   std::unique_ptr<PGconn, Close> handle = {};
   long statements = 0;
   bool reads_only = false;
+  int pending = 0;  ///< statements that were sent, and whose ends are not known
+  std::vector<std::string> unused =
+      {};  ///< prepared statements to be freed when nothing is pending
 
   [[noreturn]] void fail(const PGresult* result) const {
     const char* state = result == nullptr ? "" : ::PQresultErrorField(result, PG_DIAG_SQLSTATE);
@@ -60,12 +66,70 @@ struct Connection {
       throw std::invalid_argument(fmt::format("{}: {}", name, message));
     throw FileError(fmt::format("{}: {}", name, message));
   }
+  static bool good(const PGresult* result) {
+    const ExecStatusType status = ::PQresultStatus(result);
+    return status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK;
+  }
   Result checked(PGresult* raw) const {
     Result result(raw);
-    const ExecStatusType status = ::PQresultStatus(raw);
-    if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) fail(raw);
+    if (!good(raw)) fail(raw);
     return result;
   }
+  /// Reads how the pending statements ended. @returns the first that failed; null: none
+  Result settled() {
+    Result failed;
+    if (pending == 0) return failed;
+    const bool lost = ::PQpipelineSync(handle.get()) == 0;
+    for (; pending > 0 && !lost; --pending)
+      while (Result result{::PQgetResult(handle.get())})
+        if (!failed && !good(result.get())) failed = std::move(result);
+    pending = 0;
+    const Result end(::PQgetResult(handle.get()));
+    if (::PQexitPipelineMode(handle.get()) == 0) fail(failed.get());
+    free_unused();
+    return failed;
+  }
+  void free_unused() noexcept {
+    for (const std::string& statement : unused)
+      const Result ignored(::PQexec(handle.get(), ("DEALLOCATE " + statement).c_str()));
+    unused.clear();
+  }
+  void settle() {
+    if (const Result failed = settled()) fail(failed.get());
+  }
+};
+
+/// Parameters as libpq takes them.
+struct Parameters {
+  explicit Parameters(std::span<const SqlValue> all)
+      : texts(all.size()),
+        values(all.size(), nullptr),
+        sizes(all.size(), 0),
+        formats(all.size(), 0) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (const auto* bytes = std::get_if<std::span<const std::byte>>(&all[i])) {
+        values[i] = reinterpret_cast<const char*>(bytes->data());
+        sizes[i] = static_cast<int>(bytes->size());
+        formats[i] = 1;
+      } else if (all[i].index() != 0) {
+        texts[i] = text_of(all[i]);
+        values[i] = texts[i].c_str();
+      }
+    }
+  }
+  static std::string text_of(const SqlValue& value) {
+    if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
+    if (const auto* integer = std::get_if<std::int64_t>(&value)) return fmt::format("{}", *integer);
+    // PostgreSQL takes well-formed UTF-8 without zeros; names of files may be anything.
+    std::string text = utf8_of_text(std::get<std::string_view>(value));
+    std::erase(text, '\0');
+    return text;
+  }
+  int count() const { return static_cast<int>(values.size()); }
+
+  std::vector<std::string> texts;
+  std::vector<const char*> values;
+  std::vector<int> sizes, formats;
 };
 
 /// With $1, $2, ... for every ? outside of quotes.
@@ -93,36 +157,37 @@ class PostgresStatement final : public StatementEngine {
  public:
   PostgresStatement(Connection& connection, const std::string& sql)
       : connection_(connection), statement_(fmt::format("s{}", ++connection.statements)) {
+    connection.settle();
     connection.checked(
         ::PQprepare(handle(), statement_.c_str(), numbered(sql).c_str(), 0, nullptr));
     described_ = connection.checked(::PQdescribePrepared(handle(), statement_.c_str()));
   }
   ~PostgresStatement() override {
-    const Result ignored(::PQexec(handle(), ("DEALLOCATE " + statement_).c_str()));
+    connection_.unused.push_back(statement_);
+    if (connection_.pending == 0) connection_.free_unused();
   }
   PostgresStatement(const PostgresStatement&) = delete;
   PostgresStatement& operator=(const PostgresStatement&) = delete;
 
   void start(std::span<const SqlValue> parameters) override {
-    const std::size_t count = parameters.size();
-    std::vector<std::string> texts(count);
-    std::vector<const char*> values(count, nullptr);
-    std::vector<int> sizes(count, 0), formats(count, 0);
-    for (std::size_t i = 0; i < count; ++i) {
-      const SqlValue& value = parameters[i];
-      if (const auto* bytes = std::get_if<std::span<const std::byte>>(&value)) {
-        values[i] = reinterpret_cast<const char*>(bytes->data());
-        sizes[i] = static_cast<int>(bytes->size());
-        formats[i] = 1;
-      } else if (value.index() != 0) {
-        texts[i] = text_of(value);
-        values[i] = texts[i].c_str();
-      }
-    }
-    rows_ =
-        connection_.checked(::PQexecPrepared(handle(), statement_.c_str(), static_cast<int>(count),
-                                             values.data(), sizes.data(), formats.data(), 0));
+    connection_.settle();
+    const Parameters all(parameters);
+    rows_ = connection_.checked(::PQexecPrepared(handle(), statement_.c_str(), all.count(),
+                                                 all.values.data(), all.sizes.data(),
+                                                 all.formats.data(), 0));
     row_ = -1;
+  }
+  /// Within a transaction, without waiting for the answer of the server.
+  void run(std::span<const SqlValue> parameters) override {
+    if (connection_.pending == 0) {
+      if (::PQtransactionStatus(handle()) != PQTRANS_INTRANS) return start(parameters);
+      if (::PQenterPipelineMode(handle()) == 0) connection_.fail(nullptr);
+    }
+    const Parameters all(parameters);
+    if (::PQsendQueryPrepared(handle(), statement_.c_str(), all.count(), all.values.data(),
+                              all.sizes.data(), all.formats.data(), 0) == 0)
+      connection_.fail(nullptr);
+    if (++connection_.pending >= kMostPending) connection_.settle();
   }
   bool step() override {
     if (!rows_) start({});
@@ -166,15 +231,6 @@ class PostgresStatement final : public StatementEngine {
   PGconn* handle() const { return connection_.handle.get(); }
   const char* value(int column) const { return ::PQgetvalue(rows_.get(), row_, column); }
 
-  static std::string text_of(const SqlValue& value) {
-    if (const auto* number = std::get_if<double>(&value)) return fmt::format("{}", *number);
-    if (const auto* integer = std::get_if<std::int64_t>(&value)) return fmt::format("{}", *integer);
-    // PostgreSQL takes well-formed UTF-8 without zeros; names of files may be anything.
-    std::string text = utf8_of_text(std::get<std::string_view>(value));
-    std::erase(text, '\0');
-    return text;
-  }
-
   Connection& connection_;
   std::string statement_;
   Result described_, rows_;
@@ -197,6 +253,8 @@ class PostgresEngine final : public DatabaseEngine {
     return std::make_unique<PostgresStatement>(connection_, sql);
   }
   void execute(const std::string& sql) override {
+    const Result failed = connection_.settled();
+    if (failed && sql != "ROLLBACK") connection_.fail(failed.get());
     connection_.checked(::PQexec(handle(), sql.c_str()));
   }
   void create(const std::string& schema) override {
@@ -235,6 +293,7 @@ class PostgresEngine final : public DatabaseEngine {
   }
   /// A lock of this session, which ends with the process.
   bool claim(std::int64_t number) override {
+    connection_.settle();
     const Result row = connection_.checked(
         ::PQexec(handle(), fmt::format("SELECT pg_try_advisory_lock({})", number).c_str()));
     return std::string_view(::PQgetvalue(row.get(), 0, 0)) == "t";

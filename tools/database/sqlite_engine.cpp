@@ -79,6 +79,12 @@ class SqliteStatement final : public StatementEngine {
     if (code != SQLITE_ROW && code != SQLITE_DONE) fail(file_, database_, code);
     return code == SQLITE_ROW;
   }
+  void run(std::span<const SqlValue> parameters) override {
+    start(parameters);
+    while (step()) {
+    }
+    finish();
+  }
   void finish() override { ::sqlite3_reset(statement_.get()); }
   bool changes_nothing() const override { return ::sqlite3_stmt_readonly(statement_.get()) != 0; }
   int columns() const override { return ::sqlite3_column_count(statement_.get()); }

@@ -51,6 +51,24 @@ class FleetRun {
         store_(config.store, Database::Access::create),
         progress_(console, "fleet", "jobs") {}
 
+  /// The jobs that are not done. Their fingerprints are stored, so that others need not read the logs for them.
+  std::size_t find_jobs(const std::vector<FleetLog>& logs) {
+    const std::map<std::string, JobState> stored = store_.jobs();
+    std::set<std::string> known;
+    for (const FleetLog& log : logs) {
+      try {
+        Job job{log, log_fingerprint(store_, log.file), ""};
+        job.id = job_id(job.fingerprint, config_);
+        if (known.insert(job.id).second) add(std::move(job), stored);  // else a copy
+      } catch (const FileError& error) {
+        ++summary_.failed;
+        console_.warning(error.what());
+      }
+    }
+    summary_.jobs = known.size() + summary_.failed;
+    return jobs_.size();
+  }
+
   FleetSummary run(const std::vector<FleetLog>& logs, std::size_t workers) {
     find_jobs(logs);
     for (std::size_t i = 0; i < jobs_.size(); ++i) open_.push_back(i);
@@ -68,29 +86,16 @@ class FleetRun {
   }
 
  private:
-  void find_jobs(const std::vector<FleetLog>& logs) {
-    const std::map<std::string, JobState> stored = store_.jobs();
-    std::set<std::string> known;
-    for (const FleetLog& log : logs) {
-      try {
-        Job job{log, log_fingerprint(store_, log.file), ""};
-        job.id = job_id(job.fingerprint, config_);
-        if (!known.insert(job.id).second) continue;  // a copy of another log
-        const auto found = stored.find(job.id);
-        const JobState state = found == stored.end() ? JobState::none : found->second;
-        if (state == JobState::failed) failed_before_.insert(job.id);
-        if (state == JobState::none || state == JobState::failed) {
-          jobs_.push_back(std::move(job));
-          continue;
-        }
-        ++summary_.done_before;
-        if (state == JobState::superseded) store_.make_current(job.id);  // options used before
-      } catch (const FileError& error) {
-        ++summary_.failed;
-        console_.warning(error.what());
-      }
+  void add(Job job, const std::map<std::string, JobState>& stored) {
+    const auto found = stored.find(job.id);
+    const JobState state = found == stored.end() ? JobState::none : found->second;
+    if (state == JobState::failed) failed_before_.insert(job.id);
+    if (state == JobState::none || state == JobState::failed) {
+      jobs_.push_back(std::move(job));
+      return;
     }
-    summary_.jobs = known.size() + summary_.failed;
+    ++summary_.done_before;
+    if (state == JobState::superseded) store_.make_current(job.id);  // options used before
   }
 
   /// Starts jobs while there are workers. Those that other processes run remain open, in case these end early.
@@ -166,6 +171,11 @@ class FleetRun {
 };
 
 }  // namespace
+
+std::size_t open_jobs(const FleetConfig& config, const std::vector<FleetLog>& logs,
+                      const Console& console) {
+  return FleetRun(config, console).find_jobs(logs);
+}
 
 FleetSummary run_fleet(const FleetConfig& config, const std::vector<FleetLog>& logs, int workers,
                        const Console& console) {

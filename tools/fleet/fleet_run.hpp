@@ -26,4 +26,8 @@ struct FleetSummary {
 FleetSummary run_fleet(const FleetConfig& config, const std::vector<FleetLog>& logs, int workers,
                        const Console& console);
 
+/// How many jobs run_fleet() would run.
+std::size_t open_jobs(const FleetConfig& config, const std::vector<FleetLog>& logs,
+                      const Console& console);
+
 }  // namespace stageid

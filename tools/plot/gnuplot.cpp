@@ -1,15 +1,9 @@
 #include "tools/plot/gnuplot.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
@@ -20,6 +14,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
+#include "tools/terminal/external_program.hpp"
 #include "tools/terminal/interrupt.hpp"
 
 namespace stageid {
@@ -81,46 +76,6 @@ std::string preamble(const Picture& picture, const Format& format) {
       2.0 * format.point, format.point);
 }
 
-std::atomic<pid_t> running_gnuplot = -1;
-
-/// Runs `gnuplot -d script.gp` in the directory, messages into a file. Language and time settings of the environment
-/// must not affect the picture. @returns the status of waitpid()
-int run_gnuplot(const std::filesystem::path& directory) {
-  std::string words[] = {"/usr/bin/env", "LC_ALL=C.UTF-8", "TZ=UTC", "gnuplot", "-d", "script.gp"};
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "messages",
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  ::sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-  pid_t child = -1;
-  const int error =
-      ::posix_spawn(&child, words[0].c_str(), &actions, &attributes, arguments.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0)
-    throw FileError(fmt::format("gnuplot: cannot be started: {}", std::strerror(error)));
-  running_gnuplot = child;
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  running_gnuplot = -1;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 127)  // env did not find it
-    throw FileError("gnuplot: not installed; install the Debian package gnuplot-nox");
-  return status;
-}
-
 /// The first line that is neither empty nor a position in the script.
 std::string first_message(const std::string& text) {
   std::istringstream lines(text);
@@ -161,21 +116,22 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
   const Format& format = kFormats[static_cast<std::size_t>(kind)];
   const PrivateDirectory directory;
   const CleanedUpAtInterrupt clean_up([&directory] {
-    if (const pid_t child = running_gnuplot; child > 0) ::kill(child, SIGKILL);
+    kill_external();
     directory.remove();
   });
   for (const Picture::Table& table : picture.tables)
     write_text_file(directory.path() / table.name, table.text);
   write_text_file(directory.path() / "script.gp",
                   preamble(picture, format) + picture.script + "unset output\n");
-  const int status = run_gnuplot(directory.path());
+  const ExternalEnd end =
+      run_external({"gnuplot", "-d", "script.gp"}, directory.path(), "gnuplot-nox");
   throw_if_interrupted();
   const std::filesystem::path picture_file = directory.path() / "picture";
   std::string bytes =
       std::filesystem::exists(picture_file) ? read_whole_file(picture_file) : std::string();
-  if (status != 0 || !is_whole(bytes, format))
+  if (end.status != 0 || !is_whole(bytes, format))
     throw FileError(fmt::format("{}: gnuplot failed: {}; check the free space in {}", file.string(),
-                                first_message(read_whole_file(directory.path() / "messages")),
+                                first_message(end.messages),
                                 std::filesystem::temp_directory_path().string()));
   if (kind == PictureFormat::pdf) forget_date(bytes);
   write_text_file(file, bytes);

@@ -1,0 +1,45 @@
+#include "tools/fleet/slurm.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "acquisition/files/file_error.hpp"
+#include "tools/terminal/external_program.hpp"
+
+namespace stageid {
+namespace {
+
+/// A word of a shell command.
+std::string shell_word(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+}  // namespace
+
+std::string submit_fleet(const FleetConfig& config, int tasks, int workers) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  const std::string of_task = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}";
+  // A task that is killed with its node is queued again; meanwhile others take over its jobs.
+  std::vector<std::string> words = {"sbatch",
+                                    "--parsable",
+                                    "--job-name=stageid-fleet",
+                                    fmt::format("--array=1-{}", tasks),
+                                    "--requeue",
+                                    "--open-mode=append",
+                                    "--output=" + (config.results / "slurm-%A_%a.txt").string()};
+  if (workers > 0) words.push_back(fmt::format("--cpus-per-task={}", workers));
+  words.push_back(fmt::format("--wrap=exec {} --verbosity quiet fleet {} --workers {}",
+                              shell_word(program), shell_word(config.file.string()),
+                              workers > 0 ? fmt::format("{}", workers) : of_task));
+  const ExternalEnd end = run_external(words, "", "slurm-client");
+  const std::string line = end.messages.substr(0, end.messages.find('\n'));
+  if (end.status != 0)
+    throw FileError(fmt::format("{}: not submitted: {}", config.file.string(),
+                                line.empty() ? "sbatch failed without a message" : line));
+  return line.substr(0, line.find(';'));  // NUMBER;CLUSTER
+}
+
+}  // namespace stageid
