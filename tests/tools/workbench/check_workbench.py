@@ -166,6 +166,14 @@ def check_comparison(bench):
     expect("day2" in bench.get("document.getElementById('entry-legend').textContent"), "the other day is not in the legend")
 
 
+def check_matrix(bench):
+    """A drag across a panel zooms all figures, as in the report."""
+    before = bench.get("document.querySelector('.band-text').textContent")
+    bench.drag(".panel", 20, 80, 40)
+    expect(bench.get("document.querySelector('.band-text').textContent") != before, "a drag across a panel does not zoom")
+    bench.get("Array.from(document.querySelectorAll('.band-bar button')).pop().click()")
+
+
 def check_cursor_and_provenance(bench):
     at = bench.place("#entry-magnitude")
     bench.mouse("mouseMoved", *at)
@@ -229,6 +237,7 @@ def main():
         check_numbers(bench)
         check_band_and_loop(bench)
         check_comparison(bench)
+        check_matrix(bench)
         check_cursor_and_provenance(bench)
         check_sentences(bench, guide)
         check_save(program, bench, work)

@@ -13,7 +13,7 @@ function cursorFrames() {
   return frames;
 }
 
-function followPointer() {
+function followWithCursor() {
   window.addEventListener('resize', () => showCursor(null));  // places are in pixels
   document.getElementById('main').addEventListener('pointermove', (event) => {
     const frame = cursorFrames().find(({ node }) => node.contains(event.target));

@@ -10,7 +10,7 @@ readBlocks().then(() => {
   buildSections();
   if (stability.figure) equipDiagram();
   undoKeys();
-  followPointer();
+  followWithCursor();
   tellProvenance();
   listen();
 }, (error) => tellFailure(error.message));
