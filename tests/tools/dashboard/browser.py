@@ -6,16 +6,33 @@ Source: Chrome DevTools Protocol, --remote-debugging-pipe: JSON texts, each ende
 import base64
 import json
 import os
+import pathlib
 import select
 import shutil
 import subprocess
 import tempfile
 import time
 
+KEYS = {"Tab": 9, "Enter": 13, "Home": 36, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = ("--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
          "--disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars "
          "--remote-debugging-pipe").split()
+
+# The accessibility checks, if they are installed: npm install --global axe-core, or elsewhere with NODE_PATH.
+AXE = next((file for place in (*os.environ.get("NODE_PATH", "").split(":"), "/usr/local/lib/node_modules", "/usr/lib/node_modules")
+            if (file := pathlib.Path(place, "axe-core/axe.min.js")).exists()), None)
+
+# tabStops(): every element that Tab must reach.
+TAB_STOPS = """(() => { window.tabbed = new Set(); window.tabStops = () => Array.from(document.querySelectorAll('a[href], button, input, select, summary, [tabindex]'))
+  .filter((e) => e.tabIndex >= 0 && !e.disabled && e.checkVisibility({ visibilityProperty: true })); })()"""
+# Where a press of Tab led to: whether it was there before, and whether a reader sees it.
+TABBED = """(() => { const e = document.activeElement; const again = e === document.body || tabbed.has(e); tabbed.add(e);
+  const box = e.getBoundingClientRect(); const style = getComputedStyle(e);
+  const x = Math.min(innerWidth - 1, Math.max(0, (box.left + box.right) / 2)), y = Math.min(innerHeight - 1, Math.max(0, (box.top + box.bottom) / 2));
+  const top = document.elementFromPoint(x, y);
+  return { again, ring: style.outlineStyle !== 'none' && parseFloat(style.outlineWidth) >= 1, seen: Boolean(top) && (e.contains(top) || top.contains(e)),
+    html: e.outerHTML.slice(0, 120) }; })()"""
 
 
 failures = []
@@ -131,8 +148,34 @@ class Browser:
             self.evaluate("new Promise((f) => setTimeout(f, 500))")
             overflow = self.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
             expect(overflow <= 0, f"{what}: at {width} pixels the page is {overflow} pixels too wide")
+            self.check_accessibility(f"{what}, {width} pixels, {'dark' if dark else 'light'}")
             self.screenshot(folder / f"{what}_{width}{'_dark' if dark else ''}.png")
         self.resize(1280, height)
+
+    def check_accessibility(self, what):
+        """No violation of the rules of axe, if it is installed; with everything unfolded."""
+        if AXE is None:
+            return
+        self.evaluate(AXE.read_text() + "; null")
+        found = self.evaluate("""(async () => { const folded = Array.from(document.querySelectorAll('details:not([open])'));
+            for (const one of folded) one.open = true;
+            await new Promise((done) => setTimeout(done, 100));
+            const { violations } = await axe.run();
+            for (const one of folded) one.open = false;
+            return violations.map(({ id, nodes }) => id + ': ' + nodes.slice(0, 5).map(({ target }) => target.join(' ')).join(', ')); })()""")
+        expect(found == [], f"{what}: axe: {found}")
+
+    def check_tab(self, what):
+        """From the top of a fresh page, Tab leads to every control, and its focus is visible."""
+        self.evaluate(TAB_STOPS)
+        for _ in range(self.evaluate("tabStops().length") + 10):
+            self.press("Tab")
+            stop = self.evaluate(TABBED)
+            if stop["again"]:
+                break
+            expect(stop["ring"] and stop["seen"], f"{what}: the focus is not visible: {stop}")
+        missed = self.evaluate("tabStops().filter((e) => !tabbed.has(e)).map((e) => e.outerHTML.slice(0, 120))")
+        expect(missed == [], f"{what}: Tab does not reach {missed}")
 
     def resize(self, width, height, dark=False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
@@ -141,7 +184,7 @@ class Browser:
 
     def press(self, key):
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode={"Enter": 13, "Tab": 9}[key],
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=KEYS[key],
                       **({"text": "\r"} if key == "Enter" and kind == "keyDown" else {}))
 
     def screenshot(self, file):

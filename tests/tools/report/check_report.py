@@ -245,11 +245,15 @@ def check_page(found, expected, width):
         expect(found["rows"]["modes"] == expected["modes"], f"{found['rows']['modes']} modes in the table")
 
 
-def check_screenshot(page, width, picture):
-    browser = open_page(page, width)
-    browser.screenshot(picture)
-    colours = browser.evaluate(COLOURS % base64.b64encode(picture.read_bytes()).decode())
-    expect(colours > 4000, f"the screenshot at {width} pixels has only {colours} colours: {picture}")
+def check_look(page, work, kind):
+    """At all widths, light and dark, and with the keyboard."""
+    browser = open_page(page, ready="document.readyState === 'complete' && window.stageidReport.content !== undefined", still=True)
+    browser.check_tab(kind)
+    browser.check_widths(work, "report", 1000)
+    for picture in work.glob("report_*.png") if kind == "full" else ():
+        colours = browser.evaluate(COLOURS % base64.b64encode(picture.read_bytes()).decode())
+        expect(colours > 4000, f"the screenshot has only {colours} colours: {picture}")
+    expect(browser.problems == [], f"console: {browser.problems}")
     browser.close()
 
 
@@ -266,8 +270,7 @@ def checks(sample, work, kind):
         found = findings(testable, width)
         check_page(found, expected, width)
         print(f"{kind}, {width} pixels: {page.stat().st_size} bytes, sections {found['sections']}")
-        if kind == "full":
-            check_screenshot(page, width, work / f"report_{width}.png")
+    check_look(page, work, kind)
 
 
 if __name__ == "__main__":

@@ -233,6 +233,7 @@ def main():
                           "--controller-view", configs / "stage/small_stage.yaml")
     bench = Workbench(running.url)
     try:
+        bench.browser.check_tab("workbench")
         check_edits(bench)
         check_numbers(bench)
         check_band_and_loop(bench)

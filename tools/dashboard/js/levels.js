@@ -18,7 +18,7 @@ function buildLevels() {
 function levelRow(channel, limit, place) {
   const row = { bar: element('span', { class: 'level-bar' }), rms: element('span', { class: 'level-rms' }),
     largest: element('span', { class: 'level-largest' }), value: element('span', { class: 'level-value' }), channel, limit };
-  row.track = element('span', { class: 'level-track', role: 'meter', 'aria-label': channel.name, 'aria-valuemin': 0, 'aria-valuemax': limit || 1 },
+  row.track = element('span', { class: 'level-track', role: 'meter', 'aria-label': channel.name, 'aria-valuemin': 0, 'aria-valuemax': 100 },
     row.bar, row.rms, row.largest);
   levels.rows[place] = row;
   return element('div', { class: 'level' }, element('span', { class: 'level-name', title: channel.name }, channel.name), row.track, row.value);
@@ -43,6 +43,7 @@ function showLevels(state) {
     row.rms.style.left = 'calc(' + part(rms[i]) + '% - 1px)';
     row.largest.style.left = 'calc(' + part(largest[i]) + '% - 2px)';
     row.value.textContent = quantity(largest[i], row.channel.unit) + (row.limit ? ' of ' + quantity(row.limit, row.channel.unit) : ', no limit');
-    row.track.setAttribute('aria-valuenow', peak[i]);
+    row.track.setAttribute('aria-valuenow', part(peak[i]).toFixed(1));
+    row.track.setAttribute('aria-valuetext', quantity(peak[i], row.channel.unit));
   });
 }

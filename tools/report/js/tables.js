@@ -136,7 +136,7 @@ function channelErrors(errors) {
     const e = errors[channelIndex(o, i)];
     return element('td', { class: 'heat', style: '--heat:' + shade(e).toFixed(3) }, percent(e));
   })]);
-  return table(['', ...heads], rows, 'Relative rms error of each channel', 'heatmap');
+  return table(['sensor', ...heads], rows, 'Relative rms error of each channel', 'heatmap');
 }
 
 function buildDecisions() {
