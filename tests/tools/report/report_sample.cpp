@@ -1,5 +1,5 @@
 // Writes report.html of a synthetic stage and expected.json, the content that a browser must find.
-//   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]
+//   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile|large|list]
 
 #include <algorithm>
 #include <filesystem>
@@ -230,6 +230,10 @@ ReportData sample(const std::string& kind) {
     bare.frf->noise_variance.resize(0, 0);
     return bare;
   }
+  if (kind == "large")  // the largest matrix of panels
+    return test::synthetic_report({.outputs = 50, .inputs = 50, .lines = 1000});
+  if (kind == "list")  // too many sensors for panels
+    return test::synthetic_report({.outputs = 400, .inputs = 10, .lines = 500});
   ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 300, .modes = 5});
   if (kind == "small") {
     data.geometry = {};  // shapes as bars
@@ -245,8 +249,8 @@ ReportData sample(const std::string& kind) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr
-        << "usage: report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile]\n";
+    std::cerr << "usage: report_sample DIRECTORY "
+                 "[full|full_compared|small|compared|bare|hostile|large|list]\n";
     return 2;
   }
   const std::filesystem::path directory = argv[1];

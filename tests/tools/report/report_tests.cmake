@@ -16,7 +16,7 @@ if(Python3_Interpreter_FOUND)
     set_tests_properties(report_in_browser.${kind} PROPERTIES
       SKIP_RETURN_CODE 77 LABELS "tools;browser" TIMEOUT 1800)
   endforeach()
-  foreach(what motion print)
+  foreach(what motion print size)
     add_test(NAME report_in_${what}
       COMMAND Python3::Interpreter ${CMAKE_CURRENT_LIST_DIR}/check_${what}.py
         --sample $<TARGET_FILE:report_sample> --work ${CMAKE_CURRENT_BINARY_DIR}/report_in_${what})

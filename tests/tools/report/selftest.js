@@ -22,12 +22,12 @@ async function selfTest() {
   };
   if (content.frf) {
     matrix.panels.forEach((_, channel) => drawPanel(channel));
-    const seen = matrix.panels.map((panel) => pixelsOf(panel.canvas));
+    const seen = Array.from(matrix.panels.values(), (panel) => pixelsOf(panel.canvas));
     Object.assign(findings, {
-      panels: matrix.panels.length, panels_with_ink: seen.filter(hasInk).length,
+      panels: matrix.panels.size, panels_with_ink: seen.filter(hasInk).length,
       panels_with_peak: seen.filter((pixels, channel) => showsPeak(channel, pixels)).length,
       panel_sizes: smallestPanel(), arrays: Object.fromEntries(Object.keys(content.arrays).map((id) => [id, summaryOf(array(id))])),
-      entries: matrix.panels.map((_, channel) => entrySummary(channel)),
+      entries: Array.from(matrix.panels.keys(), entrySummary),
     });
   }
   findings.plots = Object.fromEntries(Array.from(document.querySelectorAll('.plot'), (plot) => [plot.id, inkOf(plot)]));
@@ -60,7 +60,7 @@ function showsPeak(channel, pixels) {
   const { measured } = channelCurves(channel);
   let peak = 0;
   for (let k = 1; k < f.length; ++k) if (measured[k] * f[k] * f[k] > measured[peak] * f[peak] * f[peak]) peak = k;
-  const { canvas } = matrix.panels[channel];
+  const { canvas } = matrix.panels.get(channel);
   const frame = panelFrame(canvas.clientWidth, canvas.clientHeight);
   const ratio = canvas.width / canvas.clientWidth;
   const x = Math.min(canvas.width - 2, frame.x(Math.log10(f[peak])) * ratio);
@@ -79,8 +79,9 @@ function inkOf(plot) {
 }
 
 function smallestPanel() {
-  const widths = matrix.panels.map((panel) => panel.canvas.clientWidth);
-  const heights = matrix.panels.map((panel) => panel.canvas.clientHeight);
+  const panels = Array.from(matrix.panels.values());
+  const widths = panels.map((panel) => panel.canvas.clientWidth);
+  const heights = panels.map((panel) => panel.canvas.clientHeight);
   return { width: Math.min(...widths), height: Math.min(...heights) };
 }
 
@@ -139,7 +140,7 @@ function tableCheck() {
 
 // A drag over the right half of the first panel must show the upper half of the (logarithmic) band everywhere.
 function dragCheck() {
-  const { button } = matrix.panels[0];
+  const { button } = matrix.panels.get(0);
   const box = button.getBoundingClientRect();
   const at = (share) => ({ clientX: box.left + share * box.width, clientY: box.top + 5, bubbles: true, pointerType: 'mouse', button: 0 });
   button.dispatchEvent(new PointerEvent('pointerdown', at(0.5)));
@@ -219,14 +220,14 @@ function savedPeak() {
 
 // Actions of a reader: choose a panel, move with the keys, hide a trace, multiply by omega squared.
 function useCheck() {
-  const last = matrix.panels.length - 1;
+  const last = channelCount() - 1;
   const title = document.getElementById('entry-title');
   const use = { last: channelName(last) };
-  matrix.panels[last].button.click();
+  matrix.panels.get(last).button.click();
   use.clicked = title.textContent;
   selectPanel(0);
-  matrix.panels[0].button.focus();
-  matrix.panels[0].button.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true, cancelable: true }));
+  matrix.panels.get(0).button.focus();
+  matrix.panels.get(0).button.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true, cancelable: true }));
   use.walked = Number(document.activeElement.dataset.channel);
   toggleTrace('measured');
   const only = entry.order.length === 1;

@@ -10,6 +10,6 @@ async function setResponse(fresh) {
   blocks = await unpackAll(fresh.blocks);
   content = fresh.content;
   decoded = {};
-  curvesOfChannel.clear();
+  lastCurves.channel = null;
   matrix.columns = null;
 }

@@ -10,7 +10,7 @@ function fetchResponse(edition) {
 }
 
 function showResponse() {
-  if (matrix.panels.length === 0) {
+  if (!matrix.grid) {
     buildMatrix();
     buildEntry();
     selectPanel(0);

@@ -37,11 +37,11 @@ function channelPairs(channel) {
   return { measured, residual, model: residual && difference(measured, residual), other: part('other_response'), otherModel: part('other_model') };
 }
 
-// The curves of one channel: magnitudes, one per line; null if unknown.
-const curvesOfChannel = new Map();
+// The curves of one channel: magnitudes, one per line; null if unknown. Only those of the last channel are kept.
+const lastCurves = { channel: null, curves: null };
 function channelCurves(channel) {
-  if (!curvesOfChannel.has(channel)) curvesOfChannel.set(channel, makeCurves(channel));
-  return curvesOfChannel.get(channel);
+  if (lastCurves.channel !== channel) Object.assign(lastCurves, { channel, curves: makeCurves(channel) });
+  return lastCurves.curves;
 }
 
 function makeCurves(channel) {

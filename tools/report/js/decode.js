@@ -1,13 +1,16 @@
 // Decodes packed numbers written by tools/report/report_encoding.hpp.
 
-let blocks = {};  // by name, unpacked
+let blocks = {};  // by name, unpacked, not yet decoded
 let decoded = {};
 
 // The array of that name, decoded on first use; null if the page does not contain it.
 function array(id) {
   const about = content.arrays[id];
   if (!about) return null;
-  if (!decoded[id]) decoded[id] = decoders[about.type](blocks[id], about, about.base && array(about.base));
+  if (!decoded[id]) {
+    decoded[id] = decoders[about.type](blocks[id], about, about.base && array(about.base));
+    delete blocks[id];
+  }
   return decoded[id];
 }
 
@@ -90,13 +93,13 @@ function fromComplexFloat32(bytes, about, base) {
   });
 }
 
-// m 2^(e-15): int16 m minus the expected one modulo 2^16, then int8 e minus the previous one.
+// m 2^(e-15), which float32 represents: int16 m minus the expected one modulo 2^16, then int8 e minus the previous one.
 function fromBlock16(bytes, about, base) {
   const count = bytes.length / 5;
   const words = new Uint16Array(interleaved(bytes.subarray(0, 4 * count), 2));
   const exponents = runningSum(bytes.subarray(4 * count));
   const scales = Float64Array.from({ length: 256 }, (_, e) => Math.pow(2, (e << 24 >> 24) - 15));
-  return expectedPairs(new Float64Array(2 * count), about, base, (guess, i) => {
+  return expectedPairs(new Float32Array(2 * count), about, base, (guess, i) => {
     const scale = scales[exponents[i >> 1]];
     const expected = Math.max(-32767, Math.min(32767, Math.floor(guess / scale + 0.5)));
     return ((expected + signFirst(words[i])) << 16 >> 16) * scale;

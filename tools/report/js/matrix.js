@@ -1,6 +1,6 @@
-// The element-wise Bode matrix: one small canvas per channel, drawn when it becomes visible.
+// The element-wise Bode matrix: one panel per channel, drawn while it is near the visible part of the page.
 
-const matrix = { panels: [], timesOmega: 0, pending: 0 };
+const matrix = { panels: new Map(), grid: null, watcher: null, timesOmega: 0, pending: 0, range: null, size: null };
 
 // Factor of the magnitudes: 1 or omega^2 (acceleration instead of position).
 function lineScale() {
@@ -12,22 +12,29 @@ function scaled(values, scale) {
   return scale && values ? Float64Array.from(values, (v, k) => v * scale[k]) : values;
 }
 
+// Calls use(magnitude) for every `step`-th line of the visible band, of all channels.
+function eachMagnitude(id, step, scale, use) {
+  const values = array(id);
+  if (!values) return;
+  const [first, last] = bandLines(...shownBand());
+  for (let c = 0; c < channelCount(); ++c) {
+    for (let k = first; k <= last; k += step) {
+      const at = 2 * (c * content.frf.lines + k);
+      use(Math.sqrt(values[at] * values[at] + values[at + 1] * values[at + 1]) * (scale ? scale[k] : 1));
+    }
+  }
+}
+
 // The common range in the visible band: all measured values and most of the residual below them.
 function matrixRange(scale) {
   let high = 0;
   let low = Infinity;
   const small = [];
-  const [first, last] = bandLines(...shownBand());
-  for (let c = 0; c < channelCount(); ++c) {
-    const curves = channelCurves(c);
-    const measured = scaled(curves.measured, scale);
-    for (let k = first; k <= last; ++k) {
-      if (measured[k] > high) high = measured[k];
-      if (measured[k] > 0 && measured[k] < low) low = measured[k];
-    }
-    const residual = scaled(curves.residual, scale);
-    if (residual) for (let k = first; k <= last; k += 7) if (residual[k] > 0) small.push(residual[k]);
-  }
+  eachMagnitude('response', 1, scale, (v) => {
+    if (v > high) high = v;
+    if (v > 0 && v < low) low = v;
+  });
+  eachMagnitude('residual', 7, scale, (v) => { if (v > 0) small.push(v); });
   if (small.length) low = Math.min(low, Float64Array.from(small).sort()[Math.floor(0.03 * small.length)]);
   if (!(high > 0)) return [-1, 0];
   return [Math.log10(low) - 0.2, Math.log10(high) + 0.3];
@@ -36,7 +43,7 @@ function matrixRange(scale) {
 function buildMatrix() {
   const { inputs, outputs } = content.frf;
   const body = section('response', 'Response', 'Frequency response, element by element',
-    'Each panel is one sensor over one actuator, named at the edges: magnitude over frequency, both logarithmic, ' +
+    'Each panel is one sensor over one actuator' + (isListed() ? '' : ', named at the edges') + ': magnitude over frequency, both logarithmic, ' +
     'with a common scale. Select a panel to enlarge it, drag across one to zoom all; the arrow keys move between panels, ' +
     '+ and \u2212 zoom, Page Up and Page Down pan, Home shows the whole band.');
   const legend = element('div', { class: 'legend' }, element('span', { class: 'legend', id: 'matrix-legend' }));
@@ -46,15 +53,12 @@ function buildMatrix() {
     showEntry(entry.channel);
   } });
   legend.append(element('label', { class: 'toggle', for: 'times-omega' }, times, ' times \u03c9\u00b2'));
-  const grid = element('div', {
-    class: 'matrix', role: 'group', 'aria-label': 'Panels', onkeydown: moveFocus, onpointerdown: dragAcross,
+  matrix.grid = element('div', {
+    class: isListed() ? 'matrix list' : 'matrix', role: 'group', 'aria-label': 'Panels', onkeydown: moveFocus, onpointerdown: dragAcross,
     style: '--inputs:' + inputs.length + ';--outputs:' + outputs.length,
   });
-  inputs.forEach((input, i) => grid.append(element('span', { class: 'input-name', style: '--i:' + i, title: input.name }, input.name)));
-  outputs.forEach((output, o) => grid.append(element('span', { class: 'output-name', style: '--o:' + o, title: output.name }, output.name)));
-  for (let c = 0; c < channelCount(); ++c) grid.append(makePanel(c));
   legend.append(saveButtons('frequency response', savedMatrix));
-  body.append(legend, bandBar(), element('div', { class: 'matrix-scroll' }, grid),
+  body.append(legend, bandBar(), ...(isListed() ? [buildSearch()] : []), element('div', { class: 'matrix-scroll' }, matrix.grid),
     element('p', { class: 'quiet', id: 'matrix-scale' }));
   fillMatrixLegend();
   followBand(() => {
@@ -62,12 +66,30 @@ function buildMatrix() {
   });
   plots.add({ resize: () => {}, recolour: redrawMatrix });
   watchPanels();
+  if (isListed()) fillList();
+  else showPanels(Array.from({ length: channelCount() }, (_, channel) => channel));
+}
+
+// The names at the edges, and the empty corner between them.
+function edgeNames() {
+  const name = (kind, place) => ({ name: text }, i) => element('span', { class: kind, style: place + ':' + i, title: text }, element('span', null, text));
+  return [element('span', { class: 'corner' }), ...content.frf.inputs.map(name('input-name', '--i')), ...content.frf.outputs.map(name('output-name', '--o'))];
+}
+
+// Replaces the panels by those of the channels.
+function showPanels(channels) {
+  matrix.watcher.disconnect();
+  matrix.panels = new Map(channels.map((channel) => [channel, makePanel(channel)]));
+  const buttons = Array.from(matrix.panels.values(), ({ button }) => button);
+  matrix.grid.replaceChildren(...(isListed() ? [] : edgeNames()), ...buttons);
+  for (const button of buttons) matrix.watcher.observe(button);
+  markPanel();
 }
 
 function fillMatrixLegend() {
   const legend = document.getElementById('matrix-legend');
   legend.replaceChildren(swatch('measured', 'measured'));
-  if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel'));
+  if (content.arrays.residual) legend.append(swatch('model', 'model'), swatch('residual', 'residual'), element('span', { class: 'quiet' }, 'number: relative rms error of the channel; \u2013: no response above the noise'));
   if (otherTrace()) legend.append(swatch(otherTrace(), traceName(otherTrace())));
 }
 
@@ -83,56 +105,61 @@ function swatch(kind, text, tag = 'span', more = {}) {
 }
 
 function makePanel(channel) {
-  const canvas = element('canvas', { 'aria-hidden': 'true' });
+  const name = channelName(channel);
   const error = element('span', { class: 'error' });
   const button = element('button', {
     type: 'button', class: 'panel', style: '--i:' + inputOf(channel) + ';--o:' + outputOf(channel), 'data-channel': channel,
-    tabindex: channel === 0 ? '0' : '-1', title: channelName(channel), 'aria-label': channelName(channel),
-    'aria-pressed': 'false', onclick: () => selectPanel(channel),
-  }, canvas, error);
-  matrix.panels[channel] = { button, canvas, error, drawn: false };
-  return button;
+    title: name, onclick: () => selectPanel(channel),
+  }, element('span', { class: 'panel-name' }, name), error);
+  return { button, error, canvas: null, near: false };
 }
 
 function selectPanel(channel) {
-  matrix.panels.forEach(({ button }, i) => {
-    button.setAttribute('aria-pressed', String(i === channel));
-    button.tabIndex = i === channel ? 0 : -1;
-  });
   showEntry(channel);
+  markPanel();
+}
+
+// The panel of the chosen element is pressed; it, else the first one, is reached by Tab.
+function markPanel() {
+  const reached = matrix.panels.has(entry.channel) ? entry.channel : matrix.panels.keys().next().value;
+  matrix.panels.forEach(({ button }, channel) => {
+    button.setAttribute('aria-pressed', String(channel === entry.channel));
+    button.tabIndex = channel === reached ? 0 : -1;
+  });
 }
 
 function moveFocus(event) {
   if (bandKey(event)) return;
-  const outputs = content.frf.outputs.length;
-  const inputs = content.frf.inputs.length;
-  const turned = getComputedStyle(event.currentTarget).getPropertyValue('--turned').trim() === '1';
   const step = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key];
-  if (step && turned) step.reverse();
-  const from = Number(event.target.dataset ? event.target.dataset.channel : NaN);
-  if (!step || !Number.isInteger(from)) return;
+  const from = Number(event.target.dataset.channel);
+  if (!step || !matrix.panels.has(from)) return;
   event.preventDefault();
-  const output = Math.min(outputs - 1, Math.max(0, outputOf(from) + step[0]));
-  const input = Math.min(inputs - 1, Math.max(0, inputOf(from) + step[1]));
-  matrix.panels[from].button.tabIndex = -1;
-  const target = matrix.panels[channelIndex(output, input)].button;
-  target.tabIndex = 0;
-  target.focus();
+  const channel = isListed() ? nextInList(from, ...step) : nextInMatrix(from, ...step);
+  drawPanel(channel);  // with its error, which is read with the name
+  matrix.panels.get(from).button.tabIndex = -1;
+  const { button } = matrix.panels.get(channel);
+  button.tabIndex = 0;
+  button.focus();
 }
 
-// Visible panels are drawn at once, the others when the browser is idle.
+function nextInMatrix(from, down, right) {
+  const { inputs, outputs } = content.frf;
+  const turned = getComputedStyle(matrix.grid).getPropertyValue('--turned').trim() === '1';
+  const within = (place, list) => Math.min(list.length - 1, Math.max(0, place));
+  return channelIndex(within(outputOf(from) + (turned ? right : down), outputs), within(inputOf(from) + (turned ? down : right), inputs));
+}
+
+// Panels are drawn while they are near the visible part of the page and of the matrix.
 function watchPanels() {
-  const seen = new IntersectionObserver((entries) => {
-    for (const entry of entries) if (entry.isIntersecting) drawPanel(Number(entry.target.dataset.channel));
-  }, { rootMargin: '200px' });
-  for (const panel of matrix.panels) seen.observe(panel.button);
-  const idle = window.requestIdleCallback || ((f) => setTimeout(() => f({ timeRemaining: () => 8 }), 30));
-  let next = 0;
-  const work = (deadline) => {
-    while (next < matrix.panels.length && deadline.timeRemaining() > 3) drawPanel(next++);
-    if (next < matrix.panels.length) idle(work);
-  };
-  idle(work);
+  matrix.watcher = new IntersectionObserver((seen) => {
+    for (const { target, isIntersecting } of seen) {
+      const channel = Number(target.dataset.channel);
+      const panel = matrix.panels.get(channel);
+      if (!panel) continue;  // replaced meanwhile
+      panel.near = isIntersecting;
+      refreshPanel(panel, channel);
+    }
+  }, { rootMargin: '100px', scrollMargin: '100px' });
   let width = window.innerWidth;
   window.addEventListener('resize', () => {
     if (window.innerWidth === width) return;
@@ -144,32 +171,31 @@ function watchPanels() {
 function redrawMatrix() {
   cancelAnimationFrame(matrix.pending);
   matrix.pending = 0;
-  matrix.range = null;
-  for (const panel of matrix.panels) panel.drawn = false;
-  matrix.panels.forEach((panel, channel) => drawPanel(channel));
+  matrix.range = matrix.size = null;
+  matrix.panels.forEach(refreshPanel);
+}
+
+// On paper all panels are visible.
+function refreshPanel(panel, channel) {
+  if (panel.near || printing) drawPanel(channel);
+  else if (panel.canvas) {
+    panel.canvas.remove();
+    panel.canvas = null;
+  }
 }
 
 function drawPanel(channel) {
-  const panel = matrix.panels[channel];
-  if (panel.drawn) return;
-  const width = panel.canvas.clientWidth;
-  const height = panel.canvas.clientHeight;
-  if (width === 0) return;
-  panel.drawn = true;
+  const panel = matrix.panels.get(channel);
+  if (!panel.canvas) panel.button.prepend(panel.canvas = element('canvas', { 'aria-hidden': 'true' }));
+  // All panels are of one size: measuring each would lay out the page once per panel.
+  if (!matrix.size) matrix.size = { width: panel.canvas.clientWidth, height: panel.canvas.clientHeight };
+  const { width, height } = matrix.size;
   paintPanel(channel, sharpContext(panel.canvas, width, height), width, height);
-  panel.error.textContent = '';
-  if (!array('residual')) return;
-  const { relativeError } = channelCurves(channel);
-  if (relativeError !== null) panel.error.textContent = percent(relativeError);
-  panel.button.setAttribute('aria-label', channelName(channel) + (relativeError === null ? ', no response above the noise' : ', relative rms error ' + percent(relativeError)));
+  panel.error.textContent = content.arrays.residual ? percent(channelCurves(channel).relativeError) : '';
 }
 
 function paintPanel(channel, context, width, height) {
   const scale = lineScale();
-  if (!matrix.range) {
-    matrix.range = matrixRange(scale);
-    tellScale();
-  }
   const frame = panelFrame(width, height);
   drawDecades(context, frame);
   const curves = channelCurves(channel);
@@ -197,6 +223,10 @@ function unitOf(output, input) {
 }
 
 function panelFrame(width, height) {
+  if (!matrix.range) {
+    matrix.range = matrixRange(lineScale());
+    tellScale();
+  }
   const [x0, x1] = shownBand().map(Math.log10);
   const [y0, y1] = matrix.range;
   return {
@@ -246,9 +276,11 @@ function drawCurve(context, frame, values, colour, width) {
   context.beginPath();
   let column = -1, low = 0, high = 0, last = 0, x = 0;
   const flush = () => {
-    context.lineTo(x, y(low));
-    context.lineTo(x, y(high));
-    context.lineTo(x, y(last));
+    if (high > low) {
+      context.lineTo(x, y(low));
+      context.lineTo(x, y(high));
+    }
+    if (last < high) context.lineTo(x, y(last));
   };
   // One line beyond the band on either side, so that curves reach the edge.
   const [inside, end] = bandLines(...shownBand());

@@ -45,19 +45,24 @@ function swallowClick(button) {
   setTimeout(() => button.removeEventListener('click', swallow, { capture: true }));
 }
 
-// The whole matrix for a slide: about 16 to 9, names beside rows and above columns.
+// The panels for a slide: about 16 to 9, names beside rows and above columns, or in the panels of a list.
 function savedMatrix() {
   const { inputs, outputs } = content.frf;
-  const width = Math.max(80, Math.min(300, Math.floor(1240 / inputs.length)));
-  const height = Math.max(70, Math.min(220, Math.floor(640 / outputs.length)));
-  const left = 64, top = 22;
+  const channels = Array.from(matrix.panels.keys());
+  const columns = isListed() ? 10 : inputs.length;
+  const rows = Math.ceil(channels.length / columns);
+  const width = Math.max(44, Math.min(300, Math.floor(1240 / columns)));
+  const height = Math.max(36, Math.min(220, Math.floor(640 / rows)));
+  const [left, top] = isListed() ? [0, 0] : [64, 22];
   const draw = (context) => {
     const colours = palette();
-    for (const [o, output] of outputs.entries()) drawName(context, output.name, 'right', left - 8, top + (o + 0.5) * height);
-    for (const [i, input] of inputs.entries()) drawName(context, input.name, 'center', left + (i + 0.5) * width, top / 2);
-    for (let c = 0; c < channelCount(); ++c) {
-      const x = left + inputOf(c) * width;
-      const y = top + outputOf(c) * height;
+    if (!isListed()) {
+      for (const [o, output] of outputs.entries()) drawName(context, output.name, 'right', left - 8, top + (o + 0.5) * height);
+      for (const [i, input] of inputs.entries()) drawName(context, input.name, 'center', left + (i + 0.5) * width, top / 2, width);
+    }
+    channels.forEach((c, place) => {
+      const x = left + (isListed() ? place % columns : inputOf(c)) * width;
+      const y = top + (isListed() ? Math.floor(place / columns) : outputOf(c)) * height;
       context.save();
       context.translate(x, y);
       clipTo(context, 1, 1, width - 3, height - 3);
@@ -66,13 +71,15 @@ function savedMatrix() {
       context.strokeStyle = colours.frame;
       context.lineWidth = 1;
       context.strokeRect(x + 0.5, y + 0.5, width - 3, height - 3);
-    }
+      if (isListed()) drawName(context, channelName(c), 'left', x + 4, y + 10, width);
+    });
   };
   const legend = traceLegend(['measured', ...(content.arrays.residual ? ['model', 'residual'] : []), otherTrace()]);
-  const panel = { width: left + inputs.length * width, height: top + outputs.length * height, draw };
+  const panel = { width: left + columns * width, height: top + rows * height, draw };
   return { title: 'Frequency response, ' + bandText() + (matrix.timesOmega ? ', times \u03c9\u00b2' : ''), legend, panels: [panel] };
 }
 
-function drawName(context, name, align, x, y) {
-  drawText(context, shortened(name, 12), x, y, { align, base: 'middle' });
+// Shortened to about that many pixels.
+function drawName(context, name, align, x, y, room = 84) {
+  drawText(context, shortened(name, Math.floor(room / 7)), x, y, { align, base: 'middle' });
 }

@@ -71,15 +71,17 @@ function drawNonlinearity(context, width, height) {
     return turned ? at.reverse() : at;
   };
   const colours = palette();
-  rows.forEach((row, r) => drawName(context, row.name.slice(0, 8), 'right', area.x - 8, area.y + (r + 0.5) * h));
-  columns.forEach((column, c) => drawName(context, column.name.slice(0, Math.max(2, Math.floor(w / 6.5))), 'center', area.x + (c + 0.5) * w, area.y / 2));
+  const [across, down] = [Math.ceil(30 / w), Math.ceil(14 / h)];  // every name, or as many as fit
+  rows.forEach((row, r) => { if (r % down === 0) drawName(context, row.name, 'right', area.x - 8, area.y + (r + 0.5) * h, 56); });
+  columns.forEach((column, c) => { if (c % across === 0) drawName(context, column.name, 'center', area.x + (c + 0.5) * w, area.y / 2, across * w); });
+  const gap = Math.min(8, 0.3 * h);
   context.lineWidth = 1;
   context.strokeStyle = colours.text;
-  for (const test of distortionBars()) {
+  for (const test of distortionBars().sort((a, b) => isDistorted(a) - isDistorted(b))) {
     const [column, row] = place(test.channel);
     const left = area.x + column * w + 2;
-    const bottom = area.y + (row + 1) * h - 3;
-    const tall = (h - 8) * distortionHeight(test.level);
+    const bottom = area.y + (row + 1) * h - 0.375 * gap;
+    const tall = Math.max(1, (h - gap) * distortionHeight(test.level));
     const wide = (w - 5) / bands;
     if (!test.settled) {
       context.strokeRect(left + test.band * wide + 0.5, bottom - tall + 0.5, Math.max(1, wide - 2), tall - 1);
@@ -89,7 +91,7 @@ function drawNonlinearity(context, width, height) {
     context.fillRect(left + test.band * wide, bottom - tall, Math.max(1, wide - 1), tall);
   }
   context.strokeStyle = colours.grid;
-  for (let c = 0; c < channelCount(); ++c) {
+  for (let c = 0; h > 4 && c < channelCount(); ++c) {
     const [column, row] = place(c);
     context.strokeRect(area.x + column * w + 0.5, area.y + row * h + 0.5, w - 2, h - 2);
   }

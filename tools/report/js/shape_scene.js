@@ -11,6 +11,7 @@ function drawShape(context, width, height) {
 }
 
 const lift = 0.2;  // largest deflection relative to the size of the stage
+const mostLabels = 60;  // more would cover each other
 
 // Oblique view from above after a rotation about the vertical axis; no perspective, so parallels stay parallel.
 function stageView(width, height) {
@@ -42,7 +43,7 @@ function drawStage(context, width, height) {
     drawChannel(context, point.kind, now.x, now.y);
     // For a sensor and an actuator at the same position, names on either side.
     const [shift, align] = point.kind === 'outputs' ? [-7, 'right'] : [7, 'left'];
-    drawText(context, point.name.slice(0, 12), now.x + shift, now.y - 7, { align, base: 'middle', pixels: 11, colour: colours.ink });
+    if (seen.length <= mostLabels) drawText(context, point.name.slice(0, 12), now.x + shift, now.y - 7, { align, base: 'middle', pixels: 11, colour: colours.ink });
   }
 }
 

@@ -9,7 +9,7 @@ function cursorFrames() {
     frames.push({ node: graph.graphDiv.parentElement.classList.contains('plot') ? graph.graphDiv.parentElement : graph.graphDiv, left: area.x, width: area.w });
   }
   if (stability.figure) frames.push({ node: stability.figure.node, left: diagramFrame().area.x, width: diagramFrame().area.w });
-  for (const { button } of matrix.panels) frames.push({ node: button, left: 0, width: button.clientWidth });
+  for (const { button, near } of matrix.panels.values()) if (near) frames.push({ node: button, left: 0, width: button.clientWidth });
   return frames;
 }
 

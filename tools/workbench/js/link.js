@@ -60,5 +60,5 @@ async function takeResults(fresh) {
   content.provenance = responses.concat(fresh.content.provenance);
   Object.assign(bench, { stage: fresh.stage, trends: fresh.trends });
   if (previews[fresh.stage]) content.verdict = { level: 'doubt', text: previews[fresh.stage], head: [], reasons: [] };
-  curvesOfChannel.clear();
+  lastCurves.channel = null;
 }
