@@ -37,7 +37,7 @@ async function selfTest() {
   findings.correlated = Array.from(document.querySelectorAll('#interpolation p, .correlated, #provenance dd'), (node) => node.textContent).join(' | ');
   if (content.comparison) findings.comparison = { ...content.comparison, rows: document.querySelectorAll('#comparison .compared > div:first-child tbody tr').length };
   if (content.shapes) findings.shapes = shapesCheck();
-  findings.saved = await savedCheck();
+  findings.saved = savedCheck();
   findings.timed_cycles = Array.from(document.querySelectorAll('.histogram .step-time'), (cell) => Number(cell.textContent.replace(/\u202f/g, '')))
     .reduce((a, b) => a + b, 0);
   findings.errors = errors;
@@ -191,12 +191,12 @@ function shapesCheck() {
 
 // Every figure as a file: SVG that can be parsed and has valid numbers only, non-empty PNG; the peak must be at the
 // right place.
-async function savedCheck() {
+function savedCheck() {
   const saved = {};
   for (const name of savable.keys()) {
     const { text, width, height } = svgOf(name);
     const file = new DOMParser().parseFromString(text, 'image/svg+xml');
-    const png = await pngOf(name, 1);
+    const png = pngOf(name, 1);
     saved[name] = {
       bytes: text.length, width, height, broken: Boolean(file.querySelector('parsererror')) || /NaN|Infinity|undefined/.test(text.replace(/<text.*?<\/text>|<title>.*?<\/title>/gs, '')),
       marks: file.querySelectorAll('path, text').length, ink: hasInk(pixelsOf(png)), png: [png.width, png.height],

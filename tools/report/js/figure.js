@@ -1,4 +1,4 @@
-// Figures on a canvas, and export of all figures as SVG, and as PNG made from it.
+// Figures on a canvas, and export of all figures as SVG and PNG.
 
 // Calls draw(context, width, height) on a canvas whenever its element, the colours or the medium change.
 function canvasFigure(id, label, draw, kind) {
@@ -72,19 +72,24 @@ function drawGraph(graph, context) {
 
 const savedMargin = 14;
 
-// The file's text, and its size.
-function svgOf(name) {
-  const { title, legend, panels } = savable.get(name)();
-  const context = new SvgContext();
+function savedSize({ legend, panels }) {
+  return {
+    width: Math.max(...panels.map((panel) => panel.width)) + 2 * savedMargin,
+    height: 2 * savedMargin + 22 + (hasLegend(legend) ? 24 : 0) + panels.reduce((sum, panel) => sum + panel.height + (panel.title ? 20 : 0), 0),
+  };
+}
+
+function hasLegend(legend) {
+  return Boolean(legend) && legend.length > 0;
+}
+
+function drawSaved(context, { title, legend, panels }, { width, height }) {
   const colours = palette();
-  const width = Math.max(...panels.map((panel) => panel.width)) + 2 * savedMargin;
-  const hasLegend = legend && legend.length > 0;
-  const height = 2 * savedMargin + 22 + (hasLegend ? 24 : 0) + panels.reduce((sum, panel) => sum + panel.height + (panel.title ? 20 : 0), 0);
   context.fillStyle = colours.background;
   context.fillRect(0, 0, width, height);
   drawText(context, title, savedMargin, savedMargin + 12, { pixels: 15, weight: '600', colour: colours.ink });
   let y = savedMargin + 22;
-  if (hasLegend) y = drawLegend(context, legend, y);
+  if (hasLegend(legend)) y = drawLegend(context, legend, y);
   for (const panel of panels) {
     if (panel.title) {
       drawText(context, panel.title, savedMargin, y + 13, { pixels: 12.5 });
@@ -96,7 +101,15 @@ function svgOf(name) {
     context.restore();
     y += panel.height;
   }
-  return { width, height, text: context.text(width, height, title) };
+}
+
+// The file's text, and its size.
+function svgOf(name) {
+  const figure = savable.get(name)();
+  const size = savedSize(figure);
+  const context = new SvgContext();
+  drawSaved(context, figure, size);
+  return { ...size, text: context.text(size.width, size.height, figure.title) };
 }
 
 function drawLegend(context, legend, y) {
@@ -112,13 +125,14 @@ function drawLegend(context, legend, y) {
 }
 
 // Pixels for a slide: twice the size on the page.
-async function pngOf(name, scale = 2) {
-  const { width, height, text } = svgOf(name);
-  const image = new Image();
-  image.src = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(text);
-  await image.decode();
-  const canvas = element('canvas', { width: Math.round(width * scale), height: Math.round(height * scale) });
-  canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
+function pngOf(name, scale = 2) {
+  const figure = savable.get(name)();
+  const size = savedSize(figure);
+  const canvas = element('canvas', { width: Math.round(size.width * scale), height: Math.round(size.height * scale) });
+  const context = canvas.getContext('2d');
+  context.scale(scale, scale);
+  context.clearRect = () => {};  // as in SvgContext: a plot would clear the background
+  drawSaved(context, figure, size);
   return canvas;
 }
 
@@ -128,8 +142,8 @@ function download(blob, file) {
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 }
 
-async function saveFigure(name, kind) {
+function saveFigure(name, kind) {
   const file = name.replace(/[^\w]+/g, '_') + '.' + kind.toLowerCase();
-  if (kind === 'PNG') (await pngOf(name)).toBlob((blob) => download(blob, file));
+  if (kind === 'PNG') pngOf(name).toBlob((blob) => download(blob, file));
   else download(new Blob([svgOf(name).text], { type: 'image/svg+xml' }), file);
 }
