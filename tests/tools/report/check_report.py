@@ -249,6 +249,9 @@ def check_look(page, work, kind):
     """At all widths, light and dark, and with the keyboard."""
     browser = open_page(page, ready="document.readyState === 'complete' && window.stageidReport.content !== undefined", still=True)
     browser.check_tab(kind)
+    browser.evaluate("document.querySelector('#entry-legend button').focus()")
+    browser.press("Enter")
+    expect(browser.evaluate("document.activeElement.parentElement.id") == "entry-legend", "a trace that is switched has not the focus any more")
     browser.check_widths(work, "report", 1000)
     for picture in work.glob("report_*.png") if kind == "full" else ():
         colours = browser.evaluate(COLOURS % base64.b64encode(picture.read_bytes()).decode())

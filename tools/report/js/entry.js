@@ -193,8 +193,8 @@ function savedEntry() {
 
 function buildLegend() {
   const legend = document.getElementById('entry-legend');
-  legend.replaceChildren(...entry.order.map((name) => swatch(name, traceName(name), 'button',
-    { type: 'button', 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name) })), element('output', { id: 'entry-values', class: 'values' }));
+  keepFocus(() => legend, () => legend.replaceChildren(...entry.order.map((name) => swatch(name, traceName(name), 'button',
+    { type: 'button', 'aria-pressed': String(!entry.hidden.has(name)), onclick: () => toggleTrace(name) })), element('output', { id: 'entry-values', class: 'values' })));
 }
 
 function toggleTrace(name) {

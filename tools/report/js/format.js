@@ -91,6 +91,15 @@ function smallButton(text, name, onclick, title = name) {
   return element('button', { type: 'button', class: 'plain small', 'aria-label': name, title, onclick }, text);
 }
 
+// Calls change(), which replaces controls within find(); the focus stays at its place among them.
+function keepFocus(find, change) {
+  const controls = () => Array.from(find() ? find().querySelectorAll('button, select, input') : []);
+  const place = controls().indexOf(document.activeElement);
+  change();
+  const next = place < 0 ? null : controls().slice(0, place + 1).pop();
+  if (next) next.focus({ preventScroll: true });
+}
+
 // A section of the page with its entry in the contents; returns the body to fill.
 function section(id, short, title, lead) {
   const node = element('section', { id, 'aria-labelledby': id + '-title' },

@@ -48,9 +48,9 @@ function showState(state) {
   session.stop.disabled = !running;
   session.status.textContent = statusText(state);
   session.command.textContent = state.command || 'none: there is no model yet';
-  session.list.replaceChildren(...states.map((one, i) => element('li', null, element('button', {
+  keepFocus(() => session.list, () => session.list.replaceChildren(...states.map((one, i) => element('li', null, element('button', {
     type: 'button', class: 'plain fit', 'aria-current': i === index ? 'true' : null, onclick: () => act({ kind: 'go', index: i }),
-  }, one.what), element('span', { class: 'quiet' }, fitText(one)))));
+  }, one.what), element('span', { class: 'quiet' }, fitText(one))))));
   const current = states[index];
   session.save.hidden = !state.writable;
   for (const node of session.save.elements) node.disabled = running || current.stage !== 'refined' || Boolean(current.saved);

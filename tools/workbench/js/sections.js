@@ -31,7 +31,7 @@ function showResults() {
   document.getElementById('head').replaceChildren();
   buildHead('workbench');
   resultParts.forEach(([id], place) => {
-    if (changingParts.has(id)) rebuild(resultParts, place);
+    if (changingParts.has(id)) keepFocus(() => document.getElementById(id), () => rebuild(resultParts, place));
   });
   fillMatrixLegend();
   redrawMatrix();
