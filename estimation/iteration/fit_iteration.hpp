@@ -74,6 +74,9 @@ class Damping {
  public:
   static constexpr int kTries = 40;
 
+  /// Whether the last undamped step lowered the cost.
+  bool is_off() const noexcept { return damping_ == 0.0; }
+
   /// Tries steps with increasing damping until one lowers the cost. @param lowers_cost (damping) -> bool
   template <typename Step>
   bool descend(const Step& lowers_cost, int tries = kTries) {
