@@ -269,7 +269,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       figure,
       needed <= evidence.transient_periods + evidence.periods - 2
           ? fmt::format("--transient-periods {}, or --method lpm", needed)
-          : fmt::format("use --method lpm, or measure again with transient_periods: {}", needed)};
+          : fmt::format("measure again with transient_periods: {}, or use --method lpm", needed)};
   if (!linear) {
     finding.cause = Cause::limit_cycle;
     finding.what = fmt::format(

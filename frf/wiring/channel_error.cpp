@@ -27,8 +27,10 @@ Finding swap_finding(bool in_recording, bool of_sensors) {
   if (in_recording)
     return fault(
         Cause::swapped,
-        "recorded under each other's name: u = r - C y is satisfied if the two are exchanged",
-        "exchanged", "exchange the two names in the channel list of the recorder");
+        "recorded under each other's name: the records follow the control law only if the two are "
+        "exchanged",
+        "exchanged",
+        "exchange the two names in the channel list of the recorder, and measure or import again");
   return fault(
       Cause::swapped, "cables exchanged: the rigid body fits if the two are exchanged", "exchanged",
       of_sensors ? "exchange the two sensors' cables, or their positions in the stage file"

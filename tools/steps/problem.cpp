@@ -43,7 +43,9 @@ int place_of(const Problem& p) {
   const bool avoids = p.is(FitStatus::undetermined) || p.flags.starts_with("--band");
   if (!p.flags.empty() && !avoids) return 9;
   if (p.cause == kOneRealization) return 10;
-  return p.cause == kHeldBack ? 12 : 11;
+  // Modes that the data do not determine also keep the iteration from its end.
+  const bool ended = p.is(FitStatus::iteration_limit) || p.is(FitStatus::cost_stalled);
+  return p.cause == kHeldBack ? 13 : ended ? 12 : 11;
 }
 
 bool explains_others(const Problem& problem) { return place_of(problem) <= 3; }
@@ -67,13 +69,14 @@ std::vector<Problem> check_noise(const FrfEstimate& frf) {
   return {
       {kNoise, false,
        fmt::format("the response is not above its noise: {:.0f} % of the lines of the best channel "
-                   "exceed it, and noise alone gives 5 %",
+                   "are above its 95 % limit, and noise alone gives 5 %",
                    100.0 * share),
        "raise 'level' in the experiment file, or measure more periods"}};
 }
 
-/// Faults and noise of the data explain all that follows.
+/// Faults and noise of the data explain all that follows, and noise alone also that nothing repeats.
 std::size_t in_head(const std::vector<Problem>& problems) {
+  if (!problems.empty() && problems.front().cause == kNoise) return 1;
   const auto last = std::ranges::find_if(problems, std::not_fn(explains_others));
   const auto count = last == problems.begin() ? problems.size()
                                               : static_cast<std::size_t>(last - problems.begin());
@@ -110,7 +113,7 @@ std::vector<Problem> problems_of(const std::vector<Finding>& health) {
     if (f.severity == Severity::unchecked) continue;
     problems.push_back({to_string(f.cause), f.severity == Severity::fault,
                         fmt::format("{}{}{}{}", f.channel, f.channel.empty() ? "" : ": ", f.what,
-                                    f.figure.empty() ? "" : " (" + f.figure + ")"),
+                                    f.what.ends_with(f.figure) ? "" : " (" + f.figure + ")"),
                         f.remedy});
   }
   return problems;

@@ -85,9 +85,9 @@ class Commands {
   void add(Problem& p) const {
     const auto cause = from_word<Cause>(p.cause);
     if (!p.flags.empty())
-      p.command = refit(p.flags);
+      refit(p, p.flags);
     else if (p.is(FitStatus::iteration_limit))
-      p.command = refit(fmt::format("--max-iterations {:.0f}", kMoreIterations * iterations()));
+      refit(p, fmt::format("--max-iterations {:.0f}", kMoreIterations * iterations()));
     else if (from_word<FitStatus>(p.cause))
       return;  // no remedy is known
     else if (p.cause == kNonlinear && model_ != nullptr &&
@@ -115,6 +115,14 @@ class Commands {
         .value_or(FitRequest().max_iterations);
   }
 
+  void refit(Problem& p, const std::string& flags) const {
+    p.command = refit(flags);
+    if (p.command.empty() || files_.experiment.empty()) return;
+    if (!p.remedy.empty()) p.remedy += "; ";
+    p.remedy +=
+        fmt::format("for later measurements, change 'fit' in {}", files_.experiment.string());
+  }
+
   std::string refit(const std::string& flags) const {
     if (files_.frf.empty() || files_.model.empty()) return {};
     const Json options = fit_.value("options", Json());
@@ -138,7 +146,7 @@ class Commands {
     p.command = measure();
     if (p.command.starts_with("stageid log"))
       p.remedy += "; then check the log";
-    else if (!p.command.empty() && p.remedy.find("measure") == std::string::npos)
+    else if (p.remedy.find("measure") == std::string::npos)
       p.remedy += "; then measure again";
   }
 
