@@ -15,6 +15,7 @@
 #include "estimation/problem/fit_start.hpp"
 #include "estimation/problem/pole_bounds.hpp"
 #include "estimation/problem/residual.hpp"
+#include "estimation/problem/search_limit.hpp"
 #include "estimation/problem/weight_matrices.hpp"
 #include "estimation/search/determinacy.hpp"
 #include "estimation/search/hidden_modes.hpp"
@@ -126,7 +127,9 @@ ParameterCovariance constrain_ranks(const FrfEstimate& frf, const FitOptions& op
   iteration = std::move(constrained);
   for (std::size_t i = 0; i < factors.ranks().size(); ++i)
     if (factors.ranks()[i] > 0) result.model.submodels[i].residue_rank = factors.ranks()[i];
-  if (!options.uncertainty || iteration.status == FitStatus::singular) return {};
+  // Who interrupts a fit does not wait for these deviations: they take longer than the fit.
+  const bool interrupted = options.limit && options.limit->was_interrupted();
+  if (!options.uncertainty || interrupted || iteration.status == FitStatus::singular) return {};
   return low_rank_covariance(problem, beta, iteration.end_cost, factors,
                              data_noise(frf, options.weighting), iteration.frozen,
                              options.response_variance);
