@@ -109,8 +109,7 @@ void Examination::find_clipped(Index c, double log_p) {
   const bool low = scan.log_p_low() <= log_p;
   const std::string& unit =
       sensor ? record_.info.sensors.unit(c) : record_.info.actuators.unit(c - record_.n_y());
-  find(Severity::fault, Cause::saturated, name(c),
-       "clipped: it stays at the end of its range",
+  find(Severity::fault, Cause::saturated, name(c), "clipped: it stays at the end of its range",
        fmt::format("{} at {:.4g} {}",
                    counted((high ? scan.high().count : 0) + (low ? scan.low().count : 0), "sample"),
                    high ? scan.high().value : scan.low().value, unit),

@@ -128,7 +128,7 @@ class ZeroMq(ProcessTest):
         self.assertIn("controller: {}", stage)
         (WORK / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
         self.node("forward_node")
-        self.check_modes(warnings=1)  # that the loop of the node is not tested
+        self.check_modes(warnings=2)  # that the loop of the node is not tested, and its signals not predicted
         self.succeed("log", "convert", "run.slog", "-o", "run.csv")
         with open(WORK / "run.csv", newline="") as file:
             forces = [float(row["actuator z1 [N]"]) for row in csv.DictReader(file)]
