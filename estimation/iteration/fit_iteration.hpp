@@ -74,7 +74,7 @@ class Damping {
  public:
   static constexpr int kTries = 40;
 
-  /// Whether the last undamped step lowered the cost.
+  /// Whether the next step is tried undamped first.
   bool is_off() const noexcept { return damping_ == 0.0; }
 
   /// Tries steps with increasing damping until one lowers the cost. @param lowers_cost (damping) -> bool

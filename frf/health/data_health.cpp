@@ -113,8 +113,8 @@ void Examination::find_clipped(Index c, double log_p) {
        fmt::format("{} at {:.4g} {}",
                    counted((high ? scan.high().count : 0) + (low ? scan.low().count : 0), "sample"),
                    high ? scan.high().value : scan.low().value, unit),
-       sensor ? "lower the level, or widen the sensor's range"
-              : "lower the level, or raise the actuator's limit");
+       sensor ? "lower the level, or widen the sensor's range, and measure again"
+              : "lower the level, or raise the actuator's limit, and measure again");
   spoilt_.push_back(c);
 }
 

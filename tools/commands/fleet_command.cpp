@@ -55,10 +55,10 @@ bool submit_jobs(const FleetFlags& flags, const FleetConfig& config,
     console.message(
         fmt::format("{}: this kind of store needs all tasks on the machine of its "
                     "disk; for several machines, set 'store: postgresql://...'",
-                    config.store.string()));
+                    shown_place(config.store)));
   console.result(fmt::format(
       "Slurm job {}: {} share {}; 'squeue -j {}' shows them. When they have ended, run the command "
-      "again for the result",
+      "again without --slurm",
       number, counted(tasks, "task"), counted(jobs, "job"), number));
   console.result({{"slurm_job", number}, {"tasks", tasks}, {"open_jobs", jobs}});
   return true;
@@ -75,9 +75,9 @@ void run_jobs(const FleetFlags& flags, Console& console) {
   pair_fleet(store);
   console.result(
       fmt::format("{}: {}: {} done before, {} done now, {} of them not trustworthy; {} failed",
-                  config.store.string(), counted(summary.jobs, "job"), summary.done_before,
+                  shown_place(config.store), counted(summary.jobs, "job"), summary.done_before,
                   summary.done, summary.not_trustworthy, summary.failed));
-  console.result({{"store", config.store.string()},
+  console.result({{"store", shown_place(config.store)},
                   {"jobs", summary.jobs},
                   {"done_before", summary.done_before},
                   {"done", summary.done},
@@ -85,7 +85,7 @@ void run_jobs(const FleetFlags& flags, Console& console) {
                   {"failed", summary.failed}});
   if (summary.failed > 0)
     console.warning(fmt::format("{}: {} failed; remove the cause and run the command again",
-                                config.store.string(), counted(summary.failed, "job")));
+                                shown_place(config.store), counted(summary.failed, "job")));
   console.exit_code = summary.failed > 0            ? kWorldFailed
                       : summary.not_trustworthy > 0 ? kNotTrustworthy
                                                     : kDone;
@@ -135,7 +135,7 @@ void add_watched_log(const FleetAddFlags& flags, Console& console) {
   require_readable(flags.log.file);
   FleetStore store(flags.store, Database::Access::create);
   const std::size_t rows = add_watched(store, flags.log);
-  console.result(fmt::format("{}: {} of stage '{}'", flags.store.string(),
+  console.result(fmt::format("{}: {} of stage '{}'", shown_place(flags.store),
                              counted(rows, "watched value"), flags.log.stage));
   console.result({{"stage", flags.log.stage}, {"values", rows}});
 }
@@ -196,7 +196,7 @@ void query_fleet(const FleetQueryFlags& flags, Console& console) {
       store.database().prepare(is_name(flags.sql) ? "SELECT * FROM " + flags.sql : flags.sql);
   if (!rows.changes_nothing() || rows.columns() == 0)
     throw std::invalid_argument(
-        fmt::format("{}: expected a table or a SELECT statement", flags.store.string()));
+        fmt::format("{}: expected a table or a SELECT statement", shown_place(flags.store)));
   std::vector<std::vector<std::string>> table(1);
   for (int c = 0; c < rows.columns(); ++c) table[0].push_back(rows.name(c));
   Json list = Json::array();
@@ -271,7 +271,8 @@ void fleet_command(CLI::App& app, Console& console) {
   auto [add, add_flags] = add_command(
       fleet, console, "add", "Add the hourly values of a watched log, from 'stageid watch -o'",
       add_watched_log);
-  add.add_option("store", add_flags.store, "store of a fleet (.db)")->required();
+  add.add_option("store", add_flags.store, "store of a fleet (.db, or postgresql://...)")
+      ->required();
   add.add_option("tracks", add_flags.log.file, "watch.h5")->required();
   add.add_option("--stage", add_flags.log.stage, "name of the stage")
       ->type_name("NAME")
@@ -282,7 +283,8 @@ void fleet_command(CLI::App& app, Console& console) {
 
   auto [report, report_flags] = add_command(
       fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
-  report.add_option("store", report_flags.store, "store of a fleet (.db)")->required();
+  report.add_option("store", report_flags.store, "store of a fleet (.db, or postgresql://...)")
+      ->required();
   report.add_option("-o,--output", report_flags.request.output, "page to write (.html)")
       ->required();
   report.add_option("--stage", report_flags.request.stages, "stages to show; default: all")
@@ -295,7 +297,8 @@ void fleet_command(CLI::App& app, Console& console) {
 
   auto [query, query_flags] = add_command(
       fleet, console, "query", "Print a table of a store, or write it as CSV", query_fleet);
-  query.add_option("store", query_flags.store, "store of a fleet (.db)")->required();
+  query.add_option("store", query_flags.store, "store of a fleet (.db, or postgresql://...)")
+      ->required();
   query
       .add_option("sql", query_flags.sql,
                   "stages | modes | stage_modes | identifications | outliers | watched | another "

@@ -27,13 +27,16 @@ bool is_database_url(const std::filesystem::path& place) {
   return place.native().starts_with("postgresql://") || place.native().starts_with("postgres://");
 }
 
-std::string shown_url(const std::string& url) {
-  static const std::regex password("(://[^/?@:]*):[^/?@]*@|([?&])password=[^&]*");
-  return std::regex_replace(url, password, "$1$2@");
+std::string shown_place(const std::filesystem::path& place) {
+  if (!is_database_url(place)) return place.string();
+  static const std::regex of_user("(://[^/@:]*):[^/]*@");
+  static const std::regex parameter("([?&]password=)[^&]*");
+  const std::string url = std::regex_replace(place.string(), of_user, "$1@");
+  return std::regex_replace(url, parameter, "$1...");
 }
 
 Database::Database(const std::filesystem::path& place, Access access)
-    : name_(is_database_url(place) ? shown_url(place.string()) : place.string()),
+    : name_(shown_place(place)),
       engine_(is_database_url(place) ? make_postgres_engine(place.string(), access)
                                      : make_sqlite_engine(place, access)) {}
 

@@ -49,7 +49,7 @@ class Statement {
   double number(int column) const { return engine_->number(column); }  ///< 0 for null
   std::int64_t integer(int column) const { return engine_->integer(column); }
   std::string text(int column) const;                   ///< bytes as hexadecimal digits
-  std::span<const std::byte> bytes(int column) const {  ///< until the next step()
+  std::span<const std::byte> bytes(int column) const {  ///< until the next bytes() or step()
     return engine_->bytes(column);
   }
 
@@ -83,7 +83,7 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
-  /// For messages: a URL is without its password.
+  /// See shown_place().
   const std::string& name() const noexcept { return name_; }
   /// @throws std::invalid_argument if it is not one statement
   Statement prepare(const std::string& sql) const { return Statement(engine_->prepare(sql)); }
@@ -103,8 +103,8 @@ class Database {
 /// postgresql://USER@HOST:PORT/DATABASE?OPTIONS, as libpq takes it.
 bool is_database_url(const std::filesystem::path& place);
 
-/// A URL without the password.
-std::string shown_url(const std::string& url);
+/// For messages: a URL is without its password.
+std::string shown_place(const std::filesystem::path& place);
 
 /// Everything between construction and commit() is stored, or nothing. It is the only writer meanwhile.
 class Transaction {

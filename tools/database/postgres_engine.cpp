@@ -16,8 +16,16 @@ namespace stageid {
 namespace {
 
 constexpr const char* kSettings =
-    "SET client_min_messages = warning; SET lock_timeout = '60s'; SET extra_float_digits = 1; "
-    "SET bytea_output = 'hex'; SET client_encoding = 'UTF8'; SET application_name = 'stageid'";
+    "SET lock_timeout = '60s'; SET extra_float_digits = 1; SET bytea_output = 'hex'; "
+    "SET client_encoding = 'UTF8'; SET tcp_keepalives_idle = 30; SET tcp_keepalives_interval = 10; "
+    "SET tcp_keepalives_count = 3";
+/// What a URL may set otherwise. A peer that vanishes without a word is noticed after a minute, and its claims end.
+constexpr std::array<std::pair<const char*, const char*>, 5> kConnection = {
+    {{"fallback_application_name", "stageid"},
+     {"connect_timeout", "30"},
+     {"keepalives_idle", "30"},
+     {"keepalives_interval", "10"},
+     {"keepalives_count", "3"}}};
 /// The first of the two numbers of a lock; the second is that of the schema.
 constexpr int kWriterLock = 0x57A6E1D;
 
@@ -46,13 +54,15 @@ struct Connection {
       {};  ///< prepared statements to be freed when nothing is pending
 
   [[noreturn]] void fail(const PGresult* result) const {
-    const char* state = result == nullptr ? "" : ::PQresultErrorField(result, PG_DIAG_SQLSTATE);
+    const char* field =
+        result == nullptr ? nullptr : ::PQresultErrorField(result, PG_DIAG_SQLSTATE);
+    const std::string state = field == nullptr ? "" : field;
     const char* primary =
         result == nullptr ? nullptr : ::PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
     std::string message = primary != nullptr ? primary : ::PQerrorMessage(handle.get());
     message = message.substr(0, message.find('\n'));
-    const std::string kind = std::string(state == nullptr ? "" : state).substr(0, 2);
-    if (state != nullptr && std::string_view(state) == "55P03")
+    const std::string kind = state.substr(0, 2);
+    if (state == "55P03")
       throw FileError(fmt::format(
           "{}: another process has been writing for 60 s; run the command again when it has ended",
           name));
@@ -61,8 +71,13 @@ struct Connection {
           fmt::format("{}: no connection to the database: {}; check the address and "
                       "the server, then run the command again",
                       name, message));
+    if (state == "42501")
+      throw FileError(
+          fmt::format("{}: {}; ask its owner for the permission, or use a database of "
+                      "your own",
+                      name, message));
     // 22, 23, 42: the statement is at fault; 25: it would have changed something.
-    if (kind == "22" || kind == "23" || kind == "25" || kind == "42")
+    if (kind == "22" || kind == "23" || kind == "42" || (kind == "25" && reads_only))
       throw std::invalid_argument(fmt::format("{}: {}", name, message));
     throw FileError(fmt::format("{}: {}", name, message));
   }
@@ -84,6 +99,7 @@ struct Connection {
       while (Result result{::PQgetResult(handle.get())})
         if (!failed && !good(result.get())) failed = std::move(result);
     pending = 0;
+    if (lost) fail(nullptr);
     const Result end(::PQgetResult(handle.get()));
     if (::PQexitPipelineMode(handle.get()) == 0) fail(failed.get());
     free_unused();
@@ -185,8 +201,10 @@ class PostgresStatement final : public StatementEngine {
     }
     const Parameters all(parameters);
     if (::PQsendQueryPrepared(handle(), statement_.c_str(), all.count(), all.values.data(),
-                              all.sizes.data(), all.formats.data(), 0) == 0)
+                              all.sizes.data(), all.formats.data(), 0) == 0) {
+      if (connection_.pending == 0) ::PQexitPipelineMode(handle());
       connection_.fail(nullptr);
+    }
     if (++connection_.pending >= kMostPending) connection_.settle();
   }
   bool step() override {
@@ -241,9 +259,18 @@ class PostgresStatement final : public StatementEngine {
 class PostgresEngine final : public DatabaseEngine {
  public:
   PostgresEngine(const std::string& url, DatabaseAccess access) {
-    connection_.name = shown_url(url);
+    connection_.name = shown_place(url);
     connection_.reads_only = access == DatabaseAccess::read;
-    connection_.handle.reset(::PQconnectdb(url.c_str()));
+    std::vector<const char*> keys, values;
+    for (const auto& [key, value] : kConnection) {
+      keys.push_back(key);
+      values.push_back(value);
+    }
+    keys.insert(keys.end(), {"dbname", nullptr});
+    values.insert(values.end(), {url.c_str(), nullptr});
+    connection_.handle.reset(::PQconnectdbParams(keys.data(), values.data(), 1));
+    ::PQsetNoticeProcessor(
+        handle(), [](void*, const char*) {}, nullptr);
     if (::PQstatus(handle()) != CONNECTION_OK) connection_.fail(nullptr);
     execute(kSettings);
     if (connection_.reads_only) execute("SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY");
@@ -255,7 +282,10 @@ class PostgresEngine final : public DatabaseEngine {
   void execute(const std::string& sql) override {
     const Result failed = connection_.settled();
     if (failed && sql != "ROLLBACK") connection_.fail(failed.get());
-    connection_.checked(::PQexec(handle(), sql.c_str()));
+    const Result done = connection_.checked(::PQexec(handle(), sql.c_str()));
+    if (sql == "COMMIT" && std::string_view(::PQcmdStatus(done.get())) != sql)
+      throw FileError(
+          fmt::format("{}: nothing was stored; run the command again", connection_.name));
   }
   void create(const std::string& schema) override {
     std::string sql = schema;
@@ -274,7 +304,7 @@ class PostgresEngine final : public DatabaseEngine {
     execute(sql);
   }
   void begin() override {
-    execute("BEGIN");
+    execute("BEGIN ISOLATION LEVEL READ COMMITTED");  // it reads what was stored while it waited
     try {
       execute(
           fmt::format("SELECT pg_advisory_xact_lock({}, hashtext(current_schema()))", kWriterLock));

@@ -41,7 +41,7 @@ int enter_wal_mode(sqlite3* database) {
           "{}: another process has been writing for {} s; run the command again when it has ended",
           name, kPatience_ms / 1000));
     case SQLITE_NOTADB:
-      throw FormatError(file, "", "is not a store of 'stageid fleet'; choose another file");
+      throw FormatError(file, "", "is not a store of 'stageid fleet'; choose another one");
     case SQLITE_CORRUPT:
       throw FormatError(file, "",
                         "is damaged; restore a copy, or delete it and run the fleet again");

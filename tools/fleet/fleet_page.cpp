@@ -53,7 +53,10 @@ class FleetPage {
 
  private:
   /// The name of the file or the database.
-  std::string title() const { return std::filesystem::path(database_.name()).stem().string(); }
+  std::string title() const {
+    const std::string& name = database_.name();
+    return std::filesystem::path(name.substr(0, name.find('?'))).stem().string();
+  }
 
   std::vector<std::pair<std::string, std::int64_t>> chosen_stages() const {
     std::vector<std::pair<std::string, std::int64_t>> out;

@@ -247,6 +247,9 @@ void pair_fleet(FleetStore& store) {
   while (stages.step()) changed.push_back(stages.integer(0));
   for (const std::int64_t stage : changed) {
     Transaction transaction(database);
+    // Other processes may have paired it meanwhile.
+    if (!database.prepare("SELECT 1 FROM stage WHERE id = ? AND changed = 1").first(stage))
+      continue;
     StageHistory history = read_stage(database, stage);
     const ModeTracks tracks = follow(history);
     const std::vector<std::vector<Row*>> rows = by_track(history, tracks.size());
@@ -254,8 +257,12 @@ void pair_fleet(FleetStore& store) {
     transaction.commit();
   }
   // 2: followed over time, but not yet compared with the other stages, even if an earlier call was interrupted.
-  if (!database.prepare("SELECT 1 FROM stage WHERE changed = 2").step()) return;
+  const auto is_paired = [&] {
+    return !database.prepare("SELECT 1 FROM stage WHERE changed = 2").first().has_value();
+  };
+  if (is_paired()) return;
   Transaction transaction(database);
+  if (is_paired()) return;
   pair_stages(database);
   database.execute("UPDATE stage SET changed = 0 WHERE changed = 2");
   transaction.commit();

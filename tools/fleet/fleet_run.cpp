@@ -6,6 +6,7 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -89,7 +90,7 @@ class FleetRun {
   void add(Job job, const std::map<std::string, JobState>& stored) {
     const auto found = stored.find(job.id);
     const JobState state = found == stored.end() ? JobState::none : found->second;
-    if (state == JobState::failed) failed_before_.insert(job.id);
+    if (state == JobState::failed) failed_before_[job.id] = store_.failure(job.id);
     if (state == JobState::none || state == JobState::failed) {
       jobs_.push_back(std::move(job));
       return;
@@ -111,7 +112,7 @@ class FleetRun {
       // Other processes may have run it since find_jobs().
       const JobState state = store_.state_of(job.id);
       const bool done = state == JobState::current || state == JobState::superseded;
-      const bool failed = state == JobState::failed && !failed_before_.contains(job.id);
+      const bool failed = state == JobState::failed && !is_failure_before(job.id);
       if (done || failed) {
         ++(done ? summary_.done_before : summary_.failed);
         store_.database().release(job.claim());
@@ -119,6 +120,12 @@ class FleetRun {
         pool_.start(index, arguments_of(job, config_));
       }
     }
+  }
+
+  /// Whether a failure was stored before this call: such jobs run again, but in one process only.
+  bool is_failure_before(const std::string& job) {
+    const auto before = failed_before_.find(job);
+    return before != failed_before_.end() && before->second == store_.failure(job);
   }
 
   void wait_for_others() {
@@ -162,7 +169,7 @@ class FleetRun {
   FleetStore store_;
   Progress progress_;
   std::vector<Job> jobs_;
-  std::set<std::string> failed_before_;
+  std::map<std::string, std::optional<std::int64_t>> failed_before_;  ///< see FleetStore::failure()
   std::deque<std::size_t>
       open_;  ///< jobs that are neither run by this process nor known to be done
   bool waiting_ = false;

@@ -125,6 +125,11 @@ bool FleetStore::is_done(const std::string& job) {
   return state == JobState::superseded || state == JobState::current;
 }
 
+std::optional<std::int64_t> FleetStore::failure(const std::string& job) const {
+  return database_.prepare("SELECT id FROM identification WHERE job = ? AND verdict = 'failed'")
+      .first(job);
+}
+
 bool FleetStore::add(const Identification& result) {
   Transaction transaction(database_);
   if (is_done(result.job)) return false;

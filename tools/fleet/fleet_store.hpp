@@ -69,6 +69,8 @@ class FleetStore {
   std::map<std::string, JobState> jobs() const;
   JobState state_of(const std::string& job);
   bool is_done(const std::string& job);  ///< superseded or current
+  /// The number of a failed result, which mostly differs from that of the failure before it.
+  std::optional<std::int64_t> failure(const std::string& job) const;
   /// Does nothing if the job is done; replaces a failed one of the same job or log. @returns whether it was added
   /// A result becomes the current one of its log: others, of other options or versions, are kept, but not shown.
   bool add(const Identification& identification);

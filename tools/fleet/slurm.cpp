@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
+#include <sstream>
 #include <vector>
 
 #include "acquisition/files/file_error.hpp"
@@ -35,11 +37,17 @@ std::string submit_fleet(const FleetConfig& config, int tasks, int workers) {
                               shell_word(program), shell_word(config.file.string()),
                               workers > 0 ? fmt::format("{}", workers) : of_task));
   const ExternalEnd end = run_external(words, "", "slurm-client");
-  const std::string line = end.messages.substr(0, end.messages.find('\n'));
+  const std::string first = end.messages.substr(0, end.messages.find('\n'));
   if (end.status != 0)
     throw FileError(fmt::format("{}: not submitted: {}", config.file.string(),
-                                line.empty() ? "sbatch failed without a message" : line));
-  return line.substr(0, line.find(';'));  // NUMBER;CLUSTER
+                                first.empty() ? "sbatch failed without a message" : first));
+  // NUMBER or NUMBER;CLUSTER, possibly after warnings.
+  std::string number;
+  std::istringstream lines(end.messages);
+  for (std::string line; std::getline(lines, line);)
+    if (!line.empty() && std::isdigit(static_cast<unsigned char>(line[0])) != 0)
+      number = line.substr(0, line.find(';'));
+  return number;
 }
 
 }  // namespace stageid

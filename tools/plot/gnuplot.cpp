@@ -124,7 +124,7 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
   write_text_file(directory.path() / "script.gp",
                   preamble(picture, format) + picture.script + "unset output\n");
   const ExternalEnd end =
-      run_external({"gnuplot", "-d", "script.gp"}, directory.path(), "gnuplot-nox");
+      run_external({"TZ=UTC", "gnuplot", "-d", "script.gp"}, directory.path(), "gnuplot-nox");
   throw_if_interrupted();
   const std::filesystem::path picture_file = directory.path() / "picture";
   std::string bytes =

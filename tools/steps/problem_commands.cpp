@@ -146,7 +146,7 @@ class Commands {
     p.command = measure();
     if (p.command.starts_with("stageid log"))
       p.remedy += "; then check the log";
-    else if (p.remedy.find("measure") == std::string::npos)
+    else if (!p.command.empty() && p.remedy.find("measure") == std::string::npos)
       p.remedy += "; then measure again";
   }
 

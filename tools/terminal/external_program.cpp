@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -20,9 +21,15 @@ namespace {
 
 std::atomic<pid_t> running = -1;
 
+/// The first word that sets no variable.
+std::string name_of(const std::vector<std::string>& words) {
+  return *std::ranges::find_if(
+      words, [](const std::string& word) { return word.find('=') == std::string::npos; });
+}
+
 pid_t spawned(const std::vector<std::string>& words, const std::filesystem::path& directory,
               int messages) {
-  std::vector<std::string> all = {"/usr/bin/env", "LC_ALL=C.UTF-8", "TZ=UTC"};
+  std::vector<std::string> all = {"/usr/bin/env", "LC_ALL=C.UTF-8"};
   all.insert(all.end(), words.begin(), words.end());
   std::vector<char*> arguments;
   for (std::string& word : all) arguments.push_back(word.data());
@@ -46,7 +53,7 @@ pid_t spawned(const std::vector<std::string>& words, const std::filesystem::path
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0)
-    throw FileError(fmt::format("{}: cannot be started: {}", words[0], system_reason(error)));
+    throw FileError(fmt::format("{}: cannot be started: {}", name_of(words), system_reason(error)));
   return child;
 }
 
@@ -56,7 +63,7 @@ ExternalEnd run_external(const std::vector<std::string>& words,
                          const std::filesystem::path& directory, const std::string& package) {
   const FileDescriptor messages(::memfd_create("stageid messages", MFD_CLOEXEC));
   if (messages.get() < 0)
-    throw FileError(fmt::format("{}: cannot be started: {}", words[0], system_reason(errno)));
+    throw FileError(fmt::format("{}: cannot be started: {}", name_of(words), system_reason(errno)));
   const pid_t child = spawned(words, directory, messages.get());
   running = child;
   ExternalEnd end;
@@ -66,7 +73,7 @@ ExternalEnd run_external(const std::vector<std::string>& words,
   constexpr int kNotFound = 127;  // of env
   if (WIFEXITED(end.status) && WEXITSTATUS(end.status) == kNotFound)
     throw FileError(
-        fmt::format("{}: not installed; install the Debian package {}", words[0], package));
+        fmt::format("{}: not installed; install the Debian package {}", name_of(words), package));
   end.messages.resize(static_cast<std::size_t>(::lseek(messages.get(), 0, SEEK_END)));
   const ssize_t size = ::pread(messages.get(), end.messages.data(), end.messages.size(), 0);
   end.messages.resize(size > 0 ? static_cast<std::size_t>(size) : 0);

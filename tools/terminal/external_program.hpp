@@ -12,6 +12,7 @@ struct ExternalEnd {
 };
 
 /// Runs a program of another package, found in PATH, without input. The language of its messages is that of the locale C.
+/// @param words may begin with variables of its environment, NAME=VALUE
 /// @param directory where it runs; empty: here
 /// @param package   Debian package that contains it
 /// @throws FileError if it is not installed or cannot be started

@@ -67,11 +67,12 @@ std::shared_ptr<const FitDetails> details_of_fit(const FitSetup& setup, FitResul
   FitDetails details;
   try {
     fill_covariance(setup.frf, options, result);
-  } catch (const std::bad_alloc&) {
+    if (result.covariance.response_variance.size() == 0) details.problem = result.decisions.back();
+    details.deviation = deviation_on_all(frf, frequency_hz, result.covariance.response_variance);
+    add_loop(stage, result.model, result.covariance.sandwich, frequency_hz, details);
+  } catch (const std::bad_alloc&) {  // the fit itself is done
     details.problem = "no 95 % band: out of memory";
   }
-  details.deviation = deviation_on_all(frf, frequency_hz, result.covariance.response_variance);
-  add_loop(stage, result.model, result.covariance.sandwich, frequency_hz, details);
   return std::make_shared<const FitDetails>(std::move(details));
 }
 

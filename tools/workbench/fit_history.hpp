@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -61,6 +62,12 @@ class FitHistory {
   std::size_t index() const noexcept { return index_; }
   const std::vector<FitState>& states() const noexcept { return states_; }
   FitState& current() noexcept { return states_[index_]; }
+  /// The state with this model; null: it is forgotten.
+  FitState* of(const AdditiveModel* model) noexcept {
+    const auto found =
+        std::ranges::find(states_, model, [](const FitState& s) { return s.model.get(); });
+    return found == states_.end() ? nullptr : &*found;
+  }
   const FitState& current() const noexcept { return states_[index_]; }
 
  private:

@@ -235,13 +235,14 @@ void Workbench::improve(const FitSetup& setup, Work& work, const std::function<b
   store(work);
 }
 
-/// Adds the details of a fit to the current state, unless another one is current by now.
+/// Adds the details of a fit to its state, which may not be the current one by now.
 void Workbench::detail(const FitSetup& setup, const Work& work, FitResult result) {
   const auto details = details_of_fit(setup, std::move(result), page_.frf(), stage());
   const std::lock_guard lock(mutex_);
-  if (version_ != work.version) return;
-  history_.current().details = details;
-  show();
+  FitState* const state = history_.of(work.state.model.get());
+  if (state == nullptr) return;
+  state->details = details;
+  if (state == &history_.current()) show();
 }
 
 /// The second preview, then the fit of `stageid fit`, then its details.

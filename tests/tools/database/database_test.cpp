@@ -12,6 +12,14 @@
 namespace stageid {
 namespace test_database {
 
+TEST(Database, NoMessageContainsAPassword) {
+  EXPECT_EQ(shown_place("fleet:1@2.db"), "fleet:1@2.db");
+  EXPECT_EQ(shown_place("postgresql://u:se?cr@t@h:1/db?sslmode=require"),
+            "postgresql://u@h:1/db?sslmode=require");
+  EXPECT_EQ(shown_place("postgres://h/db?user=u&password=secret&port=1"),
+            "postgres://h/db?user=u&password=...&port=1");
+}
+
 TEST(Database, SeveralWritersMayCreateOneFileAtTheSameInstant) {
   const test::TemporaryDirectory directory;
   constexpr int kFiles = 200, kWriters = 4;

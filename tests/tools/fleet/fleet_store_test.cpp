@@ -43,6 +43,8 @@ TEST_F(FleetStoreTest, ReplacesAFailedJobOfTheSameLog) {
   EXPECT_TRUE(store.add(failed));
   EXPECT_EQ(store.state_of("a"), JobState::failed);
   EXPECT_EQ(store.state_of("b"), JobState::none);
+  EXPECT_TRUE(store.failure("a").has_value());
+  EXPECT_FALSE(store.failure("b").has_value());
   EXPECT_TRUE(store.add(failed)) << "it failed again";
   EXPECT_EQ(count_in(store, "identification"), 1);
   // The log was repaired: another fingerprint, so another job.
@@ -113,6 +115,24 @@ TEST_F(FleetStoreTest, TakesAnyBytesAsTheNameOfALog) {
   odd.log = "/data/\xff\xfe'\"?.slog";
   EXPECT_TRUE(store.add(odd));
   EXPECT_EQ(count_in(store, "identification WHERE log LIKE '%?.slog'"), 1);
+}
+
+TEST_F(FleetStoreTest, AStatementThatFailsIsToldAtTheEndAndNothingIsStored) {
+  const FleetStore store = open();
+  for (const int more : {0, 500}) {  // statements behind it
+    EXPECT_THROW(
+        {
+          Transaction transaction(store.database());
+          Statement add =
+              store.database().prepare("INSERT INTO stage (name, changed) VALUES (?, 0)");
+          add.run(std::string("twice"));
+          add.run(std::string("twice"));
+          for (int i = 0; i < more; ++i) add.run(fmt::format("{}", i));
+          transaction.commit();
+        },
+        std::invalid_argument);
+    EXPECT_EQ(count_in(store, "stage"), 0);
+  }
 }
 
 TEST_F(FleetStoreTest, AJobIsClaimedByOneOfSeveral) {

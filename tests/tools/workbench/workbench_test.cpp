@@ -172,6 +172,27 @@ TEST_F(WorkbenchTest, ComparesWithFitsOfTheSession) {
   refused({{"kind", "compare"}, {"index", 1}}, 409, "no such result");
 }
 
+TEST_F(WorkbenchTest, AFitThatIsNotShownGetsItsBandTooAndShowsItLater) {
+  make_model();
+  open(false);
+  settled();
+  const std::string url = bench_->url();
+  httplib::Client client("127.0.0.1", std::stoi(url.substr(url.find(':', 7) + 1)));
+  const auto has_band = [&] {
+    const Json results =
+        Json::parse(client.Get("/response.json" + url.substr(url.find('?')))->body);
+    return results["arrays"].contains("model_deviation");
+  };
+  done({{"kind", "remove"}, {"frequency_hz", 181.15}});
+  act({{"kind", "undo"}});  // before its band is known
+  EXPECT_FALSE(has_band()) << "the opened model has none";
+  std::this_thread::sleep_for(50ms);
+  act({{"kind", "redo"}});
+  bool found = false;
+  for (int i = 0; i < 1000 && !found; ++i, std::this_thread::sleep_for(10ms)) found = has_band();
+  EXPECT_TRUE(found);
+}
+
 TEST_F(WorkbenchTest, EveryRequestNeedsTheTokenAndAnActionTheHeader) {
   make_model();
   open(true);
