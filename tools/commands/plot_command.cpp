@@ -4,10 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <filesystem>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "estimation/model/cmif.hpp"
@@ -24,6 +27,19 @@ namespace stageid {
 namespace {
 
 const std::vector<std::string> kFigures = {"cmif", "bode", "entry"};
+
+/// The width of a figure: its own, or that of one or two columns of a journal.
+enum class PlotPreset : std::uint8_t { figure, single, both };
+enum class PlotTheme : std::uint8_t { colour, grey };
+
+}  // namespace
+
+template <>
+inline constexpr std::array kWords<PlotPreset> = {"figure", "single", "double"};
+template <>
+inline constexpr std::array kWords<PlotTheme> = {"colour", "grey"};
+
+namespace {
 
 /// Indices of the named channels, in the given order; of all channels if none is named.
 std::vector<Eigen::Index> places(const char* flag, const std::vector<std::string>& names,
@@ -56,7 +72,52 @@ struct PlotFlags {
   std::vector<std::string> output_channels;
   std::vector<std::string> input_channels;
   std::filesystem::path output;
+  PlotPreset preset = PlotPreset::figure;
+  double width_mm = 0.0;
+  double height_mm = 0.0;
+  PlotTheme theme = PlotTheme::colour;
+  PictureStyle style;
+  std::vector<double> band_hz;
 };
+
+PictureStyle style_of(const PlotFlags& flags) {
+  constexpr double kInch_mm = 25.4, kLeast_mm = 30.0, kMost_mm = 1000.0;
+  PictureStyle style = flags.style;
+  style.grey = flags.theme == PlotTheme::grey;
+  if (flags.preset != PlotPreset::figure)
+    style.width_in = flags.preset == PlotPreset::single ? kColumn_in : kPage_in;
+  for (const auto& [flag, size_mm, size_in] :
+       {std::tuple("--width", flags.width_mm, &style.width_in),
+        std::tuple("--height", flags.height_mm, &style.height_in)}) {
+    if (size_mm == 0.0) continue;
+    if (!(size_mm >= kLeast_mm && size_mm <= kMost_mm))
+      throw std::invalid_argument(
+          fmt::format("{}: got {} mm; expected {} to {}", flag, size_mm, kLeast_mm, kMost_mm));
+    *size_in = size_mm / kInch_mm;
+  }
+  if (!(style.font_pt >= 4.0 && style.font_pt <= 40.0))
+    throw std::invalid_argument(
+        fmt::format("--font-size: got {} pt; expected 4 to 40", style.font_pt));
+  const auto of_names = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == ' ' || c == '-';
+  };
+  if (style.font.empty() || !std::ranges::all_of(style.font, of_names))
+    throw std::invalid_argument(
+        fmt::format("--font: got '{}'; expected the name of a font, such as Times", style.font));
+  return style;
+}
+
+/// Keeps the lines within the requested band.
+void keep_band(const std::vector<double>& band_hz, ReportData& data) {
+  if (band_hz.empty()) return;
+  const Eigen::VectorXd all_hz = data.frf->frequency_hz;
+  data.frf = select_band(std::move(*data.frf), band_hz[0], band_hz[1]);
+  const auto first = std::ranges::find(all_hz, data.frf->frequency_hz[0]) - all_hz.begin();
+  if (data.model_response.size() > 0)
+    data.model_response = data.model_response.middleCols(first, data.frf->lines()).eval();
+  if (data.cmif_curves.size() > 0)
+    data.cmif_curves = data.cmif_curves.middleCols(first, data.frf->lines()).eval();
+}
 
 Picture cmif_of(const PlotFlags& flags, const ReportData& data) {
   if (!flags.output_channels.empty() || !flags.input_channels.empty())
@@ -64,24 +125,26 @@ Picture cmif_of(const PlotFlags& flags, const ReportData& data) {
         "cmif: always uses all channels; --output-channel and --input-channel are for bode and "
         "entry");
   // Without modes.json and model, show the modes with which a fit would start.
-  if (!data.chosen_modes.empty() || data.model) return cmif_picture(data);
+  if (!data.chosen_modes.empty() || data.model) return cmif_picture(data, style_of(flags));
   ReportData with_modes = data;
   with_modes.chosen_modes = pick_modes(*data.frf);
-  return cmif_picture(with_modes);
+  return cmif_picture(with_modes, style_of(flags));
 }
 
 Picture entry_of(const PlotFlags& flags, const ReportData& data) {
   const Eigen::Index output =
       one_place("--output-channel", flags.output_channels, data.frf->outputs);
   return entry_picture(data, output,
-                       one_place("--input-channel", flags.input_channels, data.frf->inputs));
+                       one_place("--input-channel", flags.input_channels, data.frf->inputs),
+                       style_of(flags));
 }
 
 Picture requested_picture(const PlotFlags& flags, const ReportData& data) {
   if (flags.figure == "cmif") return cmif_of(flags, data);
   if (flags.figure == "entry") return entry_of(flags, data);
   return bode_picture(data, places("--output-channel", flags.output_channels, data.frf->outputs),
-                      places("--input-channel", flags.input_channels, data.frf->inputs));
+                      places("--input-channel", flags.input_channels, data.frf->inputs),
+                      style_of(flags));
 }
 
 void plot(const PlotFlags& flags, Console& console) {
@@ -93,7 +156,9 @@ void plot(const PlotFlags& flags, Console& console) {
   if (input.frf.empty())
     throw std::invalid_argument(fmt::format("{}: contains no frequency response; add an FRF file",
                                             flags.inputs.front().string()));
-  draw(requested_picture(flags, read_response_data(input)), flags.output);
+  ReportData data = read_response_data(input);
+  keep_band(flags.band_hz, data);
+  draw(requested_picture(flags, data), flags.output);
   console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
                              std::filesystem::file_size(flags.output)));
   console.result({{"output", flags.output.string()},
@@ -130,6 +195,19 @@ void plot_command(CLI::App& app, Console& console) {
       ->allow_extra_args(false);
   command.add_option("-o,--output", flags.output, "picture to write: .pdf, .svg or .png")
       ->required();
+  add_band(command, flags.band_hz, "all lines, or the band of the model");
+  add_choice(
+      command, "--preset", flags.preset,
+      "width: of the figure | single: a column of a journal, 88.9 mm | double: both, 181.9 mm");
+  command.add_option("--width", flags.width_mm, "width of the picture, mm")->type_name("MM");
+  command.add_option("--height", flags.height_mm, "height of the picture, mm")->type_name("MM");
+  command.add_option("--font", flags.style.font, "font, as of fontconfig")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_option("--font-size", flags.style.font_pt, "size of the font, pt")
+      ->type_name("PT")
+      ->capture_default_str();
+  add_choice(command, "--theme", flags.theme, "colour, which also differs in brightness | grey");
 }
 
 }  // namespace stageid

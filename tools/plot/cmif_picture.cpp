@@ -74,7 +74,7 @@ std::pair<std::string, int> mode_lines(const ReportData& data) {
 
 }  // namespace
 
-Picture cmif_picture(const ReportData& data) {
+Picture cmif_picture(const ReportData& data, const PictureStyle& style) {
   if (!data.frf || data.cmif_curves.size() == 0)
     throw std::invalid_argument("cmif: needs a frequency response");
   const FrfEstimate& frf = *data.frf;
@@ -84,12 +84,13 @@ Picture cmif_picture(const ReportData& data) {
   std::vector<LegendEntry> names;
   for (Eigen::Index i = 0; i < data.cmif_curves.rows(); ++i) {
     columns.emplace_back(fmt::format("curve_{}", i + 1), data.cmif_curves.row(i));
-    const char* const style = kCurves[static_cast<std::size_t>(i) % kCurves.size()];
+    const char* const curve = kCurves[static_cast<std::size_t>(i) % kCurves.size()];
     drawn += fmt::format("{}'cmif.txt' using 1:{} with lines {}", i > 0 ? ", \\\n     " : "", i + 2,
-                         style);
-    names.push_back({fmt::format("lines {}", style), fmt::format("σ@_{}^2", i + 1), 2});
+                         curve);
+    names.push_back({fmt::format("lines {}", curve), fmt::format("σ@_{}^2", i + 1), 2});
   }
-  Picture picture{3.5, 2.5, "", {{"cmif.txt", table_text(columns)}}};
+  Picture picture = sized_picture(style, kColumn_in, 2.5);
+  picture.tables = {{"cmif.txt", table_text(columns)}};
   const auto [lines, modes] = mode_lines(data);
   const auto [ring_hz, ring_value] = rings(data);
   std::vector<LegendEntry> marks;
@@ -103,9 +104,12 @@ Picture cmif_picture(const ReportData& data) {
     marks.push_back(
         {fmt::format("points {}", kRing), fmt::format("candidates ({})", ring_hz.size()), 15});
   }
-  picture.script = single_panel(picture, frf.frequency_hz, magnitude_range(data.cmif_curves),
-                                "CMIF of ω²G" + unit_of(frf),
-                                fmt::format("{}plot {}\n", lines, drawn), {names, marks});
+  picture.script = panel_column(picture, frf.frequency_hz,
+                                {magnitude_range(data.cmif_curves),
+                                 "CMIF of ω²G" + unit_of(frf),
+                                 fmt::format("{}plot {}\n", lines, drawn),
+                                 "",
+                                 {names, marks}});
   return picture;
 }
 

@@ -68,12 +68,29 @@ class PrivateDirectory {
 /// Names of files are our own and relative: external texts are in the script only through quoted().
 std::string preamble(const Picture& picture, const Format& format) {
   return fmt::format(
-      "set encoding utf8\nset terminal {} enhanced size {}{},{}{} font 'Helvetica,8' "
+      "set encoding utf8\nset terminal {} enhanced size {}{},{}{} font '{},{:.4g}' "
       "fontscale {:.6g} linewidth {:.6g} dashlength {:.6g}\npoint = {:.6g}\n"
       "set output 'picture'\n",
       format.terminal, picture.width_in * format.per_inch, format.unit,
-      picture.height_in * format.per_inch, format.unit, format.point * format.font, format.line,
-      2.0 * format.point, format.point);
+      picture.height_in * format.per_inch, format.unit, picture.style.font, picture.style.font_pt,
+      format.point * format.font, format.line, 2.0 * format.point, format.point);
+}
+
+/// With grey of the same brightness (ITU-R BT.601) for every colour. Texts of others contain no '#rrggbb' in quotes of
+/// its own: their quotes are doubled.
+std::string greyed(const std::string& script) {
+  static constexpr std::string_view kColour = "rgb '#";
+  std::string out = script;
+  for (std::size_t at = out.find(kColour); at != std::string::npos;
+       at = out.find(kColour, at + 1)) {
+    const std::size_t digits = at + kColour.size();
+    const auto part = [&](std::size_t i) {
+      return static_cast<double>(std::stoi(out.substr(digits + 2 * i, 2), nullptr, 16));
+    };
+    const auto grey = static_cast<int>(0.299 * part(0) + 0.587 * part(1) + 0.114 * part(2) + 0.5);
+    out.replace(digits, 6, fmt::format("{0:02x}{0:02x}{0:02x}", grey));
+  }
+  return out;
 }
 
 /// The first line that is neither empty nor a position in the script.
@@ -122,7 +139,9 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
   for (const Picture::Table& table : picture.tables)
     write_text_file(directory.path() / table.name, table.text);
   write_text_file(directory.path() / "script.gp",
-                  preamble(picture, format) + picture.script + "unset output\n");
+                  preamble(picture, format) +
+                      (picture.style.grey ? greyed(picture.script) : picture.script) +
+                      "unset output\n");
   const ExternalEnd end =
       run_external({"TZ=UTC", "gnuplot", "-d", "script.gp"}, directory.path(), "gnuplot-nox");
   throw_if_interrupted();

@@ -7,6 +7,15 @@
 
 namespace stageid {
 
+/// What a user chooses of a figure; sizes 0: those of the figure.
+struct PictureStyle {
+  double width_in = 0.0;
+  double height_in = 0.0;
+  std::string font = "Helvetica";
+  double font_pt = 8.0;
+  bool grey = false;  ///< colours become grey of the same brightness
+};
+
 /// A static figure for gnuplot: commands and tables, independent of the file format.
 struct Picture {
   /// Rows of numbers, separated by blanks; the numbers read back exactly.
@@ -18,7 +27,16 @@ struct Picture {
   double height_in = 0.0;
   std::string script;
   std::vector<Table> tables;
+  PictureStyle style = {};
+
+  /// Space for texts, relative to that of the default font.
+  double text_scale() const noexcept { return style.font_pt / PictureStyle{}.font_pt; }
+  /// "font ',SIZE'": a part of the size of the figure's font.
+  std::string font(double part) const;
 };
+
+/// An empty picture of the size of the style, else of the given one; a wider one is higher too, up to 1.6 times.
+Picture sized_picture(const PictureStyle& style, double width_in, double height_in);
 
 /// Columns of equal length, below a comment with their names.
 /// @throws std::invalid_argument if lengths differ.
@@ -29,7 +47,7 @@ std::string table_text(const std::vector<std::pair<std::string, Eigen::VectorXd>
 std::string quoted(const std::string& text);
 
 /// "set xrange ...", "set xtics ..." of a logarithmic frequency axis `width_in` wide, with as many plain numbers as
-/// are legible. No labels unless `labelled`.
+/// are legible, and small ticks between them. No labels unless `labelled`.
 std::string frequency_axis(double low_hz, double high_hz, double width_in, bool labelled = true);
 
 /// The same for logarithmic magnitudes, powers of ten, over whole decades that contain low to high.
@@ -62,13 +80,17 @@ struct LegendEntry {
 std::string legend_row(const Picture& picture, double y_in,
                        const std::vector<LegendEntry>& entries);
 
-/// The script of a picture with one panel of magnitudes over frequency.
-/// @param title of the vertical axis, external text
-/// @param drawn commands from the first one for this panel to "plot ..." and its line end
-/// @param legends rows of the legend; empty ones are left out
-std::string single_panel(const Picture& picture, const Eigen::VectorXd& frequency_hz,
-                         std::pair<double, double> magnitudes, const std::string& title,
-                         const std::string& drawn,
-                         const std::vector<std::vector<LegendEntry>>& legends);
+/// What a picture with one column of panels shows over frequency.
+struct PanelContent {
+  std::pair<double, double> magnitudes;
+  std::string title;  ///< of the vertical axis, external text
+  std::string drawn;  ///< commands from the first one for this panel to "plot ..." and its line end
+  std::string phase = {};  ///< the same for a panel of phases below; empty: none
+  std::vector<std::vector<LegendEntry>> legends = {};  ///< rows; empty ones are left out
+};
+
+/// Magnitudes over frequency, and phases from -180 to 180 degrees below.
+std::string panel_column(const Picture& picture, const Eigen::VectorXd& frequency_hz,
+                         const PanelContent& content);
 
 }  // namespace stageid

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "tools/report/report_uncertainty.hpp"
@@ -17,8 +18,6 @@ constexpr const char* kModelColour = "lc rgb '#0b3c7d'";
 constexpr const char* kResidualColour = "lc rgb '#8c8c8c' pt 7";
 constexpr const char* kDeviationLine = "lines lc rgb '#202020' lw 0.8";
 
-constexpr double kColumn_in = 3.5;
-constexpr double kPage_in = 7.16;
 constexpr Eigen::Index kMostRowsOrColumns = 40;
 
 const FrfEstimate& response_of(const ReportData& data, const char* figure) {
@@ -70,6 +69,23 @@ ElementTable element_table(const ReportData& data, Eigen::Index channel, bool wi
   return table;
 }
 
+/// Phases in degrees; the curve ends and begins anew where it passes 180.
+Eigen::VectorXd phases_of(const Eigen::MatrixXcd& response, Eigen::Index channel) {
+  Eigen::VectorXd degrees = response.row(channel).cwiseArg() * (180.0 / std::numbers::pi);
+  for (Eigen::Index k = degrees.size() - 1; k > 0; --k)
+    if (std::abs(degrees[k] - degrees[k - 1]) > 180.0) degrees[k] = std::nan("");
+  return degrees;
+}
+
+ElementTable phase_table(const ReportData& data, Eigen::Index channel) {
+  ElementTable table;
+  table.add("frequency_hz", data.frf->frequency_hz);
+  table.add("measured_deg", phases_of(data.frf->response, channel));
+  if (data.model_response.size() > 0)
+    table.model = table.add("model_deg", phases_of(data.model_response, channel));
+  return table;
+}
+
 std::pair<double, double> range_of(const ElementTable& table) {
   Eigen::MatrixXd values(table.columns[0].second.size(),
                          static_cast<Eigen::Index>(table.columns.size()) - 1);
@@ -84,13 +100,18 @@ struct Grid {
   double width_in = 0.0, height_in = 0.0;
 
   Grid(std::size_t rows, std::size_t columns, Picture& picture) {
+    for (double* margin_in : {&left_in, &right_in, &bottom_in, &top_in})
+      *margin_in *= picture.text_scale();
     const auto across = static_cast<double>(columns);
-    const double room_in = kPage_in - left_in - right_in - gap_in * (across - 1.0);
-    width_in = std::max(0.35, room_in / across);
+    const auto down = static_cast<double>(rows);
+    const double page_in = picture.style.width_in > 0.0 ? picture.style.width_in : kPage_in;
+    width_in = std::max(0.35, (page_in - left_in - right_in - gap_in * (across - 1.0)) / across);
     height_in = std::clamp(0.65 * width_in, 0.9, 1.7);
+    if (picture.style.height_in > 0.0)
+      height_in = std::max(
+          0.35, (picture.style.height_in - bottom_in - top_in - gap_in * (down - 1.0)) / down);
     picture.width_in = left_in + right_in + across * width_in + gap_in * (across - 1.0);
-    picture.height_in =
-        bottom_in + top_in + static_cast<double>(rows) * (height_in + gap_in) - gap_in;
+    picture.height_in = bottom_in + top_in + down * (height_in + gap_in) - gap_in;
   }
   double x_in(std::size_t column) const {
     return left_in + static_cast<double>(column) * (width_in + gap_in);
@@ -107,21 +128,23 @@ std::string around_the_panels(const FrfEstimate& frf, const Grid& grid, const Pi
                               const std::vector<Eigen::Index>& outputs,
                               const std::vector<Eigen::Index>& inputs) {
   std::string script;
-  const auto label = [&](const std::string& text, double x_in, double y_in, const char* how) {
+  const auto label = [&](const std::string& text, double x_in, double y_in,
+                         const std::string& how) {
     script += fmt::format("set label {} at screen {},{} center noenhanced {}\n", text,
                           x_in / picture.width_in, y_in / picture.height_in, how);
   };
   const double middle_x_in = 0.5 * (grid.left_in + picture.width_in - grid.right_in);
   const double middle_y_in = 0.5 * (grid.bottom_in + picture.height_in - grid.top_in);
   const std::string unit = common_unit(frf, outputs, inputs);
+  const double scale = picture.text_scale();
   for (std::size_t j = 0; j < inputs.size(); ++j)
     label(quoted(frf.inputs.name(inputs[j])), grid.x_in(j) + 0.5 * grid.width_in,
-          picture.height_in - grid.top_in + 0.09, "font ',7'");
+          picture.height_in - grid.top_in + 0.09 * scale, picture.font(7.0 / 8.0));
   for (std::size_t i = 0; i < outputs.size(); ++i)
-    label(quoted(frf.outputs.name(outputs[i])), 0.3, grid.y_in(i, picture) + 0.5 * grid.height_in,
-          "rotate by 90 font ',7'");
-  label("'Frequency [Hz]'", middle_x_in, 0.1, "");
-  label(quoted(unit.empty() ? "Magnitude" : "Magnitude [" + unit + "]"), 0.1, middle_y_in,
+    label(quoted(frf.outputs.name(outputs[i])), 0.3 * scale,
+          grid.y_in(i, picture) + 0.5 * grid.height_in, "rotate by 90 " + picture.font(7.0 / 8.0));
+  label("'Frequency [Hz]'", middle_x_in, 0.1 * scale, "");
+  label(quoted(unit.empty() ? "Magnitude" : "Magnitude [" + unit + "]"), 0.1 * scale, middle_y_in,
         "rotate by 90");
   return script;
 }
@@ -133,9 +156,10 @@ std::string bode_panel(const Picture& picture, const Grid& grid, std::size_t row
   const double x_in = grid.x_in(column);
   const double y_in = grid.y_in(row, picture);
   return panel_edges(picture, x_in, x_in + grid.width_in, y_in, y_in + grid.height_in) +
-         frequency_axis(frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], grid.width_in,
-                        lowest) +
-         magnitude_axis(magnitudes.first, magnitudes.second, grid.height_in, column == 0);
+         frequency_axis(frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1],
+                        grid.width_in / picture.text_scale(), lowest) +
+         magnitude_axis(magnitudes.first, magnitudes.second, grid.height_in / picture.text_scale(),
+                        column == 0);
 }
 
 void check_count(std::size_t count, const char* kind, const char* flag) {
@@ -185,11 +209,12 @@ Curves curves_of(const ElementTable& table, const std::string& file, const char*
 }  // namespace
 
 Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& outputs,
-                     const std::vector<Eigen::Index>& inputs) {
+                     const std::vector<Eigen::Index>& inputs, const PictureStyle& style) {
   const FrfEstimate& frf = response_of(data, "bode");
   check_count(outputs.size(), "outputs", "--output-channel");
   check_count(inputs.size(), "inputs", "--input-channel");
   Picture picture;
+  picture.style = style;
   const Grid grid(outputs.size(), inputs.size(), picture);
   std::vector<ElementTable> tables;
   std::pair<double, double> magnitudes = {INFINITY, 0.0};
@@ -200,9 +225,8 @@ Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& ou
       magnitudes = {std::min(magnitudes.first, low), std::max(magnitudes.second, high)};
     }
   picture.script = kFrame +
-                   std::string(
-                       "set xtics font ',6' offset 0,0.4\n"
-                       "set ytics font ',6' offset 0.4,0\n") +
+                   fmt::format("set xtics {0} offset 0,0.4\nset ytics {0} offset 0.4,0\n",
+                               picture.font(6.0 / 8.0)) +
                    around_the_panels(frf, grid, picture, outputs, inputs);
   std::vector<LegendEntry> legend;
   for (std::size_t i = 0; i < outputs.size(); ++i)
@@ -216,20 +240,29 @@ Picture bode_picture(const ReportData& data, const std::vector<Eigen::Index>& ou
       if (i + j == 0) picture.script += "unset label\n";  // drawn once for all panels
       legend = curves.legend;
     }
-  picture.script += legend_row(picture, 0.12, legend) + "unset multiplot\n";
+  picture.script += legend_row(picture, 0.12 * picture.text_scale(), legend) + "unset multiplot\n";
   return picture;
 }
 
-Picture entry_picture(const ReportData& data, Eigen::Index output, Eigen::Index input) {
+Picture entry_picture(const ReportData& data, Eigen::Index output, Eigen::Index input,
+                      const PictureStyle& style) {
   const FrfEstimate& frf = response_of(data, "entry");
-  const ElementTable table = element_table(data, output + frf.n_outputs() * input, true);
-  Picture picture{kColumn_in, 2.6, "", {{"entry.txt", table_text(table.columns)}}};
+  const Eigen::Index channel = output + frf.n_outputs() * input;
+  const ElementTable table = element_table(data, channel, true);
+  const ElementTable phases = phase_table(data, channel);
+  Picture picture = sized_picture(style, kColumn_in, 3.3);
+  picture.tables = {{"entry.txt", table_text(table.columns)},
+                    {"phase.txt", table_text(phases.columns)}};
   const Curves curves = curves_of(table, "entry.txt", report::uncertainty(frf).kind, 0.9);
   const std::string title =
       fmt::format("{} ← {}  [{}/{}]", frf.outputs.name(output), frf.inputs.name(input),
                   unit_of(frf.outputs, output), unit_of(frf.inputs, input));
-  picture.script = single_panel(picture, frf.frequency_hz, range_of(table), title, curves.drawn,
-                                {curves.legend, curves.errors_legend});
+  picture.script = panel_column(picture, frf.frequency_hz,
+                                {range_of(table),
+                                 title,
+                                 curves.drawn,
+                                 curves_of(phases, "phase.txt", "", 0.9).drawn,
+                                 {curves.legend, curves.errors_legend}});
   return picture;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <map>
+#include <numbers>
 #include <sstream>
 
 #include "acquisition/files/file_error.hpp"
@@ -66,6 +67,47 @@ class Plot : public ProgramTest {
     return read_response_data(input);
   }
 };
+
+TEST_F(Plot, StyleAndBandAreThoseThatAreAskedFor) {
+  make_model();
+  const auto width = [&](std::vector<std::string> more) {
+    std::vector<std::string> command = {"plot", "cmif", "frf.h5", "-o", "styled.png"};
+    command.insert(command.end(), more.begin(), more.end());
+    succeed(command);
+    return png_width(read_bytes(at("styled.png")));
+  };
+  EXPECT_NEAR(width({"--preset", "single"}), 3.5 * 300, 2);
+  EXPECT_NEAR(width({"--preset", "double"}), 7.16 * 300, 2);
+  EXPECT_NEAR(width({"--width", "127", "--height", "50", "--font", "Times", "--font-size", "10"}),
+              5.0 * 300, 2);
+  succeed({"plot", "bode", "frf.h5", "-o", "grey.svg", "--theme", "grey", "--band", "100", "400"});
+  const std::string svg = read_bytes(at("grey.svg"));
+  EXPECT_EQ(svg.find("rgb(240, 160,  48)"), std::string::npos);  // of the measurement
+  EXPECT_NE(svg.find("rgb(171, 171, 171)"), std::string::npos);  // 0.299, 0.587 and 0.114 of it
+  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--width", "5"}, 2, "expected 30 to 1000");
+  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font-size", "1"}, 2, "expected 4 to 40");
+  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font", "a'b"}, 2, "name of a font");
+  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--preset", "triple"}, 2, "triple");
+}
+
+TEST_F(Plot, TheEntryHasThePhaseOfTheData) {
+  make_frf();
+  const ReportData data = read(false);
+  const Picture picture = entry_picture(data, 1, 2);
+  const auto phase = table_of(picture, "phase.txt").at("measured_deg");
+  const Eigen::Index channel = 1 + data.frf->n_outputs() * 2;
+  int missing = 0;
+  for (std::size_t k = 0; k < phase.size(); ++k) {
+    const double degrees = std::arg(data.frf->response(channel, static_cast<Eigen::Index>(k))) *
+                           180.0 / std::numbers::pi;
+    if (std::isnan(phase[k]))
+      ++missing;
+    else
+      EXPECT_NEAR(phase[k], degrees, 1e-9);
+  }
+  EXPECT_LT(missing, 10) << "where it passes 180 degrees";
+  EXPECT_THAT(picture.script, HasSubstr("Phase [°]"));
+}
 
 TEST_F(Plot, ASmallExperimentIsDrawnInAllFormatsAndTwiceTheSame) {
   make_model();
@@ -250,6 +292,8 @@ TEST(Pictures, NumbersSurviveTheTable) {
 
 TEST(Pictures, AxesHoldTheDataAndLabelsThatFit) {
   EXPECT_THAT(frequency_axis(16.0, 800.0, 3.0), HasSubstr("('20' 20, '50' 50, '100' 100"));
+  EXPECT_THAT(frequency_axis(16.0, 800.0, 3.0), HasSubstr("'' 30 1, '' 40 1"));
+  EXPECT_THAT(magnitude_axis(3e-9, 2e-4, 2.0), HasSubstr("'10^{−9}' 1e-9"));
   EXPECT_THAT(frequency_axis(0.25, 2000.0, 0.5), HasSubstr("set xtics ('1' 1, '1000' 1000,"));
   EXPECT_THAT(magnitude_axis(3e-9, 2e-4, 2.0), HasSubstr("set yrange [1e-9:1e-3]"));
   EXPECT_THAT(magnitude_axis(3e-9, 2e-4, 0.9, false), HasSubstr("('' 1e-9, '' 1e-7"));
