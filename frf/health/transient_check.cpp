@@ -268,8 +268,10 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
                   names_of(frequencies), counted(evidence.transient_periods, "period")),
       figure,
       needed <= evidence.transient_periods + evidence.periods - 2
-          ? fmt::format("--transient-periods {}, or --method lpm", needed)
-          : fmt::format("measure again with transient_periods: {}, or use --method lpm", needed)};
+          ? fmt::format("--transient-periods {}, or --method lpm; then fit again", needed)
+          : fmt::format(
+                "measure again with transient_periods: {}, or use --method lpm and fit again",
+                needed)};
   if (!linear) {
     finding.cause = Cause::limit_cycle;
     finding.what = fmt::format(
