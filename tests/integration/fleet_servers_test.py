@@ -28,7 +28,7 @@ class PostgresFleetTest(fleet_test.FleetTest):
 
     @classmethod
     def setUpClass(cls):
-        cls.server = Postgres(cls.work.parent / "postgres")
+        cls.server = Postgres()
         cls.addClassCleanup(cls.server.stop)
         cls.store = cls.server.url("fleet")
         cls.fleet = fleet_test.FLEET + f"store: '{cls.store}'\n"
@@ -74,7 +74,7 @@ class SlurmFleetTest(unittest.TestCase):
     def setUp(self):
         self.base = fleet_test.FleetTest
         self.work = self.base.work.parent / "slurm_work"
-        self.server = Postgres(self.work.parent / "slurm_postgres")
+        self.server = Postgres()
         self.addCleanup(self.server.stop)
         self.server.execute("CREATE SCHEMA fleet")
         self.store = self.server.url("fleet")

@@ -7,6 +7,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 import time
 
 
@@ -16,6 +17,11 @@ def wait_for(true, seconds, what):
         if time.monotonic() > end:
             raise RuntimeError(f"{what} does not happen within {seconds} s")
         time.sleep(0.05)
+
+
+def socket_folder():
+    """For sockets, whose paths have at most 107 characters."""
+    return pathlib.Path(tempfile.mkdtemp(prefix="stageid-"))
 
 
 def free_ports(count):
@@ -29,23 +35,21 @@ def free_ports(count):
 
 
 class Postgres:
-    """Reached by a socket in its folder. Its programs refuse to run as root, so root runs them as their own user."""
+    """Reached by a socket. Its programs refuse to run as root, so root runs them as their own user."""
 
     @staticmethod
     def programs():
         found = sorted(pathlib.Path("/usr/lib/postgresql").glob("*/bin/initdb"))
         return found[-1].parent if found else None
 
-    def __init__(self, folder):
-        self.folder = folder
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(mode=0o755, parents=True)
+    def __init__(self):
+        self.folder = socket_folder()  # not in that of the test, which others may be unable to reach
         self.user = "postgres" if os.getuid() == 0 else pwd.getpwuid(os.getuid()).pw_name
         if os.getuid() == 0:
-            shutil.chown(folder, self.user)
-        self.call("initdb", "-D", folder / "data", "-U", self.user, "-A", "trust", "--no-sync")
+            shutil.chown(self.folder, self.user)
+        self.call("initdb", "-D", self.folder / "data", "-U", self.user, "-A", "trust", "--no-sync")
         self.start()
-        self.call("createdb", "-h", folder, "-U", self.user, "fleet")
+        self.call("createdb", "-h", self.folder, "-U", self.user, "fleet")
 
     def call(self, name, *words):
         as_user = ["runuser", "-u", self.user, "--"] if os.getuid() == 0 else []
@@ -78,6 +82,7 @@ class Postgres:
 
     def stop(self):
         self.call("pg_ctl", "-D", self.folder / "data", "-m", "immediate", "stop")
+        shutil.rmtree(self.folder)
 
 
 class Slurm:
@@ -93,6 +98,7 @@ class Slurm:
         shutil.rmtree(folder, ignore_errors=True)
         for name in ("state", "spool"):
             (folder / name).mkdir(parents=True)
+        self.sockets = socket_folder()
         key = folder / "key"
         key.write_bytes(secrets.token_bytes(1024))
         key.chmod(0o400)
@@ -105,7 +111,7 @@ SlurmctldHost={self.host}(127.0.0.1)
 SlurmUser={user}
 SlurmdUser={user}
 AuthType=auth/munge
-AuthInfo=socket={folder}/munge.socket
+AuthInfo=socket={self.sockets}/munge.socket
 CredType=cred/munge
 SlurmctldPort={control}
 SlurmdPort={node}
@@ -133,9 +139,9 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         self.environment = {**os.environ, "SLURM_CONF": str(self.settings),
                             "PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
         self.processes = {}
-        self.daemon("munged", "--foreground", "--force", f"--key-file={key}", f"--socket={folder}/munge.socket",
+        self.daemon("munged", "--foreground", "--force", f"--key-file={key}", f"--socket={self.sockets}/munge.socket",
                     f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/seed")
-        wait_for((folder / "munge.socket").exists, 30, "the start of munged")
+        wait_for((self.sockets / "munge.socket").exists, 30, "the start of munged")
         self.daemon("slurmctld", "-D", "-f", self.settings)
         self.daemon("slurmd", "-D", "-f", self.settings, "-N", "node")
         wait_for(lambda: "idle" in self.call("sinfo", "-h", "-o", "%T", check=False), 60, "a node that is ready")
@@ -167,3 +173,4 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         for name in ("slurmd", "slurmctld", "munged"):
             self.processes[name].kill()
             self.processes[name].wait()
+        shutil.rmtree(self.sockets)
