@@ -22,13 +22,21 @@ from servers import Postgres, Slurm, wait_for
 JOBS = 12
 
 
+def started(server):
+    """A server, or a skipped test: containers may forbid its daemons. What it says then is printed."""
+    try:
+        return server()
+    except (RuntimeError, subprocess.CalledProcessError) as error:
+        raise unittest.SkipTest(f"{server} does not start here: {error} {getattr(error, 'stderr', '')}") from error
+
+
 class PostgresFleetTest(fleet_test.FleetTest):
     """The same tests as with a file."""
     server = tools_tests = None
 
     @classmethod
     def setUpClass(cls):
-        cls.server = Postgres()
+        cls.server = started(Postgres)
         cls.addClassCleanup(cls.server.stop)
         cls.store = cls.server.url("fleet")
         cls.fleet = fleet_test.FLEET + f"store: '{cls.store}'\n"
@@ -74,11 +82,11 @@ class SlurmFleetTest(unittest.TestCase):
     def setUp(self):
         self.base = fleet_test.FleetTest
         self.work = self.base.work.parent / "slurm_work"
-        self.server = Postgres()
+        self.server = started(Postgres)
         self.addCleanup(self.server.stop)
         self.server.execute("CREATE SCHEMA fleet")
         self.store = self.server.url("fleet")
-        self.slurm = Slurm(self.work.parent / "slurm")
+        self.slurm = started(lambda: Slurm(self.work.parent / "slurm"))
         self.addCleanup(self.slurm.stop)
 
     def call(self, *words, wanted=0):

@@ -139,8 +139,15 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         self.environment = {**os.environ, "SLURM_CONF": str(self.settings),
                             "PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
         self.processes = {}
+        try:
+            self.start(key)
+        except RuntimeError:
+            self.stop()
+            raise
+
+    def start(self, key):
         self.daemon("munged", "--foreground", "--force", f"--key-file={key}", f"--socket={self.sockets}/munge.socket",
-                    f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/seed")
+                    f"--pid-file={self.folder}/munged.pid", f"--seed-file={self.folder}/seed")
         wait_for((self.sockets / "munge.socket").exists, 30, "the start of munged")
         self.daemon("slurmctld", "-D", "-f", self.settings)
         self.daemon("slurmd", "-D", "-f", self.settings, "-N", "node")
@@ -170,7 +177,7 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         wait_for(lambda: not self.call("squeue", "-h", "-j", job, check=False).strip(), seconds, f"the end of job {job}")
 
     def stop(self):
-        for name in ("slurmd", "slurmctld", "munged"):
-            self.processes[name].kill()
-            self.processes[name].wait()
+        for process in reversed(self.processes.values()):
+            process.kill()
+            process.wait()
         shutil.rmtree(self.sockets)
