@@ -113,7 +113,7 @@ void run_job(const FleetJobFlags& flags, Console& console) {
   const std::string fingerprint = log_fingerprint(store, log.file);
   const std::string job = job_id(fingerprint, config);
   bool added = false;
-  if (!store.is_done(job)) {
+  if (!is_done(store.state_of(job))) {
     const Identification identification = identify_log(config, log, fingerprint, console);
     added = store.add(identification);
     if (identification.verdict == IdentificationVerdict::not_trustworthy)

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <regex>
 
+#include "acquisition/files/file_error.hpp"
+
 namespace stageid {
 
 std::string Statement::text(int column) const {
@@ -21,6 +23,12 @@ SqlValue Statement::sql_value(double value) {
 
 SqlValue Statement::sql_value(const std::vector<std::complex<float>>& value) {
   return value.empty() ? SqlValue() : SqlValue(std::as_bytes(std::span(value)));
+}
+
+void fail_busy(const std::string& name) {
+  throw FileError(fmt::format(
+      "{}: another process has been writing for {} s; run the command again when it has ended",
+      name, kPatience_s));
 }
 
 bool is_database_url(const std::filesystem::path& place) {

@@ -20,6 +20,11 @@ using SqlValue = std::variant<std::monostate, std::int64_t, double, std::string_
 
 enum class SqlKind : unsigned char { null, integer, real, text, bytes };
 
+/// How long a writer waits for another one.
+inline constexpr int kPatience_s = 60;
+/// @throws FileError: that was too short
+[[noreturn]] void fail_busy(const std::string& name);
+
 /// A prepared statement of one kind of database.
 class StatementEngine {
  public:

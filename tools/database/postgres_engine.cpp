@@ -16,7 +16,7 @@ namespace stageid {
 namespace {
 
 constexpr const char* kSettings =
-    "SET lock_timeout = '60s'; SET extra_float_digits = 1; SET bytea_output = 'hex'; "
+    "SET extra_float_digits = 1; SET bytea_output = 'hex'; "
     "SET client_encoding = 'UTF8'; SET tcp_keepalives_idle = 30; SET tcp_keepalives_interval = 10; "
     "SET tcp_keepalives_count = 3";
 /// What a URL may set otherwise. A peer that vanishes without a word is noticed after a minute, and its claims end.
@@ -62,10 +62,7 @@ struct Connection {
     std::string message = primary != nullptr ? primary : ::PQerrorMessage(handle.get());
     message = message.substr(0, message.find('\n'));
     const std::string kind = state.substr(0, 2);
-    if (state == "55P03")
-      throw FileError(fmt::format(
-          "{}: another process has been writing for 60 s; run the command again when it has ended",
-          name));
+    if (state == "55P03") fail_busy(name);
     if (::PQstatus(handle.get()) == CONNECTION_BAD)
       throw FileError(
           fmt::format("{}: no connection to the database: {}; check the address and "
@@ -272,7 +269,7 @@ class PostgresEngine final : public DatabaseEngine {
     ::PQsetNoticeProcessor(
         handle(), [](void*, const char*) {}, nullptr);
     if (::PQstatus(handle()) != CONNECTION_OK) connection_.fail(nullptr);
-    execute(kSettings);
+    execute(fmt::format("SET lock_timeout = '{}s'; {}", kPatience_s, kSettings));
     if (connection_.reads_only) execute("SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY");
   }
 

@@ -17,12 +17,10 @@
 namespace stageid {
 namespace {
 
-constexpr int kPatience_ms = 60000;
-
 /// SQLite does not wait where two processes make one new file a WAL file: it refuses one of them at once.
 int enter_wal_mode(sqlite3* database) {
   using Clock = std::chrono::steady_clock;
-  const Clock::time_point end = Clock::now() + std::chrono::milliseconds(kPatience_ms);
+  const Clock::time_point end = Clock::now() + std::chrono::seconds(kPatience_s);
   while (true) {
     const int code =
         ::sqlite3_exec(database, "PRAGMA journal_mode = WAL", nullptr, nullptr, nullptr);
@@ -37,9 +35,7 @@ int enter_wal_mode(sqlite3* database) {
     case SQLITE_FULL:
       throw FileError(fmt::format("{}: {}", name, system_reason(ENOSPC)));
     case SQLITE_BUSY:
-      throw FileError(fmt::format(
-          "{}: another process has been writing for {} s; run the command again when it has ended",
-          name, kPatience_ms / 1000));
+      fail_busy(name);
     case SQLITE_NOTADB:
       throw FormatError(file, "", "is not a store of 'stageid fleet'; choose another one");
     case SQLITE_CORRUPT:
@@ -153,7 +149,7 @@ class SqliteEngine final : public DatabaseEngine {
     handle_.reset(handle);
     check(opened);
     ::sqlite3_extended_result_codes(handle, 1);
-    ::sqlite3_busy_timeout(handle, kPatience_ms);
+    ::sqlite3_busy_timeout(handle, 1000 * kPatience_s);
     execute("PRAGMA cache_size = -65536; PRAGMA trusted_schema = OFF");
     if (access == DatabaseAccess::read) {
       execute("PRAGMA query_only = ON");

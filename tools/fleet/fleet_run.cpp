@@ -91,7 +91,7 @@ class FleetRun {
     const auto found = stored.find(job.id);
     const JobState state = found == stored.end() ? JobState::none : found->second;
     if (state == JobState::failed) failed_before_[job.id] = store_.failure(job.id);
-    if (state == JobState::none || state == JobState::failed) {
+    if (!is_done(state)) {
       jobs_.push_back(std::move(job));
       return;
     }
@@ -111,7 +111,7 @@ class FleetRun {
       }
       // Other processes may have run it since find_jobs().
       const JobState state = store_.state_of(job.id);
-      const bool done = state == JobState::current || state == JobState::superseded;
+      const bool done = is_done(state);
       const bool failed = state == JobState::failed && !is_failure_before(job.id);
       if (done || failed) {
         ++(done ? summary_.done_before : summary_.failed);

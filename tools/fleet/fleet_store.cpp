@@ -120,11 +120,6 @@ void FleetStore::make_current(const std::string& job) {
   transaction.commit();
 }
 
-bool FleetStore::is_done(const std::string& job) {
-  const JobState state = state_of(job);
-  return state == JobState::superseded || state == JobState::current;
-}
-
 std::optional<std::int64_t> FleetStore::failure(const std::string& job) const {
   return database_.prepare("SELECT id FROM identification WHERE job = ? AND verdict = 'failed'")
       .first(job);
@@ -132,7 +127,7 @@ std::optional<std::int64_t> FleetStore::failure(const std::string& job) const {
 
 bool FleetStore::add(const Identification& result) {
   Transaction transaction(database_);
-  if (is_done(result.job)) return false;
+  if (is_done(state_of(result.job))) return false;
   const bool failed = result.verdict == IdentificationVerdict::failed;
   const std::string outputs = fmt::format("{}", fmt::join(result.outputs, ","));
   const std::string inputs = fmt::format("{}", fmt::join(result.inputs, ","));

@@ -55,6 +55,9 @@ struct Identification {
 
 /// What a store knows of a job; superseded: another result of its log is shown.
 enum class JobState : std::uint8_t { none, failed, superseded, current };
+inline bool is_done(JobState state) {
+  return state == JobState::superseded || state == JobState::current;
+}
 
 /// The database of a fleet, docs/formats.md. Each function that writes is one transaction.
 class FleetStore {
@@ -68,7 +71,6 @@ class FleetStore {
   const Database& database() const noexcept { return database_; }
   std::map<std::string, JobState> jobs() const;
   JobState state_of(const std::string& job);
-  bool is_done(const std::string& job);  ///< superseded or current
   /// The number of a failed result, which mostly differs from that of the failure before it.
   std::optional<std::int64_t> failure(const std::string& job) const;
   /// Does nothing if the job is done; replaces a failed one of the same job or log. @returns whether it was added

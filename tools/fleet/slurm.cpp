@@ -8,18 +8,9 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "tools/terminal/external_program.hpp"
+#include "tools/terminal/shell_word.hpp"
 
 namespace stageid {
-namespace {
-
-/// A word of a shell command.
-std::string shell_word(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
-
-}  // namespace
 
 std::string submit_fleet(const FleetConfig& config, int tasks, int workers) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();

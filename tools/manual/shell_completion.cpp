@@ -8,21 +8,16 @@
 #include <iterator>
 #include <vector>
 
+#include "tools/terminal/shell_word.hpp"
+
 namespace stageid {
 namespace {
-
-/// In single quotes.
-std::string quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
 
 /// name:description for _describe of zsh, shortened to the first clause.
 std::string described(const std::string& name, const std::string& help) {
   std::string entry;
   for (const char c : name) entry += c == ':' ? std::string("\\:") : std::string(1, c);
-  return quoted(entry + ":" + help.substr(0, help.find(';')));
+  return shell_word(entry + ":" + help.substr(0, help.find(';')));
 }
 
 /// The options accepted after a command: its own, and the program's --json and --verbosity, which are accepted before
@@ -54,18 +49,18 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
       for (const std::string& flag : option.flags)
         if (!option.words.empty())
           cases.values +=
-              fmt::format("    {}{}) {} ;;\n", path, quoted(" " + flag),
+              fmt::format("    {}{}) {} ;;\n", path, shell_word(" " + flag),
                           fmt::format(fmt::runtime(assign_values), fmt::join(option.words, " ")));
   };
   // `path`: the words that lead to the command: "", "log", "log info".
   const auto visit = [&](const auto& self, const std::string& path,
                          const CommandTree& command) -> void {
-    cases.words += fmt::format("    {}) {} ;;\n", quoted(path), assign_words(command));
-    if (!path.empty()) add_values(quoted(path), command);
+    cases.words += fmt::format("    {}) {} ;;\n", shell_word(path), assign_words(command));
+    if (!path.empty()) add_values(shell_word(path), command);
     const std::string prefix = path.empty() ? "" : path + " ";
     for (const CommandTree& sub : command.commands)
-      cases.paths += fmt::format("      {}) {}={} ;;\n", quoted(path + " " + sub.name),
-                                 path_variable, quoted(prefix + sub.name));
+      cases.paths += fmt::format("      {}) {}={} ;;\n", shell_word(path + " " + sub.name),
+                                 path_variable, shell_word(prefix + sub.name));
     for (const CommandTree& sub : command.commands) self(self, prefix + sub.name, sub);
   };
   visit(visit, "", program);
@@ -111,7 +106,7 @@ std::string zsh_completion(const CommandTree& program) {
     std::vector<std::string> next;
     for (const CommandTree& sub : command.commands) next.push_back(described(sub.name, sub.help));
     for (const CommandOption& argument : command.arguments)
-      for (const std::string& word : argument.words) next.push_back(quoted(word));
+      for (const std::string& word : argument.words) next.push_back(shell_word(word));
     return fmt::format("next=({})\n      flags=({})", fmt::join(next, " "), fmt::join(flags, " "));
   };
   const Cases cases = cases_of(program, "place", assign_words, "values=({})");

@@ -12,6 +12,7 @@
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "estimation/request/fit_request.hpp"
+#include "tools/terminal/shell_word.hpp"
 
 namespace stageid {
 namespace {
@@ -27,9 +28,7 @@ std::string in_shell(const std::string& word) {
            std::string_view("_./,:=+-@%").find(static_cast<char>(c)) != std::string_view::npos;
   };
   if (!word.empty() && std::ranges::all_of(word, is_plain)) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
+  return shell_word(word);
 }
 std::string in_shell(const Path& path) { return in_shell(path.string()); }
 
