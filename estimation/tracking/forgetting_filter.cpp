@@ -18,17 +18,17 @@ void ForgettingFilter::add(const Eigen::MatrixXd& A, const Eigen::MatrixXd& K,
   const double kept = std::pow(forgetting_, periods);
   information_ = kept * information_ + periods * A;
   scatter_ = kept * kept * scatter_ + periods * K;
-  x_ += Eigen::LDLT<Eigen::MatrixXd>(information_ + prior_)
-            .solve(gradient - (1.0 - kept) * (prior_ * x_));
+  x_ += Eigen::LDLT<Eigen::MatrixXd>(information()).solve(gradient - (1.0 - kept) * (prior_ * x_));
 }
 
 void ForgettingFilter::forget() {
   information_.setZero();
   scatter_.setZero();
+  x_.setZero();
 }
 
 Eigen::MatrixXd ForgettingFilter::covariance() const {
-  const Eigen::LDLT<Eigen::MatrixXd> factor(information_ + prior_);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information());
   const Eigen::MatrixXd half = factor.solve(scatter_ + prior_);
   return factor.solve(half.transpose());
 }

@@ -19,11 +19,13 @@ class ForgettingFilter {
   /// current estimate.
   void add(const Eigen::MatrixXd& A, const Eigen::MatrixXd& K, const Eigen::VectorXd& gradient,
            int periods = 1);
-  /// Forgets all; the estimate stays as a starting point.
+  /// Forgets all but the prior.
   void forget();
 
   const Eigen::VectorXd& estimate() const noexcept { return x_; }
   Eigen::MatrixXd covariance() const;
+  /// Of the data and the prior, around the estimate.
+  Eigen::MatrixXd information() const { return information_ + prior_; }
 
  private:
   Eigen::MatrixXd prior_;

@@ -60,9 +60,10 @@ void ModelTracker::State::track(const Eigen::VectorXd& mean_gradient, int count)
 }
 
 void ModelTracker::State::learn() {
-  reference.emplace(response, periods, start.value_or(filter.estimate()), start.has_value());
+  const Eigen::VectorXd x = start.value_or(filter.estimate());
   if (start) filter.forget();
   start.reset();
+  reference.emplace(response, periods, x, filter);
   track(reference->mean_gradient(), options.learning_periods);
   quality = reference->quality();
   scores.emplace(possible_changes(response.model(), response.parameters(),

@@ -38,19 +38,17 @@ PeriodSpectra mean_of(const std::deque<PeriodSpectra>& periods, std::size_t last
 
 TrackingReference::TrackingReference(const TrackedResponse& response,
                                      const std::deque<PeriodSpectra>& periods, Eigen::VectorXd x,
-                                     bool settle)
+                                     const ForgettingFilter& before)
     : response_(response),
       periods_(static_cast<double>(periods.size())),
       x_(std::move(x)),
       P_(response.at(x_)),
       all_motions_(free_motions(response)) {
   const PeriodSpectra mean = mean_of(periods, periods.size());
-  std::vector<Eigen::MatrixXcd> residuals = learn_noise(periods);
-  if (settle) {
-    this->settle(mean);
-    P_ = response.at(x_);
-    residuals = learn_noise(periods);  // with feedback, it depends on P
-  }
+  learn_noise(periods);
+  settle(mean, before);
+  P_ = response.at(x_);
+  const std::vector<Eigen::MatrixXcd> residuals = learn_noise(periods);  // in a loop, depends on P
   linearize(mean.U);
   const SumCovariance sums = noise_->covariance(J_);
   // An estimate over a deviation from nu degrees of freedom has the mean square nu / (nu - 2).
@@ -167,20 +165,21 @@ void TrackingReference::linearize(const Eigen::MatrixXcd& U) {
   A_ = J_.transpose() * J_;
 }
 
-/// Gauss-Newton from x to the mean of the learned periods.
-void TrackingReference::settle(const PeriodSpectra& mean) {
-  const Eigen::MatrixXd prior =
-      prior_information(response_.parameters(), response_.model().sample_rate_hz);
+/// Gauss-Newton from x.
+void TrackingReference::settle(const PeriodSpectra& mean, const ForgettingFilter& before) {
+  const Eigen::MatrixXd known = before.information();
   const auto cost = [&](const Eigen::VectorXd& at) {
+    const Eigen::VectorXd off = at - before.estimate();
     return periods_ * whitened(raw_residual(mean, response_.at(at))).squaredNorm() +
-           at.dot(prior * at);
+           off.dot(known * off);
   };
   double now = cost(x_);
   for (int iteration = 0; iteration < 20; ++iteration) {
     linearize(mean.U);
     const Eigen::VectorXd step =
-        Eigen::LDLT<Eigen::MatrixXd>(periods_ * A_ + prior)
-            .solve(periods_ * gradient(raw_residual(mean, response_.at(x_))) - prior * x_);
+        Eigen::LDLT<Eigen::MatrixXd>(periods_ * A_ + known)
+            .solve(periods_ * gradient(raw_residual(mean, response_.at(x_))) -
+                   known * (x_ - before.estimate()));
     double length = 1.0;
     double next = cost(x_ + step);
     while (!(next < now) && length > 1e-3) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimation/modal/period_spectra.hpp"
+#include "estimation/tracking/forgetting_filter.hpp"
 #include "estimation/tracking/line_noise.hpp"
 #include "estimation/tracking/reference_quality.hpp"
 #include "estimation/tracking/tracked_response.hpp"
@@ -17,16 +18,18 @@ namespace stageid {
 PeriodSpectra mean_of(const std::deque<PeriodSpectra>& periods, std::size_t last);
 
 /// What was learned from periods of a stage without change, at parameters x: the noise, the constant part of the
-/// residual, and how the residual depends on x.
+/// residual, and how the residual depends on x. The parameters are those that fit to the mean of the periods and to what
+/// was known before.
 ///
 /// A motion that does not repeat leaves free_motions() on the lines. Those of the free body, and those of the modes that
 /// it moved while this was learned, are removed from every residual.
 class TrackingReference {
  public:
-  /// @param x at which the periods are; with `settle`, a starting point of Gauss-Newton to their mean
   /// @param periods at least 4
+  /// @param x start of the search for the parameters
+  /// @param before estimate and information of other periods
   TrackingReference(const TrackedResponse& response, const std::deque<PeriodSpectra>& periods,
-                    Eigen::VectorXd x, bool settle);
+                    Eigen::VectorXd x, const ForgettingFilter& before);
 
   const Eigen::VectorXd& x() const noexcept { return x_; }
   const Eigen::MatrixXcd& response() const noexcept { return P_; }    ///< at x
@@ -59,7 +62,7 @@ class TrackingReference {
                                              std::vector<Eigen::MatrixXcd> residuals);
   Eigen::MatrixXcd add_motions(const std::vector<Eigen::MatrixXcd>& residuals);
   void linearize(const Eigen::MatrixXcd& U);
-  void settle(const PeriodSpectra& mean);
+  void settle(const PeriodSpectra& mean, const ForgettingFilter& before);
   void learn_noise_power(const std::vector<Eigen::MatrixXcd>& residuals);
   void judge(const PeriodSpectra& mean);
   Eigen::MatrixXcd raw_residual(const PeriodSpectra& period, const Eigen::MatrixXcd& P) const;

@@ -83,6 +83,12 @@ class LoopSpectra {
   }
   /// Another excitation.
   void excite() { U0_ = random_spectra(random_, 3, tracked_lines_hz().size()); }
+  /// Another excitation, which does not move a mode.
+  void excite_all_but(std::size_t mode) {
+    excite();
+    const Eigen::Vector3d psi = mode_numerator(mode)[0].row(0).normalized();
+    U0_ -= psi * (psi.transpose() * U0_).eval();
+  }
   void become(const StageProperties& stage) {
     P_ = reference_response(model_of(stage), tracked_lines_hz(), HoldModel::exact);
   }

@@ -289,6 +289,25 @@ TEST(ModelTracker, AnotherExcitationIsLearnedAndTheEstimatesContinue) {
   EXPECT_LT(kept, 0.48 * 1.6);
 }
 
+// The first excitation leaves the frequency uncertain, so that derivatives there do not suit the second one.
+TEST(ModelTracker, AnExcitationThatShowsAModeCorrectsOneThatDoesNot) {
+  constexpr int kRuns = 10;
+  double squares = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    LoopSpectra loop(300 + static_cast<std::uint64_t>(run));
+    ModelTracker tracker = tracker_of();
+    loop.excite_all_but(2);
+    watch(tracker, loop, 34);
+    tracker.change_excitation();
+    loop.excite();
+    watch(tracker, loop, 34);
+    const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+    squares += (ratio[2] * ratio[2] + ratio[6] * ratio[6]) / (2 * kRuns);
+  }
+  // Frequency and damping ratio of the mode: 20 values, one deviation is 0.32. Without a new linearization it is 2.5.
+  EXPECT_NEAR(squares, 1.0, 0.9);
+}
+
 TEST(ModelTracker, RefusesWhatItCannotTrack) {
   const auto refused = [](TrackerOptions options, const AdditiveModel& model,
                           const Eigen::VectorXd& lines_hz, const char* message) {
