@@ -12,12 +12,12 @@ namespace {
 
 /// The first curves, which show the modes, are dark and bold; curves of similar brightness differ by dashes.
 constexpr std::array kCurves = {
-    "lc rgb '#0b3c7d' lw 1.4",          "lc rgb '#d55e00' lw 1.2",
-    "lc rgb '#35a07a' lw 1.0 dt (6,2)", "lc rgb '#b07cc6' lw 1.0",
-    "lc rgb '#505050' lw 0.9 dt (2,2)", "lc rgb '#c8a040' lw 0.9 dt (8,2,2,2)"};
+    "lc rgb '#0b3c7d' lw 1.0",          "lc rgb '#d55e00' lw 0.9",
+    "lc rgb '#35a07a' lw 0.8 dt (6,2)", "lc rgb '#b07cc6' lw 0.8",
+    "lc rgb '#505050' lw 0.7 dt (2,2)", "lc rgb '#c8a040' lw 0.7 dt (8,2,2,2)"};
 
-constexpr const char* kModeLine = "lw 0.7 dt (1,2) lc rgb '#606060'";
-constexpr const char* kRing = "pt 6 ps 0.45 * point lw 0.9 lc rgb 'black'";
+constexpr const char* kModeLine = "lw 0.5 dt (1,2) lc rgb '#606060'";
+constexpr const char* kRing = "pt 6 ps 0.45 * point lw 0.6 lc rgb 'black'";
 
 /// " [(m/(N s²))²]" if all elements have the same unit.
 std::string unit_of(const FrfEstimate& frf) {

@@ -30,15 +30,17 @@ struct Format {
   const char* ending;
   const char* terminal;
   const char* unit;
-  double per_inch, line, point;
+  double per_inch;
+  double line, point;  ///< of the width of a line, of a length: units per point
   double font;  ///< Cairo interprets a point of a font as 1/96 inch, readers of SVG as a point
   std::string_view last;
 };
 constexpr double kCairoFont = kPointsPerInch / kSvgUnitsPerInch;
 constexpr Format kFormats[] = {  // in the order of PictureFormat
-    {".pdf", "pdfcairo rounded", "in", 1.0, 1.25, 1.0, kCairoFont, "%%EOF\n"},
-    {".svg", "svg", "", kSvgUnitsPerInch, 1.0, kSvgUnitsPerInch / kPointsPerInch, 1.0, "</svg>\n"},
-    {".png", "pngcairo rounded", "", kPngDotsPerInch, kPngDotsPerInch / kSvgUnitsPerInch,
+    {".pdf", "pdfcairo rounded", "in", 1.0, 2.0, 1.0, kCairoFont, "%%EOF\n"},
+    {".svg", "svg", "", kSvgUnitsPerInch, kSvgUnitsPerInch / kPointsPerInch,
+     kSvgUnitsPerInch / kPointsPerInch, 1.0, "</svg>\n"},
+    {".png", "pngcairo rounded", "", kPngDotsPerInch, kPngDotsPerInch / kPointsPerInch,
      kPngDotsPerInch / kPointsPerInch, kCairoFont, "IEND\xae\x42\x60\x82"}};
 
 /// A directory that only this user can read, removed with its content at the end.

@@ -1,6 +1,7 @@
 // Pictures for print show the data in the files, for any names of the channels.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cstdlib>
 #include <map>
@@ -88,6 +89,28 @@ TEST_F(Plot, StyleAndBandAreThoseThatAreAskedFor) {
   fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font-size", "1"}, 2, "expected 4 to 40");
   fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font", "a'b"}, 2, "name of a font");
   fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--preset", "triple"}, 2, "triple");
+}
+
+/// What is drawn on the first page.
+std::string content_of_pdf(const std::string& pdf) {
+  const std::size_t begin = pdf.find("stream\n") + 7;
+  std::string content(std::size_t{1} << 24, '\0');
+  uLongf size = content.size();
+  const auto* const from = reinterpret_cast<const Bytef*>(pdf.data() + begin);
+  const std::size_t length = pdf.find("endstream", begin) - begin;
+  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(content.data()), &size, from, length), Z_OK);
+  content.resize(size);
+  return content;
+}
+
+TEST_F(Plot, WidthsOfLinesAreInPointsInEveryFormat) {
+  make_model();
+  for (const char* file : {"widths.pdf", "widths.svg"})
+    succeed({"plot", "cmif", "frf.h5", "-o", file});
+  EXPECT_THAT(content_of_pdf(read_bytes(at("widths.pdf"))),
+              AllOf(HasSubstr(" 0.5 w\n"), HasSubstr(" 1 w\n")));  // the frame, the first curve
+  EXPECT_THAT(read_bytes(at("widths.svg")),
+              AllOf(HasSubstr("stroke-width=\"0.67\""), HasSubstr("stroke-width=\"1.33\"")));
 }
 
 TEST_F(Plot, TheEntryHasThePhaseOfTheData) {
