@@ -88,6 +88,7 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   if (result.exit_code != 0)
     console.warning(fmt::format("{}{}", named(request.log, result.message),
                                 complete < result.runs_total ? advice_behind(result) : ""));
+  result.show_end();
 }
 
 }  // namespace

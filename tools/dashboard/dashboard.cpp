@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "acquisition/files/json_text.hpp"
 #include "tools/report/html_page.hpp"
@@ -17,6 +18,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kEventsShown = 60;
+constexpr std::chrono::seconds kReload{
+    2};  // a page that is loaded again has no stream for a moment
 
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
@@ -166,7 +169,8 @@ std::string Dashboard::state_json() const {
       {"watch", watch != nullptr ? Json(watch->state()) : Json()},
       {"watchers", server_ ? server_->watchers() : 0},
       {"message", message_},
-      {"exit_code", exit_code_ ? Json(*exit_code_) : Json()}};
+      {"exit_code", exit_code_ ? Json(*exit_code_) : Json()},
+      {"stays", stays_}};
   add_counts(levels_.ended(), p, json);
   json["events"] = Json::array();
   if (const EventLog* const log = events_)
@@ -183,16 +187,18 @@ std::vector<RunObserver*> Dashboard::observers() noexcept {
   return {&levels_, &traces_, &response_};
 }
 
-void Dashboard::watch(EventLog& events) noexcept {
-  events_ = &events;
+void Dashboard::watch(std::shared_ptr<EventLog> events) noexcept {
+  shared_events_ = std::move(events);
+  events_ = shared_events_.get();
   start_ = SteadyClock::now();
 }
 
 void Dashboard::watch(std::function<PlantSnapshot()> snapshot) { plant_ = std::move(snapshot); }
 
-void Dashboard::watch(StageWatch& watch) noexcept {
-  watch.show();
-  watch_ = &watch;
+void Dashboard::watch(std::shared_ptr<StageWatch> watch) noexcept {
+  shared_watch_ = std::move(watch);
+  shared_watch_->show();
+  watch_ = shared_watch_.get();
 }
 
 void Dashboard::update(const ExperimentProgress& progress) {
@@ -212,9 +218,23 @@ void Dashboard::finish(int exit_code, const std::string& message) {
   state_ = "ended";
   exit_code_ = exit_code;
   message_ = message;
+  stays_ = aborted_ || !interrupt_flag();  // who sends a signal waits for the end of the program
   publish();
-  server_->finish(std::chrono::seconds(kFarewell_s));
+  if (!stays_) server_->finish(std::chrono::seconds(kFarewell_s));
   events_ = nullptr;
+  plant_ = {};
+}
+
+void Dashboard::stay(const Console& console) {
+  if (!stays_ || server_->watchers() == 0) return;
+  console.warning("dashboard: shows the end until its pages are closed; Ctrl-C also closes it");
+  const ControlledStop stop;
+  if (aborted_) forget_interrupt();
+  auto seen = SteadyClock::now();
+  while (!interrupt_flag() && SteadyClock::now() - seen < kReload) {
+    if (server_->watchers() > 0) seen = SteadyClock::now();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 }  // namespace stageid

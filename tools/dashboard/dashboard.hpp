@@ -17,6 +17,7 @@
 #include "tools/dashboard/live_response.hpp"
 #include "tools/dashboard/live_traces.hpp"
 #include "tools/experiment/experiment_config.hpp"
+#include "tools/terminal/console.hpp"
 #include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
@@ -39,17 +40,20 @@ class Dashboard {
   /// Observers of the rows of the log. Valid during the lifetime of *this.
   std::vector<RunObserver*> observers() noexcept;
   /// Shows the newest events of `events`, and records an abort there.
-  void watch(EventLog& events) noexcept;
-  /// Shows the state of the plant around the stage; `snapshot` may be called during the lifetime of *this.
+  void watch(std::shared_ptr<EventLog> events) noexcept;
+  /// Shows the state of the plant around the stage; `snapshot` may be called until the end of finish().
   void watch(std::function<PlantSnapshot()> snapshot);
-  /// Shows what a watch of the stage tracks and finds; `watch` has not begun, and must outlive *this.
-  void watch(StageWatch& watch) noexcept;
+  /// Shows what a watch of the stage tracks and finds; `watch` has not begun.
+  void watch(std::shared_ptr<StageWatch> watch) noexcept;
 
   /// Must be called a few times per second, from one thread.
   void update(const ExperimentProgress& progress);
-  /// Ends the experiment. Watchers receive the last state and the last response; returns when they have left, or after
-  /// kFarewell_s.
+  /// Ends the experiment. Watchers receive the last state and the last response. After a signal, returns when they
+  /// have left, or after kFarewell_s.
   void finish(int exit_code, const std::string& message);
+  /// Shows the end until every page is closed, or a signal. Returns at once without pages, and if a signal ended the
+  /// experiment.
+  void stay(const Console& console);
 
   static constexpr int kFarewell_s = 10;  ///< a page may be busy drawing
 
@@ -69,8 +73,12 @@ class Dashboard {
   Levels shown_levels_;
   std::optional<int> exit_code_;  ///< set at the end
   std::string message_;
+  bool stays_ = false;  ///< after the end
   std::function<PlantSnapshot()> plant_;
-  std::atomic<const StageWatch*> watch_ = nullptr;
+  std::shared_ptr<StageWatch> shared_watch_;
+  std::shared_ptr<EventLog> shared_events_;
+  std::atomic<const StageWatch*> watch_ =
+      nullptr;  // what was shared, for the threads of the server
   std::atomic<EventLog*> events_ = nullptr;
   std::atomic<bool> aborted_ = false;
   LiveLevels levels_;

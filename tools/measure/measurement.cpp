@@ -98,12 +98,12 @@ std::unique_ptr<SupervisedPlant> supervise(const ExperimentConfig& config,
   return plant;
 }
 
-std::unique_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
+std::shared_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
                                           const ExperimentPlan& plan,
                                           const MeasurementRequest& request, const StageInfo& stage,
                                           int runs_before, const Console& console) {
   if (!request.dashboard) return nullptr;
-  auto dashboard = std::make_unique<Dashboard>(*request.dashboard, config, plan, stage, request.log,
+  auto dashboard = std::make_shared<Dashboard>(*request.dashboard, config, plan, stage, request.log,
                                                runs_before, request.until);
   console.warning("dashboard: " + dashboard->url());
   return dashboard;
@@ -193,10 +193,10 @@ void conclude_watch(const StageWatch& watch, LiveWatch& live, MeasurementResult&
 }
 
 /// Connects observers of the measurement.
-void listen(RunExperimentOptions& options, EventLog& events, Progress& progress,
-            Dashboard* dashboard) {
+void listen(RunExperimentOptions& options, const std::shared_ptr<EventLog>& events,
+            Progress& progress, Dashboard* dashboard) {
   options.interrupt = &interrupt_flag();
-  options.events = &events;
+  options.events = events.get();
   options.progress = [&progress, dashboard](const ExperimentProgress& p) {
     progress.update(p.seconds_done, p.seconds_total,
                     fmt::format("run {}/{}", p.runs_done + 1, p.runs_total));
@@ -237,8 +237,8 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   const bool exists = check_log(request);
   RunExperimentOptions options;
   if (exists) options.skip = runs_to_skip(config, request.log);
-  std::optional<StageWatch> watch;  // must outlive the dashboard, which shows it
-  if (request.watch) watch.emplace(*request.watch, console);
+  const auto watch =
+      request.watch ? std::make_shared<StageWatch>(*request.watch, console) : nullptr;
   MeasurementResult result;
   result.runs_total = static_cast<int>(plan.runs().size());
   result.runs_before = static_cast<int>(options.skip.size());
@@ -256,16 +256,15 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   if (const std::string why = never_enough(plan.spec(), config.frf); request.until && !why.empty())
     console.warning("--until: " + why);
   const std::unique_ptr<SupervisedPlant> plant = supervise(config, request, options);
-  std::optional<EventLog> events;  // must outlive the dashboard, whose watchers write to it
-  const std::unique_ptr<Dashboard> dashboard =
+  const std::shared_ptr<Dashboard> dashboard =
       make_dashboard(config, plan, request, info, result.runs_before, console);
   if (dashboard && plant) dashboard->watch([&plant] { return plant->supervisor.snapshot(); });
-  if (dashboard && watch) dashboard->watch(*watch);
+  if (dashboard && watch) dashboard->watch(watch);
   const LogInfo log_info =
       experiment_log_info(plan, info, run_metadata(config, request.backend, info));
   SlogWriter log = exists ? SlogWriter::resume(request.log, log_info)
                           : SlogWriter::create(request.log, log_info);
-  events.emplace(event_log_of(request.log));
+  const auto events = std::make_shared<EventLog>(event_log_of(request.log));
   tell_begin(*events, config, info, result);
 
   std::optional<UntilVariance> until;
@@ -279,7 +278,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
     live_watch.emplace(*watch, request.log);
   }
   Progress progress(console, "run", "s of stage time");
-  listen(options, *events, progress, dashboard.get());
+  listen(options, events, progress, dashboard.get());
   result.experiment = stage->perform(log, options);
   result.seconds = progress.seconds();
   conclude(*stage, options, result);
@@ -289,7 +288,10 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
     log.close(result.exit_code, result.message.c_str());
   if (watch) conclude_watch(*watch, *live_watch, result, console);
   tell_end(*events, *stage, result);
-  if (dashboard) dashboard->finish(result.exit_code, result.message);
+  if (dashboard) {
+    dashboard->finish(result.exit_code, result.message);
+    result.show_end = [dashboard, &console] { dashboard->stay(console); };
+  }
   if (const std::string error = events->error(); !error.empty()) console.warning(error);
   std::error_code no_log;  // a removed log has already been reported as an error
   const std::uintmax_t bytes = std::filesystem::file_size(request.log, no_log);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -41,6 +42,7 @@ struct MeasurementResult {
   nlohmann::ordered_json watch = {};    ///< changes and tracked properties
   double seconds = 0.0;
   std::uint64_t log_bytes = 0;
+  std::function<void()> show_end = [] {};  ///< on the dashboard, until its pages are closed
 };
 
 /// Performs the experiment and logs it. When a log is resumed, its complete runs are skipped.

@@ -10,6 +10,7 @@ Exit code 77 (skipped) when there is no Chromium and STAGEID_REQUIRE_BROWSER is 
 
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -99,6 +100,23 @@ def check_numbers(file, seen):
     expect(set(seen["plots"]) >= {"entry-magnitude", "entry-phase", "cmif-plot"}, f"plots {seen['plots']}")
 
 
+def see_the_end(browser, running, timeout=60):
+    """The page has shown the end and still does when it is loaded again, because the program waits for it."""
+    expect(browser.wait_for("window.stageidDashboard.complete", timeout), "the page did not see the end")
+    browser.evaluate("window.stageidDashboard.complete = false")
+    browser.call("Page.reload")
+    expect(browser.wait_for("window.stageidDashboard && window.stageidDashboard.complete"), "the end is not shown again")
+    expect(running.process.poll() is None, "the program did not wait for its page")
+
+
+def leave(browser, running):
+    """@returns the exit code of the program, which ends with its page, and what it said"""
+    expect(browser.problems == [], f"the browser complains: {browser.problems}")
+    expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
+    browser.call("Page.navigate", url="about:blank")
+    return running.wait(30)
+
+
 def watch_one(program, configs, work):
     # Few samples a period and 2.5 ms between them: a busy machine, this browser included, is seldom so
     # late, and then in few of the periods. A realization that it spoils is left out, in the page too.
@@ -109,17 +127,15 @@ def watch_one(program, configs, work):
         expect(browser.evaluate("window.stageidDashboard.state.state") == "running", "the first response came after the end only")
         check_levels(browser)
         browser.check_widths(work, "running", 1600)
-        expect(browser.wait_for("window.stageidDashboard.left"), "the page did not see the end")
-        code, out = running.wait()
-        expect(code in (0, 3), f"exit code {code}: {out}")
-        expect(browser.evaluate("window.stageidDashboard.state.exit_code") == code, "the page knows another exit code")
-        file = estimate(program, log)
+        see_the_end(browser, running)
+        shown_code = browser.evaluate("window.stageidDashboard.state.exit_code")
         seen = browser.evaluate(RESPONSE)
         browser.check_tab("ended")
         browser.check_widths(work, "ended", 1600)
-        check_numbers(file, seen)
-        expect(browser.problems == [], f"the browser complains: {browser.problems}")
-        expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
+        check_numbers(estimate(program, log), seen)
+        code, out = leave(browser, running)
+        expect(code in (0, 3), f"exit code {code}: {out}")
+        expect(shown_code == code, "the page knows another exit code")
     finally:
         browser.close()
         running.close()
@@ -135,15 +151,14 @@ def stop_one(program, configs, work):
         expect(browser.evaluate("document.getElementById('abort').textContent") == "Press again to stop", "one press was enough")
         expect(running.process.poll() is None, "one press ended it")
         browser.press("Enter")
-        expect(browser.wait_for("window.stageidDashboard.left"), "the page did not see the end")
-        code, _ = running.wait()
-        expect(code == 130, f"exit code {code} instead of 130")
+        see_the_end(browser, running)
         browser.check_widths(work, "stopped", 1600)
+        code, _ = leave(browser, running)
+        expect(code == 130, f"exit code {code} instead of 130")
         verify = subprocess.run([program, "log", "verify", log], capture_output=True, text=True, check=False)
         expect(verify.returncode == 0, f"the log is not whole: {verify.stderr}")
         events = log.with_name("run.events.jsonl").read_text()
         expect('"event":"abort","from":"dashboard"' in events and '"reason":"interrupt"' in events, "no abort among the events")
-        expect(browser.problems == [], f"the browser complains: {browser.problems}")
     finally:
         browser.close()
         running.close()
@@ -180,17 +195,16 @@ def watch_a_change(program, configs, work):
         metrics = running.get("metrics").decode()
         expect("\nstageid_watch_changes_total 1\n" in metrics, "no change in the metrics")
         expect('\nstageid_tracked_change{kind="frequency",name="frequency of the mode at 181.' in metrics, "no tracked value in the metrics")
-        expect(browser.wait_for("window.stageidDashboard.left", 120), "the page did not see the end")
-        code, out = running.wait()
-        expect(code == 3, f"exit code {code}: {out}")
+        see_the_end(browser, running, 120)
         seen = browser.evaluate(WATCH)
         expect(len(seen["changes"]) == 1 and "181." in seen["changes"][0], f"changes: {seen['changes']}")
         expect(len(seen["red"]) == 1 and "frequency of the mode at 181." in seen["red"][0], f"red lights: {seen['red']}")
         expect(seen["lit"] == seen["cards"] - 1, f"{seen['lit']} of {seen['cards']} lights are on")
         expect(len(seen["ribbons"]) == seen["cards"] - 2 and all(seen["ribbons"]), "a ribbon was not drawn")
         browser.check_widths(work, "watched", 1600)
-        expect(browser.problems == [], f"the browser complains: {browser.problems}")
-        expect(browser.evaluate("window.stageidDashboard.errors") == [], "errors on the page")
+        running.process.send_signal(signal.SIGINT)  # ends the wait, with the code of the measurement
+        code, out = running.wait(30)
+        expect(code == 3, f"exit code {code}: {out}")
     finally:
         browser.close()
         running.close()

@@ -70,9 +70,11 @@ class Crowd:
 def run(program, config, log, crowd, *flags):
     running = RunningProgram(program, config, "-o", log, *flags, dashboard="0" if crowd else "")
     people = Crowd(running) if crowd else None
+    if people:
+        running.wait_until_measured()
+        people.leave()
     code, out = running.wait()
     if people:
-        people.leave()
         print(f"{people.answers} requests beside 60 connections: exit code {code}, {out.splitlines()[-1]}")
     return code, out
 

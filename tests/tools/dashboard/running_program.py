@@ -3,6 +3,7 @@
 import re
 import subprocess
 import threading
+import time
 import urllib.parse
 import urllib.request
 
@@ -29,6 +30,11 @@ class RunningProgram:
     def get(self, path):
         with urllib.request.urlopen(urllib.parse.urljoin(self.url, path), timeout=10) as answer:
             return answer.read()
+
+    def wait_until_measured(self):
+        """The program then stays for its watchers."""
+        while self.process.poll() is None and not any("shows the end" in line for line in self.lines):
+            time.sleep(0.05)
 
     def wait(self, timeout=300):
         """The exit code, and what it said on stdout (little: a pipe holds it)."""

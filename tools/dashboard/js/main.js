@@ -12,10 +12,10 @@ function showState(state) {
   const loaded = Promise.all([fetchResponse(state.response.edition), showWatch(state), fetchTraces()]);
   if (state.state !== 'ended') return;
   ended = true;
-  // The program waits for this page to disconnect, so fetch what is last first.
+  // If the program does not stay, it waits for this page to disconnect: fetch what is last first.
   loaded.then(() => Promise.all([fetchResponse(state.response.edition), showWatch(state)])).finally(() => {
-    stream.close();
-    window.stageidDashboard.left = true;
+    if (!state.stays) stream.close();
+    window.stageidDashboard.complete = true;
   });
 }
 
@@ -28,7 +28,7 @@ buildEvents();
 const stream = new EventSource('events' + link.search);
 stream.onmessage = (message) => showState(JSON.parse(message.data));
 stream.onerror = () => {
-  if (ended) return;
+  if (ended) return stream.close();
   head.verdict.className = 'verdict doubt';
   head.text.textContent = 'connection to the program lost; reconnecting';
 };

@@ -39,7 +39,7 @@ function showProgress(state) {
   head.track.setAttribute('aria-valuenow', Math.round(100 * share));
   head.figures.replaceChildren(...described(figures(state)));
   const now = 'Current run: realization ' + (state.run.realization + 1) + ' of ' + shown.realizations + ', experiment ' + (state.run.experiment + 1) + '. ';
-  head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.';
+  head.note.textContent = (state.state === 'running' ? now : '') + 'Response: ' + state.response.status + '.' + (state.stays ? ' The program ends when this page is closed.' : '');
 }
 
 // Relative rms error of the response so far; with a wanted one, the time until it: the variance falls with the number of realizations.
