@@ -88,20 +88,21 @@ void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult&
   if (!places.empty() && evidence.number != ModeNumber::given)
     doubts.push_back(
         {fmt::format("the data do not support the modes at {} Hz: a mode placed anywhere would "
-                     "lower the cost as much",
+                     "improve the fit as much",
                      listed(frequencies, kNamed)),
-         fmt::format("the data do not support the modes at {}: a mode placed anywhere would lower "
-                     "the cost as much; do not interpret them as resonances",
-                     listed(places, kNamed))});
+         fmt::format(
+             "the data do not support the modes at {}: a mode placed anywhere would improve "
+             "the fit as much; do not interpret them as resonances",
+             listed(places, kNamed))});
   for (const AlikeModes& pair : evidence.alike) {
     Submodel& one = fit.model.submodels[pair.first];
     Submodel& other = fit.model.submodels[pair.second];
     one.verdict = other.verdict = ModeVerdict::coincident;
     const std::string what = fmt::format(
-        "the data do not distinguish the modes at {:.6g} and {:.6g} Hz: one mode fits as well "
-        "(BIC), cost {:.6g} -> {:.6g}",
-        one.natural_frequency_hz(), other.natural_frequency_hz(), fit.model.fit.cost, pair.cost);
-    doubts.push_back({what, what + "; request fewer modes"});
+        "the data do not distinguish the modes at {:.6g} and {:.6g} Hz: one mode fits as well",
+        one.natural_frequency_hz(), other.natural_frequency_hz());
+    doubts.push_back({what, fmt::format("{} (BIC), cost {:.6g} -> {:.6g}; request fewer modes",
+                                        what, fit.model.fit.cost, pair.cost)});
   }
 }
 
@@ -206,11 +207,10 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
     judge_modes(frf, evidence, fit, doubts);
   for (const ModeDoubt& doubt : doubts) {
     tell(doubt.details);
-    if (fit.trustworthy())
-      fit.model.fit.distrust(
-          {FitStatus::undetermined, doubt.what,
-           asked ? "Let the fit choose the number of modes" : "Do not interpret them as resonances",
-           asked ? "--modes auto" : ""});
+    fit.model.fit.distrust(
+        {FitStatus::undetermined, doubt.what,
+         asked ? "Let the fit choose the number of modes" : "Do not interpret them as resonances",
+         asked ? "--modes auto" : ""});
   }
   if (!evidence.growth_ended.empty()) {
     fit.findings.push_back(evidence.growth_ended);

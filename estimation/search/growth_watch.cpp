@@ -92,8 +92,8 @@ bool GrowthWatch::a_delay_explains_more(const FrfEstimate& frf, const FitOptions
   by_delay_ = true;
   back_to_ = std::move(first_);
   finding_ = fmt::format(
-      "a delay of {:.4g} s instead of {:.4g} s fits better (cost {:.6g}) than {} more modes (cost "
-      "{:.6g}), which were discarded; use --delay estimate",
+      "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than {} more "
+      "modes ({:.6g}), which were discarded; use --delay estimate",
       trial.model.mean_delay_s(), searched.delay_s, trial.model.fit.cost,
       count_modes(now.model) - count_modes(back_to_.model), now.model.fit.cost);
   return true;

@@ -125,8 +125,9 @@ void advise_structure(const FrfEstimate& frf, const FitOptions& options, const F
     if (fit.status() == FitStatus::singular || !(criterion < least)) return false;
     least = criterion;
     reason.flags = flags;
-    reason.remedy = fmt::format("Try {}: one refit lowers the cost from {:.6g} to {:.6g}", flags,
-                                same.model.fit.cost, fit.model.fit.cost);
+    reason.remedy =
+        fmt::format("Try {}: one refit lowers the squared residual from {:.6g} to {:.6g}", flags,
+                    same.model.fit.cost, fit.model.fit.cost);
     return true;
   };
   const OpenStructure open{.rigid_body = true,
@@ -147,9 +148,9 @@ void advise_structure(const FrfEstimate& frf, const FitOptions& options, const F
   if (!advise(with_missing_modes(frf, trial, same, 1, 1), "--modes auto")) return;
   const FitResult more = with_missing_modes(frf, trial, same, kRounds, kTried);
   const std::string places = missing_frequencies(frf, trial, more, same.model.submodels.size());
-  reason.remedy =
-      fmt::format("Try {}: a refit with more modes lowers the cost from {:.6g} to {:.6g}",
-                  reason.flags, same.model.fit.cost, more.model.fit.cost);
+  reason.remedy = fmt::format(
+      "Try {}: a refit with more modes lowers the squared residual from {:.6g} to {:.6g}",
+      reason.flags, same.model.fit.cost, more.model.fit.cost);
   if (!places.empty()) reason.what += ": modes are missing at " + places;
 }
 

@@ -270,7 +270,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
       needed <= evidence.transient_periods + evidence.periods - 2
           ? fmt::format("--transient-periods {}, or --method lpm; then fit again", needed)
           : fmt::format(
-                "measure again with transient_periods: {}, or use --method lpm and fit again",
+                "use --method lpm and fit again, or measure again with transient_periods: {}",
                 needed)};
   if (!linear) {
     finding.cause = Cause::limit_cycle;

@@ -26,6 +26,10 @@ constexpr const char* kMissingModes = "missing_modes";
 
 bool is_of_health(const Problem& problem) { return from_word<Cause>(problem.cause).has_value(); }
 
+bool is_end_of_iteration(const Problem& p) {
+  return p.is(FitStatus::iteration_limit) || p.is(FitStatus::cost_stalled);
+}
+
 /// The ranking: smaller comes first.
 int place_of(const Problem& p) {
   const bool unrepeatable = p.cause == to_string(Cause::aperiodic);  // as noise is
@@ -44,8 +48,7 @@ int place_of(const Problem& p) {
   if (!p.flags.empty() && !avoids) return 9;
   if (p.cause == kOneRealization) return 10;
   // Modes that the data do not determine also keep the iteration from its end.
-  const bool ended = p.is(FitStatus::iteration_limit) || p.is(FitStatus::cost_stalled);
-  return p.cause == kHeldBack ? 13 : ended ? 12 : 11;
+  return is_end_of_iteration(p) ? 13 : p.cause == kHeldBack ? 12 : 11;
 }
 
 bool explains_others(const Problem& problem) { return place_of(problem) <= 3; }
@@ -71,15 +74,20 @@ std::vector<Problem> check_noise(const FrfEstimate& frf) {
        fmt::format("the response is not above its noise: {:.0f} % of the lines of the best channel "
                    "are above its 95 % limit, and noise alone gives 5 %",
                    100.0 * share),
-       "raise 'level' in the experiment file, or measure more periods"}};
+       "raise 'level' in the experiment file as far as the stage permits, or measure more "
+       "periods"}};
 }
 
-/// Faults and noise of the data explain all that follows, and noise alone also that nothing repeats.
+/// Faults and noise of the data explain all that follows, and noise alone also that nothing repeats. Any other grave
+/// problem may keep the iteration from its end, so more iterations are not advised beside it.
 std::size_t in_head(const std::vector<Problem>& problems) {
   if (!problems.empty() && problems.front().cause == kNoise) return 1;
   const auto last = std::ranges::find_if(problems, std::not_fn(explains_others));
-  const auto count = last == problems.begin() ? problems.size()
-                                              : static_cast<std::size_t>(last - problems.begin());
+  if (last != problems.begin())
+    return std::min(static_cast<std::size_t>(last - problems.begin()), kMostInHead);
+  const auto end = std::ranges::find_if(problems, is_end_of_iteration);
+  const bool of_others = std::any_of(problems.begin(), end, std::mem_fn(&Problem::grave));
+  const auto count = of_others ? static_cast<std::size_t>(end - problems.begin()) : problems.size();
   return std::min(count, kMostInHead);
 }
 
@@ -126,7 +134,7 @@ std::vector<Problem> problems_of(const FrfEstimate& frf) {
     problems.push_back(
         {kNonlinear, false, std::move(what),
          "the model is the best linear one at this level, and its standard deviations "
-         "include the distortion. For less of it, lower 'level' in the experiment "
+         "include the distortion. For less of it, halve 'level' in the experiment "
          "file"});
   if (frf.realizations == 1)
     problems.push_back(
@@ -155,8 +163,8 @@ std::vector<std::string> head_lines(std::string prefix, const std::vector<Proble
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < in_head(problems); ++i) {
     const Problem& p = problems[i];
-    const std::string number = i == 0 ? std::move(prefix) : fmt::format("{}. ", i + 1);
-    lines.push_back(number + p.text() + (p.command.empty() ? "" : ":"));
+    lines.push_back((i == 0 ? std::move(prefix) : "also: ") + p.text() +
+                    (p.command.empty() ? "" : ":"));
     if (!p.command.empty()) lines.push_back("    " + p.command);
   }
   if (lines.empty() && !prefix.empty()) lines.push_back(std::move(prefix));

@@ -67,6 +67,27 @@ std::string refit_flags(const Json& asked, const std::string& changed) {
   return text + words_in_shell(changed);
 }
 
+/// The lines of `fit` in an experiment file that say the same as flags: "'modes: auto'".
+std::string keys_of(const std::string& flags) {
+  std::vector<std::string> lines;
+  std::istringstream words(flags);
+  for (std::string word; words >> word;) {
+    if (!word.starts_with("--")) {
+      lines.back() += (lines.back().ends_with(":") ? " " : ", ") + word;
+      continue;
+    }
+    std::ranges::replace(word, '-', '_');
+    const std::string key = word.substr(2);
+    lines.push_back(key + (key == "delay" ? "_s:" : key == "band" ? "_hz:" : ":"));
+  }
+  for (std::string& line : lines) {
+    if (const std::size_t value = line.find(": "); line.find(", ") != std::string::npos)
+      line = fmt::format("{}[{}]", line.substr(0, value + 2), line.substr(value + 2));
+    line = fmt::format("'{}'", line);
+  }
+  return fmt::format("{}", fmt::join(lines, " and "));
+}
+
 /// Builds the commands of one result.
 class Commands {
  public:
@@ -118,8 +139,8 @@ class Commands {
     p.command = refit(flags);
     if (p.command.empty() || files_.experiment.empty()) return;
     if (!p.remedy.empty()) p.remedy += "; ";
-    p.remedy +=
-        fmt::format("for later measurements, change 'fit' in {}", files_.experiment.string());
+    p.remedy += fmt::format("for later measurements, write {} under 'fit' in {}", keys_of(flags),
+                            files_.experiment.string());
   }
 
   std::string refit(const std::string& flags) const {

@@ -72,6 +72,28 @@ TEST(ModelVerdict, NamesWhatARefitRemovesBeforeTheFitThatDidNotConverge) {
   EXPECT_EQ(verdict.problems[0].cause, "delay");
   EXPECT_EQ(verdict.problems[0].command,
             "stageid fit 'a b.h5' -o m.json --rigid-body none --modes 1,2 --delay estimate");
+  EXPECT_THAT(verdict_lines(verdict),
+              ElementsAre("verdict: not to be trusted: the residual is large:",
+                          "    " + verdict.problems[0].command))
+      << "more iterations are no remedy beside another one";
+}
+
+TEST(ModelVerdict, NamesTheKeysOfTheExperimentThatSayTheSame) {
+  const auto remedy = [](const char* flags) {
+    AdditiveModel model;
+    model.fit.status = FitStatus::gradient_small;
+    model.fit.distrust({FitStatus::unexplained, "the residual is large", "", flags});
+    ResultFiles files;
+    files.frf = "f.h5";
+    files.model = "m.json";
+    files.experiment = "e.yaml";
+    return judge_model(model, {}, {}, {}, files).problems[0].remedy;
+  };
+  EXPECT_EQ(remedy("--delay estimate"),
+            "for later measurements, write 'delay_s: estimate' under 'fit' in e.yaml");
+  EXPECT_THAT(remedy("--rigid-body suspension --modes auto"),
+              HasSubstr("write 'rigid_body: suspension' and 'modes: auto' under"));
+  EXPECT_THAT(remedy("--band 30 2000"), HasSubstr("write 'band_hz: [30, 2000]' under"));
 }
 
 // A command is copied into a shell, and a model may be of somebody else.
