@@ -7,6 +7,7 @@
 import base64
 import csv
 import hashlib
+import json
 import pathlib
 import re
 import shutil
@@ -33,6 +34,29 @@ def output(*words, **options):
 def setUpModule():
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
+
+
+class BillOfMaterials(unittest.TestCase):
+    def test_it_lists_what_the_program_is_made_of(self):
+        program, file = BUILD / "tools/stageid", WORK / "stageid.spdx.json"
+        output("/usr/bin/python3", SOURCE / "tools/package/sbom.py", program, BUILD, VERSION, file)
+        document = json.loads(file.read_text())
+        packages = {package["name"]: package for package in document["packages"]}
+        kinds = {packages[name]["SPDXID"]: name for name in packages}
+        relations = {kinds.get(r["relatedSpdxElement"]): r["relationshipType"] for r in document["relationships"]}
+        self.assertEqual(relations["libfftw3-double3"], "DYNAMIC_LINK")
+        self.assertIn("GPL-2+", packages["libfftw3-double3"]["licenseComments"])
+        for header_only in ("libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev", "libutfcpp-dev"):
+            self.assertEqual(relations[header_only], "CONTAINS")
+            self.assertEqual(packages[header_only]["versionInfo"], output("dpkg-query", "-W", "-f", "${Version}", header_only))
+        self.assertNotIn("libgtest-dev", packages)
+        digest = hashlib.sha256(program.read_bytes()).hexdigest()
+        self.assertEqual(packages["stageid"]["checksums"], [{"algorithm": "SHA256", "checksumValue": digest}])
+        identifiers = [package["SPDXID"] for package in document["packages"]]
+        self.assertEqual(len(identifiers), len(set(identifiers)))
+
+    def test_the_program_does_not_contain_its_folder(self):
+        self.assertNotIn(str(SOURCE).encode(), (BUILD / "tools/stageid").read_bytes())
 
 
 class Wheel(unittest.TestCase):

@@ -41,6 +41,11 @@ if(STAGEID_BUILD_PYTHON)
     DEPENDS stageid_python VERBATIM)
 endif()
 
+add_custom_target(sbom
+  COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/sbom.py $<TARGET_FILE:stageid_program> ${PROJECT_BINARY_DIR}
+    ${PROJECT_VERSION} ${PROJECT_BINARY_DIR}/stageid-${PROJECT_VERSION}.spdx.json
+  DEPENDS stageid_program VERBATIM)
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL ${components})
 set(CPACK_DEB_COMPONENT_INSTALL ON)
