@@ -60,8 +60,6 @@ void fit(const FitCommandFlags& flags, Console& console) {
   for (const std::string& doubt :
        health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
     console.warning(fmt::format("{}: {}", flags.frf.string(), doubt));
-  for (const std::string& warning : setup.warnings)
-    console.warning(fmt::format("{}: {}", flags.frf.string(), warning));
   const FitStep step = fit_with_progress(setup, flags.frf.filename().string(),
                                          fingerprint_of_file(flags.frf), console);
   const FitResult& result = step.result;
@@ -94,8 +92,12 @@ void fit(const FitCommandFlags& flags, Console& console) {
                                  {"seconds", step.seconds}};
   json.update(verdict_json(verdict));
   console.result(json);
-  for (const std::string& finding : findings_beside_message(result))
-    console.warning(fmt::format("{}: {}", flags.output.string(), finding));
+  if (!explain_the_rest(verdict.problems)) {
+    for (const std::string& warning : setup.warnings)
+      console.warning(fmt::format("{}: {}", flags.frf.string(), warning));
+    for (const std::string& finding : findings_beside_message(result))
+      console.warning(fmt::format("{}: {}", flags.output.string(), finding));
+  }
   if (!whole)
     console.warning(fmt::format("{}: not written: {}", flags.covariance.string(),
                                 result.decisions.empty() ? "" : result.decisions.back()));

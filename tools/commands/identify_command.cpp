@@ -325,7 +325,8 @@ class Identification {
       console_.result("on the held-back realization:");
       for (const std::string& line : validation_lines(*validation_)) console_.result("  " + line);
     }
-    for (const std::string& note : notes_) console_.warning(note);
+    if (!explain_the_rest(verdict_.problems))
+      for (const std::string& note : notes_) console_.warning(note);
     for (const std::string& line : verdict_lines(verdict_)) console_.result(line);
     console_.result(fmt::format("report: {}", path("report.html").string()));
     console_.result(summary_);

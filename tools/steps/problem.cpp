@@ -115,6 +115,10 @@ void rank(std::vector<Problem>& problems) {
   problems = std::move(kept);
 }
 
+bool explain_the_rest(const std::vector<Problem>& problems) {
+  return !problems.empty() && explains_others(problems.front());
+}
+
 std::vector<Problem> problems_of(const std::vector<Finding>& health) {
   std::vector<Problem> problems;
   for (const Finding& f : health) {

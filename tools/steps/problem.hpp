@@ -38,6 +38,10 @@ inline constexpr std::size_t kMostInHead = 3;
 /// Sorts by the one ranking of all outputs: causes before their consequences. Removes what is there twice.
 void rank(std::vector<Problem>& problems);
 
+/// Whether the first problem explains all that follows: a fault of the data, or a response of noise. What else was found
+/// is then its consequence. @param problems ranked
+bool explain_the_rest(const std::vector<Problem>& problems);
+
 /// Problems of a response before any fit: faults and doubts of its health, a response that is noise, nonlinearity, a
 /// single realization.
 std::vector<Problem> problems_of(const FrfEstimate& frf);
