@@ -6,7 +6,7 @@
 #include <fstream>
 #include <regex>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 
 namespace stageid {
@@ -114,8 +114,7 @@ std::string other_hdf5_kind(const std::string& format, const std::string& wanted
 void require_format(const Hdf5File& file, const std::string& format, const std::string& wanted,
                     const std::string& hint) {
   if (!file.has_attribute("/", "format"))
-    throw FormatError(file.path(), "/",
-                      fmt::format("attribute format is missing; expected '{}'", format));
+    fail_format(file.path(), "/", "attribute format is missing; expected '{}'", format);
   const std::string found = file.read_text_attribute("/", "format");
   if (found == format) return;
   const std::string other = other_hdf5_kind(found, wanted);
@@ -127,9 +126,8 @@ void require_format(const Hdf5File& file, const std::string& format, const std::
 void require_version(const Hdf5File& file, long long version) {
   const long long found = file.read_integer_attribute("/", "format_version");
   if (found != version)
-    throw FormatError(
-        file.path(), "/",
-        fmt::format("unsupported format_version {}; this program reads {}", found, version));
+    fail_format(file.path(), "/", "unsupported format_version {}; this program reads {}", found,
+                version);
 }
 
 }  // namespace stageid

@@ -8,8 +8,8 @@
 #include <cerrno>
 #include <new>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
@@ -45,7 +45,7 @@ std::string fingerprint_of_file(const std::filesystem::path& file) {
   Fingerprint fingerprint;
   const auto add = [&](std::string_view piece) { fingerprint.add(piece); };
   if (!descriptor || !read_pieces(descriptor, add))
-    throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
+    fail_file(file, "cannot be read: {}", system_reason(errno));
   return fingerprint.hex();
 }
 

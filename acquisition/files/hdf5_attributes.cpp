@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_support.hpp"
 #include "acquisition/files/system_reason.hpp"
@@ -78,11 +78,10 @@ std::vector<std::string> Hdf5File::attributes(const std::string& object) const {
   if (!exists(object)) throw FormatError(path_, object, "is missing");
   std::vector<std::string> names;
   if (H5Aiterate_by_name(id(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr,
-                         hdf5::collect_name<H5A_info_t>, &names, H5P_DEFAULT) < 0) {
-    throw FormatError(path_, object,
-                      "its attributes cannot be listed" + hdf5::take_system_reason() +
-                          "; the file is damaged, copy it again");
-  }
+                         hdf5::collect_name<H5A_info_t>, &names, H5P_DEFAULT) < 0)
+    fail_format(path_, object,
+                "its attributes cannot be listed{}; the file is damaged, copy it again",
+                hdf5::take_system_reason());
   return names;
 }
 

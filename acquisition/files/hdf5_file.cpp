@@ -8,8 +8,8 @@
 #include <cerrno>
 
 #include "acquisition/files/child_process.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_library.hpp"
 #include "acquisition/files/hdf5_support.hpp"
@@ -30,10 +30,10 @@ namespace {
 /// HDF5's messages do not distinguish a missing file from a forbidden one; the operating system's do.
 void check_can_be_opened(const std::filesystem::path& file) {
   const FileDescriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!descriptor) throw FileError(file.string() + ": cannot be read: " + system_reason(errno));
+  if (!descriptor) fail_file(file, "cannot be read: {}", system_reason(errno));
   struct stat status {};
   if (::fstat(descriptor.get(), &status) != 0 || !S_ISREG(status.st_mode))
-    throw FileError(file.string() + ": is not a regular file; give the name of an HDF5 file");
+    fail_file(file, "is not a regular file; give the name of an HDF5 file");
 }
 
 }  // namespace
@@ -81,11 +81,11 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
 
 Hdf5File Hdf5File::opened(const std::filesystem::path& file) {
   Hdf5Handle handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  if (!handle) {
-    throw FormatError(file, "",
-                      "the HDF5 file is truncated, damaged or still being written" +
-                          hdf5::take_system_reason() + "; copy it again or recreate it");
-  }
+  if (!handle)
+    fail_format(file, "",
+                "the HDF5 file is truncated, damaged or still being written{}; copy it again or "
+                "recreate it",
+                hdf5::take_system_reason());
   return {file, std::move(handle)};
 }
 
@@ -101,9 +101,7 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file,
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
   Hdf5Handle handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, properties.get(), access.get()),
                     H5Fclose);
-  if (!handle) {
-    throw FileError(named.string() + ": cannot be created: " + with_remedy(hdf5::take_reason()));
-  }
+  if (!handle) fail_file(named, "cannot be created: {}", with_remedy(hdf5::take_reason()));
   return {named, std::move(handle)};
 }
 
@@ -179,11 +177,9 @@ hid_t Hdf5File::open_dataset(const std::string& dataset) const {
   const Hdf5Handle access = hdf5::property_list(H5P_DATASET_ACCESS);
   H5Pset_chunk_cache(access.get(), kChunkCacheSlots, kChunkCacheBytes, 1.0);
   Hdf5Handle handle(H5Dopen2(file_.get(), dataset.c_str(), access.get()), H5Dclose);
-  if (!handle) {
-    throw FormatError(
-        path_, dataset,
-        "is not a dataset, or is damaged" + hdf5::take_system_reason() + "; expected a dataset");
-  }
+  if (!handle)
+    fail_format(path_, dataset, "is not a dataset, or is damaged{}; expected a dataset",
+                hdf5::take_system_reason());
   check_chunk(dataset, handle.get());
   OpenDatasets::Entry& entry = open_datasets_->entries[open_datasets_->oldest];
   if (!entry.handle.close())

@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <fstream>
@@ -7,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_support.hpp"
 
 namespace stageid::hdf5 {
@@ -52,12 +50,11 @@ void check_window(const std::filesystem::path& file, std::string_view window, st
     const std::uint64_t size = little_endian(window.substr(at + 8, 8));
     const bool whole = size <= window.size() - at;
     const bool fits = size >= kHeader && size <= file_bytes - offset - at;
-    if (!fits || (whole && !objects_fit(window.substr(at, static_cast<std::size_t>(size))))) {
-      throw FormatError(file, "",
-                        fmt::format("the HDF5 file is damaged: the strings stored at byte {} "
-                                    "overlap; copy it again or recreate it",
-                                    offset + at));
-    }
+    if (!fits || (whole && !objects_fit(window.substr(at, static_cast<std::size_t>(size)))))
+      fail_format(file, "",
+                  "the HDF5 file is damaged: the strings stored at byte {} overlap; copy it again "
+                  "or recreate it",
+                  offset + at);
   }
 }
 
@@ -67,14 +64,14 @@ void check_global_heaps(const std::filesystem::path& file) {
   constexpr std::uint64_t kWindow = std::uint64_t{4} << 20;
   std::ifstream stream(file, std::ios::binary | std::ios::ate);
   const std::streamoff end = stream.tellg();
-  if (!stream || end < 0) throw FileError(file.string() + ": cannot be read");
+  if (!stream || end < 0) fail_file(file, "cannot be read");
   const auto file_bytes = static_cast<std::uint64_t>(end);
   std::string window;
   const auto check_from = [&](std::uint64_t offset, std::uint64_t bytes) {
     window.resize(static_cast<std::size_t>(bytes));
     stream.seekg(static_cast<std::streamoff>(offset));
     stream.read(window.data(), static_cast<std::streamsize>(bytes));
-    if (!stream) throw FileError(file.string() + ": cannot be read");
+    if (!stream) fail_file(file, "cannot be read");
     check_window(file, window, offset, file_bytes);
   };
   if (file_bytes <= 2 * kWindow) {

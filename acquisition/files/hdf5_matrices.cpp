@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -14,11 +14,9 @@ std::string join_shape(const std::vector<hsize_t>& shape) {
 void require_shape(const Hdf5File& file, const std::string& dataset,
                    const std::vector<hsize_t>& wanted) {
   const std::vector<hsize_t> shape = file.shape(dataset);
-  if (shape != wanted) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("shape is {}; expected {}", join_shape(shape), join_shape(wanted)));
-  }
+  if (shape != wanted)
+    fail_format(file.path(), dataset, "shape is {}; expected {}", join_shape(shape),
+                join_shape(wanted));
 }
 
 }  // namespace stageid

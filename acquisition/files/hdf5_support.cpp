@@ -6,7 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid::hdf5 {
 namespace {
@@ -119,11 +119,10 @@ std::size_t plausible_count(const std::filesystem::path& file, const std::string
   if (std::find(shape.begin(), shape.end(), hsize_t{0}) != shape.end()) return 0;
   std::size_t count = 1;
   for (const hsize_t extent : shape) {
-    if (extent > limit / bytes) {
-      throw FormatError(file, place,
-                        "has the size " + text_of(shape) +
-                            ", which exceeds the size of the file; the file is damaged");
-    }
+    if (extent > limit / bytes)
+      fail_format(file, place,
+                  "has the size {}, which exceeds the size of the file; the file is damaged",
+                  text_of(shape));
     bytes *= extent;
     count *= static_cast<std::size_t>(extent);
   }

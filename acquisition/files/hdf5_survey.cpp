@@ -1,7 +1,7 @@
 #include <map>
 #include <string>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_support.hpp"
 
 namespace stageid::hdf5 {
@@ -31,10 +31,10 @@ class Survey {
 
  private:
   [[noreturn]] void refuse(const std::string& object, const char* what) const {
-    throw FormatError(file_.path(), object,
-                      std::string(what) +
-                          " another file; copy the file with its data, for example "
-                          "with h5repack, and give the copy");
+    fail_format(file_.path(), object,
+                "{} another file; copy the file with its data, for example with h5repack, and give "
+                "the copy",
+                what);
   }
 
   /// What cannot be read is reported where it is needed.
@@ -88,9 +88,9 @@ class Survey {
       if (link.type > H5L_TYPE_SOFT) refuse(child, "is a link to");
       if (link.type == H5L_TYPE_HARD) paths += visit(child);  // a soft link points to one
       if (paths > kMostPaths)
-        throw FormatError(file_.path(), "",
-                          "contains more than " + std::to_string(kMostPaths) +
-                              " objects; copy the needed ones to a new file");
+        fail_format(file_.path(), "",
+                    "contains more than {} objects; copy the needed ones to a new file",
+                    kMostPaths);
     }
     return paths;
   }

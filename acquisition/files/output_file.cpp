@@ -14,8 +14,8 @@
 #include <string>
 #include <system_error>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
 
@@ -36,9 +36,9 @@ UnfinishedFiles& unfinished() {
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what, int error,
                        const std::string& remedy = "") {
-  throw FileError(fmt::format(
-      "{}: {}: {}", shown_name(file).string(), what,
-      remedy.empty() ? system_reason(error) : fmt::format("{}; {}", std::strerror(error), remedy)));
+  fail_file(
+      shown_name(file), "{}: {}", what,
+      remedy.empty() ? system_reason(error) : fmt::format("{}; {}", std::strerror(error), remedy));
 }
 
 std::filesystem::path directory_of(const std::filesystem::path& file) {
@@ -59,12 +59,9 @@ std::filesystem::path resolve_target(const std::filesystem::path& target) {
     if (error) fail(target, "cannot follow the symbolic link", error.value());
   }
   const std::filesystem::file_status status = std::filesystem::status(resolved, ignored);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw FileError(
-        target.string() + ": " +
-        (std::filesystem::is_directory(status) ? "is a directory" : "is not a regular file") +
-        "; give the name of a file to write");
-  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    fail_file(target, "is {}; give the name of a file to write",
+              std::filesystem::is_directory(status) ? "a directory" : "not a regular file");
   if (!resolved.has_filename()) {
     throw FileError("'" + target.string() +
                     "': is not a file name; give the name of a file to write");

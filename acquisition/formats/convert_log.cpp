@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/formats/hdf5_log.hpp"
@@ -253,16 +253,14 @@ void convert_log(const LogReader& reader, const std::filesystem::path& to,
   const std::string extension = to.extension().string();
   const bool hdf5 = extension == ".h5" || extension == ".hdf5";
   const bool native = extension == ".slog";
-  if (!hdf5 && !native && extension != ".csv") {
-    throw std::invalid_argument(
-        fmt::format("{}: unsupported file extension; use .h5 or .hdf5 (HDF5), .csv (text), .mat "
-                    "(MATLAB) or .slog",
-                    to.string()));
-  }
+  if (!hdf5 && !native && extension != ".csv")
+    fail_request(
+        "{}: unsupported file extension; use .h5 or .hdf5 (HDF5), .csv (text), .mat (MATLAB) or "
+        ".slog",
+        to.string());
   if (native && dynamic_cast<const SlogReader*>(&reader) != nullptr)
-    throw std::invalid_argument(fmt::format(
-        "{}: is already a native log; use 'stageid log recover' to copy its intact parts",
-        reader.path().string()));
+    fail_request("{}: is already a native log; use 'stageid log recover' to copy its intact parts",
+                 reader.path().string());
   OutputFile output(to);
   if (hdf5) {
     convert_to_hdf5(reader, output.path(), to, options);

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/record/log_checks.hpp"
 #include "acquisition/record/row_transpose.hpp"
@@ -23,10 +23,8 @@ constexpr std::size_t kPieceBytes = std::size_t{4} << 20;
 /// An integer attribute of the file that must fit an int.
 int read_int(const Hdf5File& file, const std::string& object, const std::string& name) {
   const long long value = file.read_integer_attribute(object, name);
-  if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max()) {
-    throw FormatError(file.path(), object,
-                      fmt::format("attribute {} is out of range: {}", name, value));
-  }
+  if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max())
+    fail_format(file.path(), object, "attribute {} is out of range: {}", name, value);
   return static_cast<int>(value);
 }
 
@@ -39,12 +37,9 @@ ChannelList read_channel_list(const Hdf5File& file, const std::string& dataset) 
     channels.units = {""};
   }
   if (channels.units.size() == 1) channels.units.assign(channels.size(), channels.units.front());
-  if (channels.units.size() != channels.size()) {
-    throw FormatError(
-        file.path(), dataset,
-        fmt::format("has {} and {}; give one unit, or one per channel",
-                    counted(channels.size(), "channel"), counted(channels.units.size(), "unit")));
-  }
+  if (channels.units.size() != channels.size())
+    fail_format(file.path(), dataset, "has {} and {}; give one unit, or one per channel",
+                counted(channels.size(), "channel"), counted(channels.units.size(), "unit"));
   return channels;
 }
 
@@ -52,14 +47,11 @@ ChannelList read_channel_list(const Hdf5File& file, const std::string& dataset) 
 std::vector<double> read_column_values(const Hdf5File& file, const std::string& dataset,
                                        const std::string& name, std::size_t size) {
   std::vector<double> values = file.read_reals_attribute(dataset, name);
-  if (values.size() != 1 && values.size() != size) {
-    throw FormatError(file.path(), dataset,
-                      fmt::format("attribute {} has {}; expected 1 or {}", name,
-                                  counted(values.size(), "value"), size));
-  }
-  if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {
-    throw FormatError(file.path(), dataset, fmt::format("attribute {} is not finite", name));
-  }
+  if (values.size() != 1 && values.size() != size)
+    fail_format(file.path(), dataset, "attribute {} has {}; expected 1 or {}", name,
+                counted(values.size(), "value"), size);
+  if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+    fail_format(file.path(), dataset, "attribute {} is not finite", name);
   if (values.size() == 1) values.assign(size, values.front());
   return values;
 }
@@ -125,20 +117,16 @@ void Hdf5LogReader::read_run(const std::string& name) {
   place.actuators = open_dataset(group + "/actuators", info_.actuators.size());
   place.sensors = open_dataset(group + "/sensors", info_.sensors.size());
   run.samples = place.sensors.rows;
-  if (place.actuators.rows != run.samples) {
-    throw FormatError(
-        path_, group,
-        fmt::format("actuators have {} rows, sensors {}; both must have the same number",
-                    place.actuators.rows, run.samples));
-  }
+  if (place.actuators.rows != run.samples)
+    fail_format(path_, group, "actuators have {} rows, sensors {}; both must have the same number",
+                place.actuators.rows, run.samples);
   check_excitation_length(run, place.excitation);
   if (file_->exists(group + "/marked")) {
     place.marked = group + "/marked";
     const std::vector<hsize_t> shape = file_->shape(place.marked);
-    if (shape.size() != 1 || shape[0] != run.samples) {
-      throw FormatError(path_, place.marked,
-                        fmt::format("must be a vector of {} numbers, one per sample", run.samples));
-    }
+    if (shape.size() != 1 || shape[0] != run.samples)
+      fail_format(path_, place.marked, "must be a vector of {} numbers, one per sample",
+                  run.samples);
   }
   run.health.cycles = run.samples;
   runs_.push_back(std::move(run));
@@ -148,11 +136,9 @@ void Hdf5LogReader::read_run(const std::string& name) {
 Hdf5LogReader::Dataset Hdf5LogReader::open_dataset(const std::string& name,
                                                    std::size_t columns) const {
   const std::vector<hsize_t> shape = file_->shape(name);
-  if (shape.size() != 2 || shape[1] != columns) {
-    throw FormatError(path_, name,
-                      fmt::format("has shape [{}]; expected two dimensions, samples x {} channels",
-                                  fmt::join(shape, " x "), columns));
-  }
+  if (shape.size() != 2 || shape[1] != columns)
+    fail_format(path_, name, "has shape [{}]; expected two dimensions, samples x {} channels",
+                fmt::join(shape, " x "), columns);
   return {name, read_scaling(name, columns), shape[0]};
 }
 
@@ -172,9 +158,9 @@ void Hdf5LogReader::check_excitation_length(const LogRun& run, const Dataset& ex
   if (excitation.rows == period || (excitation.rows == run.samples && excitation.rows > period)) {
     return;
   }
-  throw FormatError(path_, excitation.name,
-                    fmt::format("has {}; expected one period ({}) or the length of the run ({})",
-                                counted(excitation.rows, "row"), period, run.samples));
+  fail_format(path_, excitation.name,
+              "has {}; expected one period ({}) or the length of the run ({})",
+              counted(excitation.rows, "row"), period, run.samples);
 }
 
 void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
@@ -257,11 +243,9 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
                                      const Eigen::MatrixXd& period) const {
   constexpr double kTolerance = 1e-9;  // of the peak: rounding of the writer, not drift
   const auto rows = static_cast<std::uint64_t>(period.rows());
-  if (dataset.rows % rows != 0) {
-    throw FormatError(path_, dataset.name,
-                      fmt::format("run {}: {} rows are not a whole number of periods of {}",
-                                  run.name, dataset.rows, rows));
-  }
+  if (dataset.rows % rows != 0)
+    fail_format(path_, dataset.name, "run {}: {} rows are not a whole number of periods of {}",
+                run.name, dataset.rows, rows);
   if (period.size() == 0) return;
   const double peak = period.cwiseAbs().maxCoeff();
   const double tolerance = kTolerance * peak;
@@ -284,12 +268,12 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
     Eigen::Index column = 0;
     const double largest =
         (later.row(row) - row_of(period, row, ahead)).cwiseAbs().maxCoeff(&column);
-    throw FormatError(path_, dataset.name,
-                      fmt::format("is not periodic: row {} of '{}' differs from the first period "
-                                  "by {:.3g} (peak {:.3g}); check period_samples ({})",
-                                  first + static_cast<std::uint64_t>(row),
-                                  info_.excitation.names[static_cast<std::size_t>(column)], largest,
-                                  peak, info_.period_samples));
+    fail_format(path_, dataset.name,
+                "is not periodic: row {} of '{}' differs from the first period by {:.3g} (peak "
+                "{:.3g}); check period_samples ({})",
+                first + static_cast<std::uint64_t>(row),
+                info_.excitation.names[static_cast<std::size_t>(column)], largest, peak,
+                info_.period_samples);
   }
 }
 

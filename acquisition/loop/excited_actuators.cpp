@@ -1,8 +1,6 @@
 #include "acquisition/loop/excited_actuators.hpp"
 
-#include <fmt/format.h>
-
-#include <stdexcept>
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -11,8 +9,8 @@ std::vector<int> excited_actuators(const ExperimentSpec& experiment, const Stage
   for (const ExcitationAxis& axis : experiment.axes) {
     const int index = channel_index(stage.actuators, axis.channel);
     if (index < 0)
-      throw std::invalid_argument(fmt::format(
-          "axes: unknown actuator '{}'; use an actuator of stage '{}'", axis.channel, stage.name));
+      fail_request("axes: unknown actuator '{}'; use an actuator of stage '{}'", axis.channel,
+                   stage.name);
     indices.push_back(index);
   }
   return indices;

@@ -1,7 +1,5 @@
 #include "acquisition/loop/measurement_loop.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "hal/stage/pacer.hpp"
 
 namespace stageid {
@@ -44,18 +43,15 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
         "loop: ramp_s, jitter_s, jitter_rms_s and misses_allowed must be 0 or more");
   }
   if (static_cast<std::size_t>(controller.sensors()) != sensors ||
-      static_cast<std::size_t>(controller.actuators()) != actuators) {
-    throw std::invalid_argument(
-        fmt::format("loop: the controller has {} sensors and {} actuators, the stage {} and {}",
-                    controller.sensors(), controller.actuators(), sensors, actuators));
-  }
+      static_cast<std::size_t>(controller.actuators()) != actuators)
+    fail_request("loop: the controller has {} sensors and {} actuators, the stage {} and {}",
+                 controller.sensors(), controller.actuators(), sensors, actuators);
   stamps_ = ring.row_words() == actuators + sensors + 2;
-  if ((ring.row_words() != actuators + sensors + 1 && !stamps_) || sensors > 64) {
-    throw std::invalid_argument(fmt::format(
+  if ((ring.row_words() != actuators + sensors + 1 && !stamps_) || sensors > 64)
+    fail_request(
         "loop: a row has {} words for {} actuators, {} sensors (at most 64), a stamp word if there "
         "are any, and a status word",
-        ring.row_words(), actuators, sensors));
-  }
+        ring.row_words(), actuators, sensors);
   ramp_samples_ = static_cast<std::uint64_t>(std::llround(options.ramp_s * info.sample_rate_hz));
   hold_ = options.between_runs == BetweenRuns::hold;
   wall_clock_ = info.clock == Clock::wall;
@@ -79,9 +75,8 @@ PreparedExcitation MeasurementLoop::prepare(const LoopExcitation& excitation) co
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     const int actuator = excitation.actuators[static_cast<std::size_t>(c)];
-    if (actuator < 0 || static_cast<std::size_t>(actuator) >= u_.size()) {
-      throw std::invalid_argument(fmt::format("loop: unknown actuator number {}", actuator));
-    }
+    if (actuator < 0 || static_cast<std::size_t>(actuator) >= u_.size())
+      fail_request("loop: unknown actuator number {}", actuator);
     if (period.col(c).isZero(0.0)) continue;
     out.actuators.push_back(static_cast<std::size_t>(actuator));
     columns.push_back(c);

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/loop/event_recorder.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
 #include "acquisition/loop/log_thread.hpp"
@@ -373,17 +374,15 @@ class Experiment {
 LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
                             std::string metadata_json) {
   const double rate_hz = plan.grid().sample_rate_hz();
-  if (std::abs(rate_hz - stage.sample_rate_hz) > 1e-9 * stage.sample_rate_hz) {
-    throw std::invalid_argument(
-        fmt::format("experiment: designed for {} Hz, but the stage runs at {} Hz; give both the "
-                    "same sample_rate_hz",
-                    rate_hz, stage.sample_rate_hz));
-  }
-  if (stage.maximum_rate_hz > 0.0 && rate_hz > stage.maximum_rate_hz) {
-    throw std::invalid_argument(fmt::format(
+  if (std::abs(rate_hz - stage.sample_rate_hz) > 1e-9 * stage.sample_rate_hz)
+    fail_request(
+        "experiment: designed for {} Hz, but the stage runs at {} Hz; give both the same "
+        "sample_rate_hz",
+        rate_hz, stage.sample_rate_hz);
+  if (stage.maximum_rate_hz > 0.0 && rate_hz > stage.maximum_rate_hz)
+    fail_request(
         "experiment: {} Hz exceeds the stage's maximum sample rate of {} Hz; lower sample_rate_hz",
-        rate_hz, stage.maximum_rate_hz));
-  }
+        rate_hz, stage.maximum_rate_hz);
   LogInfo info;
   info.sample_rate_hz = rate_hz;
   info.period_samples = plan.grid().samples_per_period();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_format.hpp"
@@ -191,10 +192,10 @@ ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentSta
         "experiment_log_info()");
   const auto samples = static_cast<std::uint64_t>(plan.samples_per_run());
   if (samples > stage.depth_samples())
-    throw std::invalid_argument(
-        fmt::format("experiment: {} samples per run, but stage '{}' records at most {}; lower the "
-                    "number of periods",
-                    samples, stage.info().name, stage.depth_samples()));
+    fail_request(
+        "experiment: {} samples per run, but stage '{}' records at most {}; lower the number of "
+        "periods",
+        samples, stage.info().name, stage.depth_samples());
   return ResidentExperiment(plan, stage, log, options).perform();
 }
 

@@ -1,10 +1,8 @@
 #include "acquisition/prediction/limited_excitation.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "hal/stage/motion_controller.hpp"
@@ -29,9 +27,8 @@ std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInf
   const std::vector<int> excited = excited_actuators(experiment, stage);
   for (std::size_t axis = 0; axis < excited.size(); ++axis)
     if (!prior.actuator_known[static_cast<std::size_t>(excited[axis])])
-      throw std::invalid_argument(
-          fmt::format("prior: does not contain the axis '{}'; measure a pilot with all axes",
-                      experiment.axes[axis].channel));
+      fail_request("prior: does not contain the axis '{}'; measure a pilot with all axes",
+                   experiment.axes[axis].channel);
   return {excited.begin(), excited.end()};
 }
 
@@ -43,8 +40,8 @@ std::vector<Index> outputs_of(const std::vector<std::string>& names, const Stage
   for (const std::string& name : names) {
     const int index = channel_index(stage.sensors, name);
     if (index < 0 || !prior.sensor_known[static_cast<std::size_t>(index)])
-      throw std::invalid_argument(fmt::format(
-          "prior: does not contain the output '{}'; measure a pilot with all outputs", name));
+      fail_request("prior: does not contain the output '{}'; measure a pilot with all outputs",
+                   name);
     indices.push_back(index);
   }
   return indices;
@@ -164,9 +161,8 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Stage
   u.peak_limit = limit_of(stage.limits.actuator_n, i) - std::abs(bias);
   const double rms = limit_of(stage.limits.thermal_rms_n, i);
   if (!(u.peak_limit > 0.0) || !(rms > std::abs(bias)))
-    throw std::invalid_argument(
-        fmt::format("the feed-forward of '{}' alone, {} {}, reaches a limit; lower it",
-                    channel.name, bias, channel.unit));
+    fail_request("the feed-forward of '{}' alone, {} {}, reaches a limit; lower it", channel.name,
+                 bias, channel.unit);
   u.rms_limit = std::sqrt(rms * rms - bias * bias);
   u.rms_time_constant_s = stage.limits.thermal_time_constant_s;
   u.reserve = reserve_of(transfers.u_noise, i);

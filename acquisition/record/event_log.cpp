@@ -8,7 +8,7 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/record/utc_time.hpp"
@@ -32,8 +32,7 @@ std::string line_of(std::string_view event, const std::vector<EventField>& field
 
 EventLog::EventLog(const std::filesystem::path& file)
     : path_(file), file_(std::fopen(file.c_str(), "ae"), &std::fclose) {
-  if (!file_)
-    throw FileError(fmt::format("{}: cannot be written: {}", file.string(), system_reason(errno)));
+  if (!file_) fail_file(file, "cannot be written: {}", system_reason(errno));
 }
 
 void EventLog::write(std::string_view event, const std::vector<EventField>& fields) noexcept {

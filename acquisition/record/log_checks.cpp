@@ -1,14 +1,12 @@
 #include "acquisition/record/log_checks.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -20,43 +18,33 @@ void check_runs(const std::filesystem::path& file, const LogInfo& info,
   for (const LogRun& run : runs) {
     if (!run.complete) continue;
     const std::string place = "/runs/" + run.name;
-    if (run.samples % period != 0 || run.samples / period <= transient) {
-      throw FormatError(
-          file, place,
-          fmt::format("has {}; expected {} and at least one further period of {} each",
-                      counted(run.samples, "sample"), counted(transient, "transient period"),
-                      counted(period, "sample")));
-    }
-    if (run.realization < 0 || run.experiment < 0) {
-      throw FormatError(file, place,
-                        fmt::format("is realization {}, experiment {}; both must be 0 or more",
-                                    run.realization, run.experiment));
-    }
+    if (run.samples % period != 0 || run.samples / period <= transient)
+      fail_format(file, place, "has {}; expected {} and at least one further period of {} each",
+                  counted(run.samples, "sample"), counted(transient, "transient period"),
+                  counted(period, "sample"));
+    if (run.realization < 0 || run.experiment < 0)
+      fail_format(file, place, "is realization {}, experiment {}; both must be 0 or more",
+                  run.realization, run.experiment);
     const auto [other, is_new] = seen.insert({{run.realization, run.experiment}, run.name});
-    if (!is_new) {
-      throw FormatError(
-          file, place,
-          fmt::format(
-              "duplicate realization {}, experiment {}, also in run {}; keep one of the two",
-              run.realization, run.experiment, other->second));
-    }
+    if (!is_new)
+      fail_format(file, place,
+                  "duplicate realization {}, experiment {}, also in run {}; keep one of the two",
+                  run.realization, run.experiment, other->second);
   }
 }
 
 void check_run_index(const std::filesystem::path& file, const std::vector<LogRun>& runs,
                      std::size_t run) {
   if (run < runs.size()) return;
-  throw std::invalid_argument(
-      fmt::format("{}: run {} is out of range; the log has {} runs, counted from 0", file.string(),
-                  run, runs.size()));
+  fail_request("{}: run {} is out of range; the log has {} runs, counted from 0", file.string(),
+               run, runs.size());
 }
 
 void check_row_range(const std::filesystem::path& file, const LogRun& run, std::uint64_t first,
                      std::uint64_t count) {
   if (first <= run.samples && count <= run.samples - first) return;
-  throw std::invalid_argument(
-      fmt::format("{}: {} rows from row {} of run {} are out of range; the run has {} rows",
-                  file.string(), count, first, run.name, run.samples));
+  fail_request("{}: {} rows from row {} of run {} are out of range; the run has {} rows",
+               file.string(), count, first, run.name, run.samples);
 }
 
 void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out) {
@@ -73,11 +61,10 @@ void throw_not_finite(const std::filesystem::path& file, const LogInfo& info, co
                          const ChannelList& channels) {
     for (Eigen::Index c = 0; c < columns.cols(); ++c)
       if (!std::isfinite(columns(row, c)))
-        throw FormatError(
+        fail_format(
             file, "/runs/" + run.name,
-            fmt::format(
-                "row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
-                first + static_cast<std::uint64_t>(row), kind, channels.name(c)));
+            "row {} of {} '{}' is not finite; mark or repair the sample, or exclude the run",
+            first + static_cast<std::uint64_t>(row), kind, channels.name(c));
   };
   for (Eigen::Index row = from; row < from + count; ++row) {
     check(row, samples.actuators, "actuator", info.actuators);

@@ -11,10 +11,9 @@
 #include <cerrno>
 #include <chrono>
 #include <random>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/slog/crc32c.hpp"
@@ -27,8 +26,7 @@ constexpr std::array<std::byte, kSlogAlignment> kZeros{};
 
 void lock(const FileDescriptor& file, const std::filesystem::path& path) {
   if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) return;
-  throw FileError(fmt::format("{}: another process is writing this log; wait until it has ended",
-                              path.string()));
+  fail_file(path, "another process is writing this log; wait until it has ended");
 }
 
 /// Makes the directory entry of a new file durable. Failures are ignored: some file systems cannot.
@@ -67,30 +65,25 @@ SlogAppender SlogAppender::create(const std::filesystem::path& file) {
 
 SlogAppender SlogAppender::open_existing(const std::filesystem::path& file) {
   FileDescriptor descriptor(::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
-  if (!descriptor)
-    throw FileError(
-        fmt::format("{}: cannot be opened for writing: {}", file.string(), system_reason(errno)));
+  if (!descriptor) fail_file(file, "cannot be opened for writing: {}", system_reason(errno));
   lock(descriptor, file);
   return {file, std::move(descriptor), 0};
 }
 
 void SlogAppender::continue_at(std::uint64_t bytes, std::uint32_t log_id,
                                std::uint64_t next_sequence) {
-  if (::ftruncate(file_.get(), static_cast<off_t>(bytes)) != 0) {
-    throw FileError(fmt::format("{}: cannot be truncated to its intact {} bytes: {}",
-                                path_.string(), bytes, system_reason(errno)));
-  }
+  if (::ftruncate(file_.get(), static_cast<off_t>(bytes)) != 0)
+    fail_file(path_, "cannot be truncated to its intact {} bytes: {}", bytes, system_reason(errno));
   bytes_ = written_back_ = bytes;
   log_id_ = log_id;
   next_sequence_ = next_sequence;
 }
 
 void SlogAppender::append(SlogBlockHeader header, std::span<const std::byte> payload) {
-  if (payload.size() > kSlogLargestPayload) {
-    throw std::invalid_argument(fmt::format(
-        "{}: a {} block of {} bytes exceeds the maximum of {} bytes", path_.string(),
-        to_string(static_cast<SlogBlockType>(header.type)), payload.size(), kSlogLargestPayload));
-  }
+  if (payload.size() > kSlogLargestPayload)
+    fail_request("{}: a {} block of {} bytes exceeds the maximum of {} bytes", path_.string(),
+                 to_string(static_cast<SlogBlockType>(header.type)), payload.size(),
+                 kSlogLargestPayload);
   const std::size_t padding = slog_padded(payload.size()) - payload.size();
   header.log_id = log_id_;
   header.sequence = next_sequence_;
@@ -146,11 +139,10 @@ void SlogAppender::fail(int error) {
   error_ = error;
   // Readers would take a partial block for damage.
   const bool cut = is_open() && ::ftruncate(file_.get(), static_cast<off_t>(bytes_)) == 0;
-  throw FileError(fmt::format("{}: cannot be written: {}; {} ({} bytes) written earlier {} kept{}",
-                              shown_name(path_).string(), system_reason(error),
-                              counted(next_sequence_, "block"), bytes_,
-                              next_sequence_ == 1 ? "is" : "are",
-                              cut ? "" : ", possibly followed by part of another block"));
+  fail_file(shown_name(path_), "cannot be written: {}; {} ({} bytes) written earlier {} kept{}",
+            system_reason(error), counted(next_sequence_, "block"), bytes_,
+            next_sequence_ == 1 ? "is" : "are",
+            cut ? "" : ", possibly followed by part of another block");
 }
 
 // Rows written to a removed file would be lost.
@@ -158,10 +150,9 @@ void SlogAppender::require_name() {
   struct stat status {};
   if (::fstat(file_.get(), &status) != 0 || status.st_nlink > 0) return;
   error_ = ENOENT;
-  throw FileError(
-      fmt::format("{}: the file or its directory was removed during the run; the data are lost. "
-                  "Measure again, and keep the directory until the run has ended",
-                  path_.string()));
+  fail_file(path_,
+            "the file or its directory was removed during the run; the data are lost. Measure "
+            "again, and keep the directory until the run has ended");
 }
 
 void SlogAppender::synchronize() {
@@ -169,9 +160,8 @@ void SlogAppender::synchronize() {
   if (::fdatasync(file_.get()) == 0 || errno == EINVAL || errno == EROFS) return;
   const int error = errno;
   error_ = error;
-  throw FileError(fmt::format(
-      "{}: cannot be flushed to disk: {}; data written since the last flush may be lost",
-      path_.string(), system_reason(error)));
+  fail_file(path_, "cannot be flushed to disk: {}; data written since the last flush may be lost",
+            system_reason(error));
 }
 
 void SlogAppender::close() {

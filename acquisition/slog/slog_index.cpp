@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -33,10 +33,10 @@ SlogBlock SlogStretch::read_block(const SlogSource& source, std::uint64_t row) c
   if (!slog_header_intact(block.header) ||
       block.header.first_row != first.header.first_row + n * first.header.rows ||
       block.header.rows != first.header.rows || block.header.cols != first.header.cols)
-    throw FormatError(source.path(), "",
-                      fmt::format("the block at byte {} was changed while the log was read; use "
-                                  "'stageid log recover' to copy the intact parts",
-                                  block.offset));
+    fail_format(source.path(), "",
+                "the block at byte {} was changed while the log was read; use 'stageid log "
+                "recover' to copy the intact parts",
+                block.offset);
   return block;
 }
 
@@ -127,17 +127,15 @@ class SlogIndexer::Step {
         index_.end = parse_end(read_text(source_, block));
         return;
     }
-    throw std::invalid_argument(fmt::format("has the unknown type {}", block.header.type));
+    fail_request("has the unknown type {}", block.header.type);
   }
 
   void begin_run(const SlogBlock& block) {
     close_run();
     SlogRunBegin begin = parse_run_begin(read_text(source_, block));
     check_run_begin(begin, index_.info);
-    if (block.header.run < index_.runs.size()) {
-      throw std::invalid_argument(
-          fmt::format("is a duplicate start of run {}", slog_run_name(block.header.run)));
-    }
+    if (block.header.run < index_.runs.size())
+      fail_request("is a duplicate start of run {}", slog_run_name(block.header.run));
     SlogRunIndex run;
     run.run = begin;
     run.run.name = slog_run_name(block.header.run);
@@ -149,10 +147,8 @@ class SlogIndexer::Step {
   }
 
   SlogRunIndex& open_run(const SlogBlock& block) {
-    if (!indexer_.open_ || block.header.run != indexer_.number_) {
-      throw std::invalid_argument(
-          fmt::format("belongs to run {}, which is not open", slog_run_name(block.header.run)));
-    }
+    if (!indexer_.open_ || block.header.run != indexer_.number_)
+      fail_request("belongs to run {}, which is not open", slog_run_name(block.header.run));
     return index_.runs.back();
   }
 
@@ -173,10 +169,8 @@ class SlogIndexer::Step {
       throw std::invalid_argument(
           "has a different number of words per row than the log has channels");
     }
-    if (header.first_row != run.run.samples) {
-      throw std::invalid_argument(
-          fmt::format("starts with row {}; expected row {}", header.first_row, run.run.samples));
-    }
+    if (header.first_row != run.run.samples)
+      fail_request("starts with row {}; expected row {}", header.first_row, run.run.samples);
     run.run.samples += header.rows;
     if (!run.samples.empty() && run.samples.back().is_continued_by(block))
       ++run.samples.back().blocks;
@@ -188,10 +182,8 @@ class SlogIndexer::Step {
     SlogRunIndex& run = open_run(block);
     const LogRun end = parse_run_end(read_text(source_, block));
     if (end.samples != run.run.samples || end.realization != run.run.realization ||
-        end.experiment != run.run.experiment) {
-      throw std::invalid_argument(
-          fmt::format("ends a run of {} rows; {} were written", end.samples, run.run.samples));
-    }
+        end.experiment != run.run.experiment)
+      fail_request("ends a run of {} rows; {} were written", end.samples, run.run.samples);
     if (end.complete && !run.excitation && !run.excitation_columns.empty()) {
       throw std::invalid_argument("the run's excitation is missing");
     }
@@ -250,11 +242,9 @@ std::string slog_run_name(std::size_t index) { return fmt::format("{:04}", index
 
 Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& info,
                                      const SlogRunIndex& run) {
-  if (!run.excitation && !run.excitation_columns.empty()) {
-    throw FormatError(
-        source.path(), "",
-        fmt::format("the excitation of run {} is missing; exclude this run", run.run.name));
-  }
+  if (!run.excitation && !run.excitation_columns.empty())
+    fail_format(source.path(), "", "the excitation of run {} is missing; exclude this run",
+                run.run.name);
   Eigen::MatrixXd excitation =
       Eigen::MatrixXd::Zero(info.period_samples, static_cast<Eigen::Index>(info.excitation.size()));
   if (!run.excitation) return excitation;
@@ -264,11 +254,9 @@ Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& in
     std::memcpy(excitation.col(run.excitation_columns[k]).data(), payload.data() + k * column_bytes,
                 column_bytes);
   }
-  if (!excitation.allFinite()) {
-    throw FormatError(
-        source.path(), "",
-        fmt::format("the excitation of run {} contains a non-finite value", run.run.name));
-  }
+  if (!excitation.allFinite())
+    fail_format(source.path(), "", "the excitation of run {} contains a non-finite value",
+                run.run.name);
   return excitation;
 }
 

@@ -1,10 +1,10 @@
 #include "acquisition/slog/slog_json.hpp"
-#include "acquisition/files/json_text.hpp"
-
-#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include "acquisition/files/fail.hpp"
+#include "acquisition/files/json_text.hpp"
 
 namespace stageid {
 
@@ -27,7 +27,7 @@ auto parse(std::string_view text, const char* what, Read read) {
   try {
     return read(parse_json<Json>(text));
   } catch (const Json::exception&) {  // discarded, too
-    throw std::invalid_argument(fmt::format("the {} is invalid", what));
+    fail_request("the {} is invalid", what);
   }
 }
 
@@ -56,8 +56,7 @@ TimingHistogram histogram_of(const Json& json) {
     const auto lower = bin.at(0).get<std::uint64_t>();
     if (lower > 0xFFFF'FFFF || TimingHistogram::lower_ns(TimingHistogram::bin_of(
                                    static_cast<std::uint32_t>(lower))) != lower)
-      throw std::invalid_argument(
-          fmt::format("end of a run: invalid bin edge of a timing histogram: {} ns", lower));
+      fail_request("end of a run: invalid bin edge of a timing histogram: {} ns", lower);
     histogram.add_bin(TimingHistogram::bin_of(static_cast<std::uint32_t>(lower)),
                       bin.at(2).get<std::uint64_t>());
   }

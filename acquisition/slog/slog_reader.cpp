@@ -1,12 +1,10 @@
 #include "acquisition/slog/slog_reader.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstring>
 #include <memory>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/record/log_checks.hpp"
 #include "acquisition/record/row_transpose.hpp"
 #include "acquisition/slog/crc32c.hpp"
@@ -36,10 +34,9 @@ SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
   scan();
   if (damaged_is_error && !damage().empty()) {
     const LogDamage first = damage().front();
-    throw FormatError(
-        file, "",
-        fmt::format("damaged at byte {}: {}; use 'stageid log recover' to copy the intact parts",
-                    first.offset, first.what));
+    fail_format(file, "",
+                "damaged at byte {}: {}; use 'stageid log recover' to copy the intact parts",
+                first.offset, first.what);
   }
   if (damaged_is_error && !end()) {
     throw FormatError(file, "",
@@ -139,13 +136,12 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
                        static_cast<Eigen::Index>(to), static_cast<Eigen::Index>(count));
     }
   }
-  if (done < padded || crc != block.header.payload_crc) {
-    throw FormatError(path(), "",
-                      fmt::format("run {}, rows {} to {}: the payload of {} is damaged; use "
-                                  "'stageid log recover' to copy the intact parts",
-                                  run.run.name, block.header.first_row,
-                                  block.header.first_row + block.header.rows - 1, describe(block)));
-  }
+  if (done < padded || crc != block.header.payload_crc)
+    fail_format(path(), "",
+                "run {}, rows {} to {}: the payload of {} is damaged; use 'stageid log recover' to "
+                "copy the intact parts",
+                run.run.name, block.header.first_row,
+                block.header.first_row + block.header.rows - 1, describe(block));
 }
 
 }  // namespace stageid

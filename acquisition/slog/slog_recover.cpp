@@ -1,14 +1,12 @@
 #include "acquisition/slog/slog_recover.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/slog/slog_appender.hpp"
 #include "acquisition/slog/slog_index.hpp"
@@ -250,11 +248,9 @@ class Recovery {
 
 RecoverReport recover_log(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code ignored;
-  if (std::filesystem::equivalent(from, to, ignored)) {
-    throw std::invalid_argument(fmt::format(
-        "{}: input and output are the same file; write the recovered log to another file",
-        from.string()));
-  }
+  if (std::filesystem::equivalent(from, to, ignored))
+    fail_request("{}: input and output are the same file; write the recovered log to another file",
+                 from.string());
   const SlogSource source(from);
   OutputFile output(to);
   std::filesystem::remove(output.path(), ignored);  // the appender requires a new file

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/slog/crc32c.hpp"
 
@@ -73,12 +73,10 @@ class ScanStep {
       wrong = "a block header is damaged";
       return std::nullopt;
     }
-    if (block.header.version != kSlogVersion) {
-      throw FormatError(
-          source_.path(), "",
-          fmt::format("has unsupported format version {}; this program reads version {}",
-                      block.header.version, kSlogVersion));
-    }
+    if (block.header.version != kSlogVersion)
+      fail_format(source_.path(), "",
+                  "has unsupported format version {}; this program reads version {}",
+                  block.header.version, kSlogVersion);
     if (log_id_ && block.header.log_id != *log_id_) {
       wrong = "a block belongs to another log";
       return std::nullopt;
@@ -203,21 +201,18 @@ SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
   note_input(path_);
   file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (!file_ || ::fstat(file_.get(), &status) != 0) {
-    throw FileError(fmt::format("{}: cannot be opened: {}; check the path", path_.string(),
-                                std::error_code(errno, std::generic_category()).message()));
-  }
-  if (!S_ISREG(status.st_mode)) {
-    throw FileError(fmt::format("{}: is not a regular file; give a log file", path_.string()));
-  }
+  if (!file_ || ::fstat(file_.get(), &status) != 0)
+    fail_file(path_, "cannot be opened: {}; check the path",
+              std::error_code(errno, std::generic_category()).message());
+  if (!S_ISREG(status.st_mode)) fail_file(path_, "is not a regular file; give a log file");
   bytes_ = static_cast<std::uint64_t>(status.st_size);
 }
 
 void SlogSource::update_bytes() {
   struct stat status {};
   if (::fstat(file_.get(), &status) != 0)
-    throw FileError(fmt::format("{}: cannot be read: {}", path_.string(),
-                                std::error_code(errno, std::generic_category()).message()));
+    fail_file(path_, "cannot be read: {}",
+              std::error_code(errno, std::generic_category()).message());
   bytes_ = static_cast<std::uint64_t>(status.st_size);
 }
 
@@ -226,12 +221,10 @@ void SlogSource::read(std::uint64_t offset, void* to, std::size_t size) const {
   while (size > 0) {
     const ssize_t count = ::pread(file_.get(), at, size, static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      throw FileError(fmt::format("{}: cannot be read at byte {}: {}", path_.string(), offset,
-                                  count < 0
-                                      ? std::error_code(errno, std::generic_category()).message()
-                                      : std::string("the file was truncated while it was read")));
-    }
+    if (count <= 0)
+      fail_file(path_, "cannot be read at byte {}: {}", offset,
+                count < 0 ? std::error_code(errno, std::generic_category()).message()
+                          : std::string("the file was truncated while it was read"));
     at += count;
     offset += static_cast<std::uint64_t>(count);
     size -= static_cast<std::size_t>(count);

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/slog/slog_appender.hpp"
 #include "acquisition/slog/slog_index.hpp"
 #include "acquisition/slog/slog_json.hpp"
@@ -29,17 +29,15 @@ std::filesystem::path save_tail(const SlogSource& source, std::uint64_t offset) 
     saved += attempt == 1 ? std::string(".damaged") : fmt::format(".damaged.{}", attempt);
     out = FileDescriptor(::open(saved.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
     if (!out && errno != EEXIST)
-      throw FileError(
-          fmt::format("{}: cannot be created to keep the damaged end of the log; make "
-                      "the directory writable",
-                      saved.string()));
+      fail_file(
+          saved,
+          "cannot be created to keep the damaged end of the log; make the directory writable");
   }
   source.read_pieces(offset, source.bytes(), [&](std::span<const std::byte> piece) {
     if (!write_whole(out, {reinterpret_cast<const char*>(piece.data()), piece.size()}))
-      throw FileError(fmt::format("{}: cannot be written; free some space", saved.string()));
+      fail_file(saved, "cannot be written; free some space");
   });
-  if (::fsync(out.get()) != 0)
-    throw FileError(fmt::format("{}: cannot be flushed to disk; check the disk", saved.string()));
+  if (::fsync(out.get()) != 0) fail_file(saved, "cannot be flushed to disk; check the disk");
   return saved;
 }
 
@@ -48,10 +46,10 @@ std::uint64_t intact_bytes(const SlogSource& source, const SlogScan& scan, const
   const std::uint64_t end = scan.blocks.back().end();
   const bool only_tail = index.damage.empty() || index.damage.front().offset >= end;
   if (only_tail) return end;
-  throw FormatError(source.path(), "",
-                    fmt::format("damaged at byte {} but intact after it: {}; run 'stageid log "
-                                "recover' to write a new file, then resume that file",
-                                index.damage.front().offset, index.damage.front().what));
+  fail_format(source.path(), "",
+              "damaged at byte {} but intact after it: {}; run 'stageid log recover' to write a "
+              "new file, then resume that file",
+              index.damage.front().offset, index.damage.front().what);
 }
 
 }  // namespace
@@ -70,7 +68,7 @@ struct SlogWriter::State {
   }
   LogRun& run(const char* caller) {
     if (open_run) return *open_run;
-    throw std::invalid_argument(fmt::format("SlogWriter: {} before begin_run", caller));
+    fail_request("SlogWriter: {} before begin_run", caller);
   }
 };
 
@@ -120,12 +118,11 @@ void SlogWriter::begin_run(const LogRun& run, const Eigen::Ref<const Eigen::Matr
   if (state.open_run) throw std::invalid_argument("SlogWriter: begin_run inside a run");
   if (excitation.rows() != state.info.period_samples ||
       excitation.cols() != static_cast<Eigen::Index>(state.info.excitation.size()) ||
-      !excitation.allFinite()) {
-    throw std::invalid_argument(fmt::format(
+      !excitation.allFinite())
+    fail_request(
         "SlogWriter: the excitation is {} x {}; expected one period, {} x {}, of finite numbers",
         excitation.rows(), excitation.cols(), state.info.period_samples,
-        state.info.excitation.size()));
-  }
+        state.info.excitation.size());
   SlogRunBegin begin{run, {}};
   std::vector<double> stored;
   for (Eigen::Index column = 0; column < excitation.cols(); ++column) {
@@ -149,11 +146,9 @@ void SlogWriter::write(std::span<const double> rows) {
   State& state = *state_;
   LogRun& run = state.run("write");
   if (rows.empty()) return;
-  if (rows.size() % state.row_words() != 0) {
-    throw std::invalid_argument(
-        fmt::format("SlogWriter: {} words are not a whole number of rows of {}", rows.size(),
-                    state.row_words()));
-  }
+  if (rows.size() % state.row_words() != 0)
+    fail_request("SlogWriter: {} words are not a whole number of rows of {}", rows.size(),
+                 state.row_words());
   SlogBlockHeader header = state.header(SlogBlockType::samples);
   header.cols = state.row_words();
   header.rows = static_cast<std::uint32_t>(rows.size() / state.row_words());

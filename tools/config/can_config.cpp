@@ -1,11 +1,10 @@
 #include "tools/config/can_config.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "hal/can/can_zeromq.hpp"
 
 namespace stageid {
@@ -40,8 +39,8 @@ std::vector<int> channel_numbers(const std::vector<std::string>& names,
   for (const std::string& name : names) {
     const int index = channel_index(channels, name);
     if (index < 0)
-      throw std::invalid_argument(fmt::format(
-          "can: bus {}: unknown channel '{}'; use a channel name of this file", interface, name));
+      fail_request("can: bus {}: unknown channel '{}'; use a channel name of this file", interface,
+                   name);
     numbers.push_back(index);
   }
   return numbers;
@@ -52,12 +51,10 @@ std::vector<double> ranges(const std::vector<double>& given, const Eigen::Vector
   if (given.size() == channels) return given;
   if (given.size() == 1) return std::vector<double>(channels, given.front());
   if (!given.empty())
-    throw std::invalid_argument(
-        fmt::format("can: {}: got {} entries for {} channels; write 1 or {}", key, given.size(),
-                    channels, channels));
+    fail_request("can: {}: got {} entries for {} channels; write 1 or {}", key, given.size(),
+                 channels, channels);
   if (limits.size() != static_cast<Eigen::Index>(channels) || !limits.allFinite())
-    throw std::invalid_argument(fmt::format(
-        "can: {}: no default, because a limit is missing or infinite; add the key", key));
+    fail_request("can: {}: no default, because a limit is missing or infinite; add the key", key);
   const Eigen::VectorXd scaled = kRangePerLimit * limits;
   return {scaled.begin(), scaled.end()};
 }
@@ -103,20 +100,20 @@ CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLi
         "can: clock: node needs the wall clock; set pace: 1, or clock: host");
   const double pause_s = can_longest_pause_s(spec, info);
   if (file.watchdog_s > 0.0 && file.watchdog_s < pause_s && config.mode == CanMode::streaming)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "can: watchdog_s: {:.4g} s is too short: the node would stop the stage before a lost frame "
         "is replaced. Use more than {:.4g} s{}",
         file.watchdog_s, pause_s,
-        info.clock == Clock::wall ? "" : ", or a shorter reply_timeout_s"));
+        info.clock == Clock::wall ? "" : ", or a shorter reply_timeout_s");
   spec.watchdog_s = file.watchdog_s > 0.0
                         ? file.watchdog_s
                         : std::max(kLeastWatchdog_s, pause_s + 1.0 / info.sample_rate_hz);
   const bool only = file.buses.size() == 1;
   for (const CanFile::Bus& bus : file.buses)
     if (is_zeromq(bus.spec.interface) && (config.mode != CanMode::resident || !only))
-      throw std::invalid_argument(fmt::format(
+      fail_request(
           "can: bus {}: ZeroMQ carries resident experiments over a single bus; set mode: resident",
-          bus.spec.interface));
+          bus.spec.interface);
   for (const CanFile::Bus& bus : file.buses) {
     CanBusSpec complete = bus.spec;
     complete.actuators = channel_numbers(bus.actuators, info.actuators, only, bus.spec.interface);

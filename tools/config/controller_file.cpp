@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/file/frf_file.hpp"
@@ -192,10 +192,9 @@ NominalStage read_controller_file(const YamlDocument& document) {
     const auto y = positions_in(stage.sensors, nominal.sensors, &missing);
     const auto u = positions_in(stage.actuators, nominal.actuators, &missing);
     if (!missing.empty())
-      throw FormatError(document.file(), "",
-                        fmt::format("stage: {} has no channel '{}'; use the names of the stage "
-                                    "file",
-                                    f.stage, missing));
+      fail_format(document.file(), "",
+                  "stage: {} has no channel '{}'; use the names of the stage file", f.stage,
+                  missing);
     nominal.rigid_body = [stage, y, u](double hz) {
       return Eigen::MatrixXcd(stage.rigid_body(hz)(y, u));
     };

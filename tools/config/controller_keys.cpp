@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -77,8 +77,8 @@ std::vector<Index> positions(const std::vector<std::string>& names,
   for (const std::string& name : names) {
     const int index = channel_index(channels, name);
     if (index < 0)
-      throw std::invalid_argument(fmt::format(
-          "controller: the stage has no channel '{}'; use the names of the stage file", name));
+      fail_request("controller: the stage has no channel '{}'; use the names of the stage file",
+                   name);
     out.push_back(index);
   }
   return out;

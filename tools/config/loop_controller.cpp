@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/config/controller_file.hpp"
 #include "tools/config/yaml_document.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -21,10 +21,10 @@ constexpr double kSameRate = 1e-9;
 
 void require_rate(const std::filesystem::path& file, double have_hz, double wanted_hz) {
   if (std::abs(have_hz - wanted_hz) > kSameRate * wanted_hz)
-    throw FormatError(file, "",
-                      fmt::format("the controller is discrete at {} Hz, the stage runs at {} Hz. "
-                                  "Discretize it at the sample rate of the stage",
-                                  have_hz, wanted_hz));
+    fail_format(file, "",
+                "the controller is discrete at {} Hz, the stage runs at {} Hz. Discretize it at "
+                "the sample rate of the stage",
+                have_hz, wanted_hz);
 }
 
 const NamedArray* find_matrix(const ArrayList& list, const std::string& lower,
@@ -38,10 +38,9 @@ std::vector<double> matrix_in(const ArrayList& list, const char* name, const Nam
                               std::size_t rows, std::size_t columns) {
   const bool same = array.shape == std::vector<std::size_t>{rows, columns};
   if (!same && (array.shape.size() > 1 || array.size() != rows * columns))
-    throw FormatError(list.file, name,
-                      fmt::format("is {}; expected {} x {}. Use the channels of the stage file, in "
-                                  "their order",
-                                  fmt::join(array.shape, " x "), rows, columns));
+    fail_format(list.file, name,
+                "is {}; expected {} x {}. Use the channels of the stage file, in their order",
+                fmt::join(array.shape, " x "), rows, columns);
   return real_values(list, array);
 }
 
@@ -77,11 +76,10 @@ Matrices packed_matrices(const ArrayList& list, const StageInfo& stage) {
   const std::size_t columns = list.arrays.size();
   const std::size_t rows = columns == 0 ? 0 : list.arrays.front().size();
   if (columns < n_y || rows != columns - n_y + n_u)
-    throw FormatError(
-        list.file, "",
-        fmt::format("the table has {} rows and {} columns; expected [A B; C D] of n + "
-                    "{} rows and n + {} columns for n states",
-                    rows, columns, n_u, n_y));
+    fail_format(list.file, "",
+                "the table has {} rows and {} columns; expected [A B; C D] of n + {} rows and n + "
+                "{} columns for n states",
+                rows, columns, n_u, n_y);
   const std::size_t n = columns - n_y;
   std::vector<std::vector<double>> table;
   for (const NamedArray& column : list.arrays) {

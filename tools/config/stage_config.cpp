@@ -1,12 +1,10 @@
 #include "tools/config/stage_config.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/limits.hpp"
@@ -44,9 +42,8 @@ int require_channel(const StageConfig& config, const std::vector<Channel>& chann
                     const std::string& name, const char* kind, const char* place) {
   const int index = channel_index(channels, name);
   if (index < 0)
-    throw FormatError(
-        config.file, "",
-        fmt::format("{}: unknown {} '{}'; use one of the names in this file", place, kind, name));
+    fail_format(config.file, "", "{}: unknown {} '{}'; use one of the names in this file", place,
+                kind, name);
   return index;
 }
 

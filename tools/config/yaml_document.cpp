@@ -14,7 +14,7 @@
 #include <sstream>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/system_reason.hpp"
@@ -226,17 +226,14 @@ void YamlDocument::fail(const YamlMark& mark, const std::string& message) const 
 }
 
 YamlDocument YamlDocument::read(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file))
-    throw FileError(fmt::format("{}: is a directory; use a YAML file", file.string()));
+  if (std::filesystem::is_directory(file)) fail_file(file, "is a directory; use a YAML file");
   note_input(file);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw FileError(fmt::format("{}: cannot be read: {}", file.string(), system_reason(errno)));
+  if (!stream) fail_file(file, "cannot be read: {}", system_reason(errno));
   std::string text(kLongestFile + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (stream.bad())
-    throw FileError(fmt::format("{}: cannot be read; check the disk", file.string()));
+  if (stream.bad()) fail_file(file, "cannot be read; check the disk");
   const bool json = text.starts_with('{') && file.extension() != ".json";  // JSON is YAML
   if (json || text.find('\0') != std::string::npos)
     if (const std::string other = other_kind(file, "a YAML file"); !other.empty())

@@ -4,16 +4,17 @@
 
 #include <charconv>
 #include <random>
-#include <stdexcept>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
 
 [[noreturn]] void refuse(const std::string& text) {
-  throw std::invalid_argument(
-      fmt::format("--dashboard: got '{}'; expected PORT (this machine only) or HOST:PORT, with a "
-                  "port from 0 to 65535",
-                  text));
+  fail_request(
+      "--dashboard: got '{}'; expected PORT (this machine only) or HOST:PORT, with a port from 0 "
+      "to 65535",
+      text);
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 #include "tools/experiment/config_plan.hpp"
 
-#include <fmt/format.h>
-
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "tools/experiment/limited_plan.hpp"
 
@@ -46,9 +44,8 @@ ExperimentPlan read_plan_of(const ExperimentConfig& config, const std::filesyste
     if (!config.limits && plan.amplitude() != wanted.amplitude()) differs = "the level";
   }
   if (differs != nullptr)
-    throw FormatError(file, "",
-                      fmt::format("differs in {} from {}; design the experiment again", differs,
-                                  config.file.string()));
+    fail_format(file, "", "differs in {} from {}; design the experiment again", differs,
+                config.file.string());
   return plan;
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/prediction/closed_loop_prediction.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/plant_prior_file.hpp"
@@ -37,8 +37,8 @@ double final_variance(const LimitedPlan& limited) {
 /// Duration in s of as many whole realizations of the plan as reach a mean relative variance.
 double duration_to_reach_s(const LimitedPlan& limited, double variance) {
   if (!(variance > 0.0) || !std::isfinite(variance))
-    throw std::invalid_argument(fmt::format(
-        "accuracy: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
+    fail_request("accuracy: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %",
+                 variance);
   const ExperimentPlan& plan = limited.design.plan;
   const double one = relative_variance(plan, limited.loop.cost) / plan.spec().periods;
   return std::ceil(one / variance) * realization_s(plan);
@@ -70,9 +70,7 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
         outline.grid(), {config.experiment, loop.cost, loop.signals, request.safety});
     return {std::move(design), std::move(loop)};
   } catch (const std::invalid_argument& error) {
-    throw FormatError(
-        config.file, "",
-        fmt::format("level.limits from {}: {}", request.prior.string(), error.what()));
+    fail_format(config.file, "", "level.limits from {}: {}", request.prior.string(), error.what());
   }
 }
 

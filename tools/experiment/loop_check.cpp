@@ -10,7 +10,7 @@
 #include <numbers>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/loop_stability.hpp"
 #include "tools/experiment/config_plan.hpp"
@@ -202,10 +202,10 @@ void require_stable_loop(const StageConfig& stage, const Console& console) {
 
 void require_stable_loop(const ExperimentConfig& config, const Console& console) {
   if (config.limits && !std::filesystem::exists(config.limits->prior))
-    throw FileError(
-        fmt::format("{}: no such file; {} designs from it. Measure a pilot with 'stageid run' and "
-                    "write this file with 'stageid frf -o'",
-                    config.limits->prior.string(), config.file.string()));
+    fail_file(config.limits->prior,
+              "no such file; {} designs from it. Measure a pilot with 'stageid run' and write this "
+              "file with 'stageid frf -o'",
+              config.file.string());
   judge(config.limits ? config.limits->prior : config.stage.file, check_loop(config), console);
 }
 
@@ -229,9 +229,8 @@ void require_within_limits(const ExperimentConfig& config, const DesignPredictio
   if (forced || violations.empty()) return;
   const std::string more =
       violations.size() == 1 ? "" : fmt::format(" (and {} more)", violations.size() - 1);
-  throw FormatError(
-      config.file, "",
-      fmt::format("{}{}; lower the level, or override with --force", violations.front(), more));
+  fail_format(config.file, "", "{}{}; lower the level, or override with --force",
+              violations.front(), more);
 }
 
 }  // namespace stageid

@@ -1,14 +1,12 @@
 #include "tools/experiment/plant_prior_file.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "estimation/modal/validation.hpp"
@@ -34,10 +32,8 @@ std::vector<Index> places(const std::filesystem::path& file, const ChannelList& 
   for (const std::string& name : channels.names) {
     const int index = channel_index(stage, name);
     if (index < 0)
-      throw FormatError(
-          file, "",
-          fmt::format("has the {0} '{1}', which the stage lacks; use a prior of this stage", kind,
-                      name));
+      fail_format(file, "", "has the {0} '{1}', which the stage lacks; use a prior of this stage",
+                  kind, name);
     indices.push_back(index);
   }
   return indices;
@@ -72,20 +68,18 @@ FrfEstimate prior_of_frf(const std::filesystem::path& file, const StageInfo& sta
   FrfEstimate frf = read_frf(file);
   if (frf.compensated != Compensation::none) frf = as_measured(std::move(frf));
   if (frf.hold != Hold::zoh || frf.sample_rate_hz != stage.sample_rate_hz)
-    throw FormatError(file, "",
-                      fmt::format("expected a response through the hold at {} Hz, got {} at {} Hz; "
-                                  "measure a pilot of this stage",
-                                  stage.sample_rate_hz,
-                                  frf.hold == Hold::zoh ? "one with hold" : "one without hold",
-                                  frf.sample_rate_hz));
+    fail_format(file, "",
+                "expected a response through the hold at {} Hz, got {} at {} Hz; measure a pilot "
+                "of this stage",
+                stage.sample_rate_hz, frf.hold == Hold::zoh ? "one with hold" : "one without hold",
+                frf.sample_rate_hz);
   const double low_hz = frequency_hz[0];
   const double high_hz = frequency_hz[frequency_hz.size() - 1];
   if (low_hz < 0.5 * frf.frequency_hz[0] || high_hz > 1.02 * frf.frequency_hz[frf.lines() - 1])
-    throw FormatError(
+    fail_format(
         file, "/frequency_hz",
-        fmt::format(
-            "{} ... {} Hz do not cover the band of {} ... {} Hz; measure a pilot on the whole band",
-            frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], low_hz, high_hz));
+        "{} ... {} Hz do not cover the band of {} ... {} Hz; measure a pilot on the whole band",
+        frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1], low_hz, high_hz);
   return frf;
 }
 

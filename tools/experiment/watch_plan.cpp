@@ -11,7 +11,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/multisine/multisine_lines.hpp"
@@ -38,10 +38,10 @@ std::vector<Index> places(const std::vector<std::string>& names,
   for (const std::string& name : names) {
     const int index = channel_index(channels, name);
     if (index < 0)
-      throw FormatError(config.file, "",
-                        fmt::format("--watch: the stage lacks the channel '{}' of the model; use a "
-                                    "model of this stage",
-                                    name));
+      fail_format(
+          config.file, "",
+          "--watch: the stage lacks the channel '{}' of the model; use a model of this stage",
+          name);
     out.push_back(index);
   }
   return out;
@@ -56,9 +56,8 @@ FrfEstimate with_outputs(const FrfEstimate& frf, const AdditiveModel& model,
   try {
     return select_channels(frf, frf.inputs.names, model.outputs.names);
   } catch (const std::invalid_argument& error) {
-    throw FormatError(
-        config.file, "",
-        fmt::format("--frf: {}; use the FRF from which the model was fitted", error.what()));
+    fail_format(config.file, "", "--frf: {}; use the FRF from which the model was fitted",
+                error.what());
   }
 }
 
@@ -69,10 +68,9 @@ FrfEstimate read_noise(const WatchRequest& request, const Eigen::VectorXd& frequ
   const double low_hz = frf.frequency_hz[0];
   const double high_hz = frf.frequency_hz[frf.lines() - 1];
   if (frequency_hz[0] < 0.98 * low_hz || frequency_hz[frequency_hz.size() - 1] > 1.02 * high_hz)
-    throw FormatError(request.frf, "/frequency_hz",
-                      fmt::format("{:.6g} ... {:.6g} Hz do not cover band_hz of the experiment; "
-                                  "narrow band_hz",
-                                  low_hz, high_hz));
+    fail_format(request.frf, "/frequency_hz",
+                "{:.6g} ... {:.6g} Hz do not cover band_hz of the experiment; narrow band_hz",
+                low_hz, high_hz);
   return frf;
 }
 
@@ -230,11 +228,9 @@ WatchPlan make_watch_plan(const ExperimentConfig& config, const WatchRequest& re
   plan.model = read_model(request.model);
   const WatchedStage stage(config, plan.model, frf, candidates.frequency_hz());
   if (stage.change(1.0).isZero(0.0))
-    throw FormatError(
-        request.model, "",
-        fmt::format("has no mode between {:.6g} and {:.6g} Hz; widen band_hz in {}",
-                    candidates.frequency_hz()[0], candidates.frequency_hz()[candidates.size() - 1],
-                    config.file.string()));
+    fail_format(request.model, "", "has no mode between {:.6g} and {:.6g} Hz; widen band_hz in {}",
+                candidates.frequency_hz()[0], candidates.frequency_hz()[candidates.size() - 1],
+                config.file.string());
   const JointDesign best = design(stage, unit_phasors(outline_plan(config).phase_rad(0)), request);
   const Eigen::MatrixXd use = stage.use_of_limits(best.r, request.rms_m);
   const std::vector<Eigen::MatrixXd> information = stage.information(best.r);

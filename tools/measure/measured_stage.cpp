@@ -5,6 +5,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/loop/run_resident.hpp"
 #include "acquisition/record/log_reader.hpp"
@@ -121,10 +122,10 @@ class ReplayLog final : public ReplaySource {
         complete[{run.realization, run.experiment}] = i;
     for (const RunId wanted : runs) {
       if (!complete.contains(wanted))
-        throw std::invalid_argument(
-            fmt::format("{}: no complete run of realization {}, experiment {}; replay the log of "
-                        "the same experiment",
-                        log_->path().string(), wanted.realization + 1, wanted.experiment + 1));
+        fail_request(
+            "{}: no complete run of realization {}, experiment {}; replay the log of the same "
+            "experiment",
+            log_->path().string(), wanted.realization + 1, wanted.experiment + 1);
       order_.push_back(complete[wanted]);
     }
   }
@@ -166,33 +167,31 @@ void require_backend(const ExperimentConfig& config, Backend backend, double pac
                      : backend == Backend::plugin ? config.stage.plugin.has_value()
                                                   : true;
   if (!there)
-    throw std::invalid_argument(
-        fmt::format("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
-                    to_string(backend), config.stage.file.string()));
+    fail_request("--backend {0}: {1} has no group '{0}'; see 'stageid config schema'",
+                 to_string(backend), config.stage.file.string());
   if (backend == Backend::sim && !config.stage.plant)
-    throw std::invalid_argument(
-        fmt::format("--backend sim: {} has no group 'plant', which is the simulated stage; add it",
-                    config.stage.file.string()));
+    fail_request("--backend sim: {} has no group 'plant', which is the simulated stage; add it",
+                 config.stage.file.string());
   const bool resident = backend == Backend::can && config.stage.can.mode == CanMode::resident;
   if (config.stage.spec.controller.by_peer && !resident)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: 'controller: peer' needs a stage that plays the excitation in a loop of its own: "
         "'backend: can' with 'mode: resident'. With back end {}, this program closes the loop; "
         "write its controller",
-        config.stage.file.string(), to_string(backend)));
+        config.stage.file.string(), to_string(backend));
   const bool virtual_link =
       (backend == Backend::can || backend == Backend::modbus) && !(pace > 0.0);
   if (config.stage.between_runs == BetweenRuns::hold && virtual_link && !resident)
-    throw std::invalid_argument(
-        fmt::format("{}: 'between_runs: hold' with back end {} needs the wall clock, because the "
-                    "watchdog of the node runs by it. Set 'pace: 1'",
-                    config.stage.file.string(), to_string(backend)));
+    fail_request(
+        "{}: 'between_runs: hold' with back end {} needs the wall clock, because the watchdog of "
+        "the node runs by it. Set 'pace: 1'",
+        config.stage.file.string(), to_string(backend));
   if (config.stage.between_runs == BetweenRuns::hold && resident)
-    throw std::invalid_argument(
-        fmt::format("{}: 'between_runs: hold' is not possible with 'mode: resident', because the "
-                    "node closes the loop and cuts its forces after every run. Use 'mode: "
-                    "streaming', or 'between_runs: release'",
-                    config.stage.file.string()));
+    fail_request(
+        "{}: 'between_runs: hold' is not possible with 'mode: resident', because the node closes "
+        "the loop and cuts its forces after every run. Use 'mode: streaming', or 'between_runs: "
+        "release'",
+        config.stage.file.string());
 }
 
 std::unique_ptr<MeasuredStage> make_measured_stage(const ExperimentConfig& config,

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/modbus/modbus_supervisor.hpp"
@@ -29,10 +27,10 @@ std::vector<RunId> runs_to_skip(const ExperimentConfig& config, const std::files
   const std::unique_ptr<LogReader> log = open_log(file, false);
   const std::string id = measurement_id_of(log->info());
   if (!id.empty() && id != config.measurement_id)
-    throw std::invalid_argument(
-        fmt::format("{}: belongs to another experiment (stage, excitation or seed differ from {}); "
-                    "choose another name with -o",
-                    file.string(), config.file.string()));
+    fail_request(
+        "{}: belongs to another experiment (stage, excitation or seed differ from {}); choose "
+        "another name with -o",
+        file.string(), config.file.string());
   return complete_runs(*log);
 }
 
@@ -117,8 +115,8 @@ bool check_log(const MeasurementRequest& request) {
     std::filesystem::remove(request.log);
   const bool exists = std::filesystem::exists(request.log);
   if (exists && !request.resume)
-    throw std::invalid_argument(fmt::format(
-        "{}: already exists; continue it with --resume, or remove it", request.log.string()));
+    fail_request("{}: already exists; continue it with --resume, or remove it",
+                 request.log.string());
   return exists;
 }
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <thread>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/response/confidence.hpp"
@@ -20,8 +20,8 @@ namespace stageid {
 UntilVariance::UntilVariance(std::filesystem::path log, FrfOptions options, double variance)
     : log_(std::move(log)), options_(std::move(options)), wanted_(variance) {
   if (!(variance > 0.0) || !std::isfinite(variance))
-    throw std::invalid_argument(fmt::format(
-        "--until: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %", variance));
+    fail_request("--until: {} is not a variance; write a positive number, e.g. 1e-6 for 0.1 %",
+                 variance);
   options_.realizations.clear();
 }
 

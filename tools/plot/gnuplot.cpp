@@ -8,10 +8,9 @@
 #include <cstring>
 #include <iterator>
 #include <sstream>
-#include <stdexcept>
 #include <string_view>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/terminal/external_program.hpp"
@@ -125,8 +124,8 @@ PictureFormat picture_format(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   const Format* const format = std::ranges::find(kFormats, ending, &Format::ending);
   if (format == std::end(kFormats))
-    throw std::invalid_argument(fmt::format(
-        "{}: unsupported picture format '{}'; use .pdf, .svg or .png", file.string(), ending));
+    fail_request("{}: unsupported picture format '{}'; use .pdf, .svg or .png", file.string(),
+                 ending);
   return static_cast<PictureFormat>(format - kFormats);
 }
 
@@ -151,9 +150,8 @@ void draw(const Picture& picture, const std::filesystem::path& file) {
   std::string bytes =
       std::filesystem::exists(picture_file) ? read_whole_file(picture_file) : std::string();
   if (end.status != 0 || !is_whole(bytes, format))
-    throw FileError(fmt::format("{}: gnuplot failed: {}; check the free space in {}", file.string(),
-                                first_message(end.messages),
-                                std::filesystem::temp_directory_path().string()));
+    fail_file(file, "gnuplot failed: {}; check the free space in {}", first_message(end.messages),
+              std::filesystem::temp_directory_path().string());
   if (kind == PictureFormat::pdf) forget_date(bytes);
   write_text_file(file, bytes);
 }

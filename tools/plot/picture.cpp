@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "frf/statistics/order_statistic.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -53,8 +53,8 @@ std::string table_text(const std::vector<std::pair<std::string, Eigen::VectorXd>
   for (const auto& [name, values] : columns) {
     text += " " + name;
     if (values.size() != columns[0].second.size())
-      throw std::invalid_argument(fmt::format("table: column '{}' has {} rows; expected {}", name,
-                                              values.size(), columns[0].second.size()));
+      fail_request("table: column '{}' has {} rows; expected {}", name, values.size(),
+                   columns[0].second.size());
   }
   text += "\n";
   for (Eigen::Index k = 0; !columns.empty() && k < columns[0].second.size(); ++k)

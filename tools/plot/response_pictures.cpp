@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "tools/report/report_uncertainty.hpp"
 
 namespace stageid {
@@ -21,7 +21,7 @@ constexpr const char* kDeviationLine = "lines lc rgb '#202020' lw 0.8";
 constexpr Eigen::Index kMostRowsOrColumns = 40;
 
 const FrfEstimate& response_of(const ReportData& data, const char* figure) {
-  if (!data.frf) throw std::invalid_argument(fmt::format("{}: needs a frequency response", figure));
+  if (!data.frf) fail_request("{}: needs a frequency response", figure);
   return *data.frf;
 }
 
@@ -164,9 +164,8 @@ std::string bode_panel(const Picture& picture, const Grid& grid, std::size_t row
 
 void check_count(std::size_t count, const char* kind, const char* flag) {
   if (count == 0 || count > static_cast<std::size_t>(kMostRowsOrColumns))
-    throw std::invalid_argument(
-        fmt::format("bode: {} {} do not fit in one figure; choose 1 to {} with {}", count, kind,
-                    kMostRowsOrColumns, flag));
+    fail_request("bode: {} {} do not fit in one figure; choose 1 to {} with {}", count, kind,
+                 kMostRowsOrColumns, flag);
 }
 
 /// Curves of a table with their legends; the model is drawn above the measurement, both above their errors.

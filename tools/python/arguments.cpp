@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
 #include <string_view>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -27,9 +27,9 @@ py::array number_array(const py::object& given, const char* name) {
 RealArray real_array(const py::object& given, const char* name) {
   const py::array array = number_array(given, name);
   if (array.dtype().kind() == 'c')
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: contains complex numbers; expected real numbers. Give the real part if intended",
-        name));
+        name);
   RealArray reals = RealArray::ensure(array);
   if (!reals) refuse_type(name);
   return reals;
@@ -39,7 +39,7 @@ Eigen::VectorXd real_vector(const py::object& given, const char* name) {
   const RealArray array = real_array(given, name);
   const bool column = array.ndim() == 2 && array.shape(1) == 1;
   if (array.ndim() > 1 && !column)
-    throw std::invalid_argument(fmt::format("{}: has {} axes; expected one", name, array.ndim()));
+    fail_request("{}: has {} axes; expected one", name, array.ndim());
   const auto in_order = py::array_t<double, py::array::c_style | py::array::forcecast>(array);
   return Eigen::Map<const Eigen::VectorXd>(in_order.data(), in_order.size());
 }
@@ -59,9 +59,8 @@ ChannelList channels(const char* group, long count, const char* prefix, const Na
   list.units.resize(list.size());
   if (!units) return list;
   if (units->size() != list.size())
-    throw std::invalid_argument(fmt::format("{}: {} for {}; give one per channel", group,
-                                            counted(units->size(), "unit"),
-                                            counted(list.size(), "channel")));
+    fail_request("{}: {} for {}; give one per channel", group, counted(units->size(), "unit"),
+                 counted(list.size(), "channel"));
   for (std::size_t c = 0; c < list.size(); ++c) list.units[c] = (*units)[c].value_or("");
   return list;
 }

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/record/log_checks.hpp"
 #include "acquisition/record/row_transpose.hpp"
 
@@ -41,9 +41,8 @@ RealArray with_rows_together(RealArray array) {
 
 void require(bool fits, const char* name, const py::array& array, const std::string& right) {
   if (fits) return;
-  throw std::invalid_argument(
-      fmt::format("{}: has the shape [{}]; {}", name,
-                  fmt::join(array.shape(), array.shape() + array.ndim(), " x "), right));
+  fail_request("{}: has the shape [{}]; {}", name,
+               fmt::join(array.shape(), array.shape() + array.ndim(), " x "), right);
 }
 
 void require_axes(const char* name, const py::array& array, py::ssize_t axes, const char* right) {
@@ -126,10 +125,10 @@ void ArrayLog::locate_runs() {
       actuators_.push_back(rows_of(a.actuators, m, e));
       sensors_.push_back(rows_of(a.sensors, m, e));
       if (!period_of(a.excitation, m, e).allFinite())
-        throw std::invalid_argument(fmt::format(
+        fail_request(
             "excitation: realization {}, experiment {} (counted from 1) is not finite; remove NaN "
             "and infinity",
-            m + 1, e + 1));
+            m + 1, e + 1);
       auto& marked = marked_.emplace_back();
       marked.setZero(a.sensors.shape(2));
       if (!a.marked) continue;

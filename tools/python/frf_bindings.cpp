@@ -1,14 +1,13 @@
-#include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 #include <variant>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "frf/file/frf_file.hpp"
@@ -90,8 +89,7 @@ std::vector<T> chosen(const char* what, const Choice<T>& given) {
   if (const T* one = std::get_if<T>(&*given)) return {*one};
   const auto& several = std::get<std::vector<T>>(*given);
   if (several.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: empty list. Give at least one, or None for the default", what));
+    fail_request("{}: empty list. Give at least one, or None for the default", what);
   return several;
 }
 

@@ -5,10 +5,10 @@
 
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "tools/python/arguments.hpp"
 #include "tools/python/array_log.hpp"
@@ -85,10 +85,10 @@ std::vector<std::size_t> full_experiment(const LogReader& log, py::ssize_t& M, p
                        return log.runs()[i].samples == log.runs()[order.front()].samples;
                      });
   if (!equal)
-    throw std::invalid_argument(
-        fmt::format("{}: the complete runs are not {} of {} with equal lengths; read them one by "
-                    "one with log[i]",
-                    log.path().string(), counted(M, "realization"), counted(E, "experiment")));
+    fail_request(
+        "{}: the complete runs are not {} of {} with equal lengths; read them one by one with "
+        "log[i]",
+        log.path().string(), counted(M, "realization"), counted(E, "experiment"));
   return order;
 }
 

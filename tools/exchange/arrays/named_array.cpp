@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <numeric>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -76,9 +76,8 @@ NamedArray permuted(const NamedArray& array, const std::vector<std::size_t>& axe
   std::vector<std::size_t> all(array.shape.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   if (sorted != all)
-    throw std::invalid_argument(
-        fmt::format("{}: {} are not a permutation of the {} axes of the array", array.name,
-                    fmt::join(axes, ", "), all.size()));
+    fail_request("{}: {} are not a permutation of the {} axes of the array", array.name,
+                 fmt::join(axes, ", "), all.size());
   NamedArray result{array.name, {}, array.values};
   for (const std::size_t axis : axes) result.shape.push_back(array.shape[axis]);
   if (axes.size() < 2) return result;

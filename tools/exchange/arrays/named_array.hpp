@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -54,7 +54,7 @@ struct ArrayList {
   template <typename... Parts>
   [[noreturn]] void fail(const std::string& place, fmt::format_string<Parts...> what,
                          Parts&&... parts) const {
-    throw FormatError(file, place, fmt::format(what, std::forward<Parts>(parts)...));
+    fail_format(file, place, what, std::forward<Parts>(parts)...);
   }
 };
 

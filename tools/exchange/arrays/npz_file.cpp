@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/arrays/raw_number.hpp"
 #include "tools/terminal/output_paths.hpp"
@@ -78,9 +78,7 @@ std::string archive_of(const std::filesystem::path& file, const ArrayList& list)
   if (archive == nullptr) throw std::bad_alloc();
   zip_source_keep(bytes.get());  // the archive frees it, too
   const auto require = [&](bool done) {
-    if (!done)
-      throw FileError(
-          fmt::format("{}: cannot be written: {}", file.string(), zip_strerror(archive.get())));
+    if (!done) fail_file(file, "cannot be written: {}", zip_strerror(archive.get()));
   };
 
   std::vector<std::string> contents;  // zip_close() reads them

@@ -1,12 +1,9 @@
 #include "tools/exchange/import/foreign_formats.hpp"
 
-#include <fmt/format.h>
-
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
@@ -40,9 +37,9 @@ ArrayList read_foreign_arrays(const std::filesystem::path& file) {
   require_readable(file);
   if (const std::string other = other_kind(file, "a file of another program"); !other.empty())
     throw FormatError(file, "", other);
-  throw std::invalid_argument(fmt::format(
+  fail_request(
       "{}: unsupported file type '{}'; use .unv, .uff, .mat, .csv, .h5, .npz or .sNp (Touchstone)",
-      file.string(), ending));
+      file.string(), ending);
 }
 
 FrfEstimate read_foreign_frf(const std::filesystem::path& file, const std::filesystem::path& output,

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -100,7 +100,7 @@ ImportMap read_import_map(const std::filesystem::path& file);
 template <typename... Parts>
 [[noreturn]] void refuse_map(const ImportMap& map, fmt::format_string<Parts...> what,
                              Parts&&... parts) {
-  throw FormatError(map.file, "", fmt::format(what, std::forward<Parts>(parts)...));
+  fail_format(map.file, "", what, std::forward<Parts>(parts)...);
 }
 
 }  // namespace stageid

@@ -1,13 +1,11 @@
 #include "tools/exchange/import/import_runs.hpp"
 
-#include <fmt/format.h>
-
 #include <iterator>
 #include <set>
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -41,16 +39,14 @@ std::vector<ForeignFile> foreign_files(const std::filesystem::path& file, const 
         "no file to import; give FILE, or write its pattern in the map: files: "
         "run_{realization}_{experiment}.mat");
   if (!file.empty() && !map.files.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: the map {} already lists the files {}; omit FILE or the key files",
-                    file.string(), map.file.string(), map.files));
+    fail_request("{}: the map {} already lists the files {}; omit FILE or the key files",
+                 file.string(), map.file.string(), map.files);
   const std::filesystem::path pattern = file.empty() ? map.file.parent_path() / map.files : file;
   if (!is_pattern(pattern.string())) return {{pattern, {}}};
   std::vector<ForeignFile> files;
   for (const auto& [numbers, path] : files_of(pattern)) files.push_back({path, numbers});
   if (files.empty())
-    throw FileError(fmt::format(
-        "{}: no file matches this pattern; check the folder and the numbers", pattern.string()));
+    fail_file(pattern, "no file matches this pattern; check the folder and the numbers");
   return files;
 }
 

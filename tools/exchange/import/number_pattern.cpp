@@ -1,13 +1,12 @@
 #include "tools/exchange/import/number_pattern.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <regex>
-#include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -28,7 +27,7 @@ Expression expression_of(const std::string& pattern) {
     if (realization || rest.starts_with(kExperiment)) {
       const std::string_view key = realization ? kRealization : kExperiment;
       if (std::ranges::count(out.is_realization, realization) > 0)
-        throw std::invalid_argument(fmt::format("'{}' contains {} twice; keep one", pattern, key));
+        fail_request("'{}' contains {} twice; keep one", pattern, key);
       out.is_realization.push_back(realization);
       text += "([0-9]{1,18})";
       rest.remove_prefix(key.size());
@@ -69,9 +68,8 @@ std::map<RunNumbers, std::string> matches_of(const std::string& pattern,
     if (!numbers) continue;
     const auto [place, is_new] = out.emplace(*numbers, text);
     if (!is_new)
-      throw std::invalid_argument(
-          fmt::format("'{}' and '{}' have the same numbers under '{}'; rename or remove one",
-                      place->second, text, pattern));
+      fail_request("'{}' and '{}' have the same numbers under '{}'; rename or remove one",
+                   place->second, text, pattern);
   }
   return out;
 }

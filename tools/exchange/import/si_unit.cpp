@@ -6,9 +6,10 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -99,10 +100,10 @@ SiUnit si_unit(const std::string& place, const std::string& text) {
     const std::size_t end = std::min(text.find_first_of("/*.", at), text.size());
     const std::string word = text.substr(at, end - at);
     if (word == "g")
-      throw std::invalid_argument(fmt::format(
-          "{}: unit '{}': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or "
-          "m/s^2 with scale: 9.80665 per channel",
-          place, text));
+      fail_request(
+          "{}: unit '{}': 'g' is ambiguous: gram or acceleration of gravity. Write kg, or m/s^2 "
+          "with scale: 9.80665 per channel",
+          place, text);
     const std::optional<SiUnit> unit = powered_unit(word);
     if (!unit) return {text, 1.0};
     out.unit += unit->unit;
@@ -142,10 +143,10 @@ void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes) {
   if (frf.residual_covariance.size() > 0 || frf.covariance.size() > 0 ||
       frf.input_factor.size() > 0 || frf.detection.frequency_hz.size() > 0 ||
       frf.nonlinearity.band_hz.size() > 0)
-    throw std::invalid_argument(
-        fmt::format("{}; its covariances and nonlinearity test cannot be converted. Estimate it "
-                    "again from a log in SI units",
-                    own.front()));
+    fail_request(
+        "{}; its covariances and nonlinearity test cannot be converted. Estimate it again from a "
+        "log in SI units",
+        own.front());
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
     const double factor = outputs[static_cast<std::size_t>(c % frf.n_outputs())] /
                           inputs[static_cast<std::size_t>(c / frf.n_outputs())];

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <fstream>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/hdf5_library.hpp"
 #include "tools/exchange/matlab/mat_variable.hpp"
@@ -41,8 +41,7 @@ struct Mat73File::State {
   std::size_t cells = 0;
 
   void require(bool done) const {
-    if (!done)
-      throw FileError(fmt::format("{}: cannot be written; check the disk", named.string()));
+    if (!done) fail_file(named, "cannot be written; check the disk");
   }
   Hdf5Handle made(hid_t id, Hdf5Handle::Close close) const {
     Hdf5Handle handle(id, close);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
-#include <stdexcept>
 #include <string>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 
@@ -60,10 +60,10 @@ void require_room(const ArrayList& list) {
     std::size_t& sum = bytes[variable];
     sum += array.size() * (array.is_complex() ? 16 : 8);
     if (sum >= kMostBytes)
-      throw std::invalid_argument(
-          fmt::format("{}: '{}' has 2 GiB or more, too large for a variable of a MATLAB v5 file; "
-                      "add --mat-version 7.3",
-                      list.file.string(), variable));
+      fail_request(
+          "{}: '{}' has 2 GiB or more, too large for a variable of a MATLAB v5 file; add "
+          "--mat-version 7.3",
+          list.file.string(), variable);
   }
 }
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
@@ -107,9 +107,8 @@ Eigen::MatrixXd read_covariance(const std::filesystem::path& path, const Additiv
   const std::vector<double> values = file.read_reals("/parameters/value");
   const std::vector<double> sandwich = file.read_reals("/covariance/sandwich");
   if (sandwich.size() != values.size() * values.size())
-    throw FormatError(path, "/covariance/sandwich",
-                      fmt::format("has {} values for {} parameters; write it again",
-                                  sandwich.size(), values.size()));
+    fail_format(path, "/covariance/sandwich", "has {} values for {} parameters; write it again",
+                sandwich.size(), values.size());
   const auto n = static_cast<Eigen::Index>(values.size());
   if (named_parameters(model, n).values != values)
     throw FormatError(path, "/parameters/value",

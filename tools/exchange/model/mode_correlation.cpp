@@ -10,7 +10,7 @@
 #include <regex>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/exchange/uff/uff_frf.hpp"
 #include "tools/terminal/console.hpp"
 
@@ -109,11 +109,10 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
     out.outputs.push_back(model.outputs.names[i]);
   }
   if (places.empty())
-    throw FormatError(
-        file, "",
-        fmt::format("its mode shapes contain no output of the model ({}); outputs are matched to "
-                    "nodes 1, 2, ... in order, or by node and direction, '12+Z'",
-                    fmt::join(model.outputs.names, ", ")));
+    fail_format(file, "",
+                "its mode shapes contain no output of the model ({}); outputs are matched to nodes "
+                "1, 2, ... in order, or by node and direction, '12+Z'",
+                fmt::join(model.outputs.names, ", "));
   const Eigen::VectorXcd alike = Eigen::VectorXcd::Ones(1);  // the file has no inputs
   for (const ModeShape& mode : mode_shapes(model)) {
     out.own.push_back(mode);

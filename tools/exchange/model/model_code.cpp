@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/version.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 
@@ -139,10 +140,10 @@ void require_identifier(const std::string& name) {
     valid = valid && (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_') &&
             static_cast<unsigned char>(c) < 128;
   if (!valid)
-    throw std::invalid_argument(fmt::format(
-        "{0}.h: '{0}' is not a C identifier, as the names in the code need; use letters, "
-        "digits and '_'",
-        name));
+    fail_request(
+        "{0}.h: '{0}' is not a C identifier, as the names in the code need; use letters, digits "
+        "and '_'",
+        name);
 }
 
 }  // namespace

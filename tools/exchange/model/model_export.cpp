@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -58,10 +59,10 @@ std::string model_csv(const AdditiveModel& model) {
   for (std::size_t index = 0; index < model.submodels.size(); ++index) {
     const Submodel& s = model.submodels[index];
     if (s.denominator.size() > 1 && !s.is_mode())
-      throw std::invalid_argument(
-          fmt::format("submodel {} is neither a mode nor an integrator; the .csv table cannot "
-                      "represent it, export as .json or .h5",
-                      index));
+      fail_request(
+          "submodel {} is neither a mode nor an integrator; the .csv table cannot represent it, "
+          "export as .json or .h5",
+          index);
     const std::string head =
         s.is_mode()
             ? fmt::format("{},{},{},{},{},{}", index, s.integrators, s.natural_frequency_hz(),
@@ -121,9 +122,9 @@ std::vector<UffMode> uff_modes(const AdditiveModel& model) {
 UffContent uff_of_model(const std::filesystem::path& file, const AdditiveModel& model,
                         const Eigen::VectorXd& frequency_hz) {
   if (frequency_hz.size() == 0)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: the model does not contain its band; define the lines of the response with --frf FRF",
-        file.string()));
+        file.string());
   FrfEstimate frf;
   frf.frequency_hz = frequency_hz;
   frf.inputs = model.inputs;

@@ -6,9 +6,8 @@
 #include <map>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
 #include "tools/terminal/text_lines.hpp"
 #include "tools/terminal/unicode.hpp"
@@ -63,9 +62,8 @@ UffAxis axis_of(const std::string& unit) {
 std::string name_line(const char* head, const std::string& name) {
   constexpr std::size_t kMost = 72;
   if (name.size() > kMost)
-    throw std::invalid_argument(fmt::format(
-        "channel '{}': names in a universal file have at most {} characters; shorten it", name,
-        kMost));
+    fail_request("channel '{}': names in a universal file have at most {} characters; shorten it",
+                 name, kMost);
   return head + name;
 }
 
@@ -196,8 +194,7 @@ std::string other_content(const UffContent& content) {
 
 [[noreturn]] void fail(const std::filesystem::path& file, const UffFunction& f,
                        const std::string& what) {
-  throw FormatError(file, fmt::format("{}", f.line),
-                    fmt::format("{} <- {}: {}", output_name(f), input_name(f), what));
+  fail_format(file, fmt::format("{}", f.line), "{} <- {}: {}", output_name(f), input_name(f), what);
 }
 
 void read_settings(const std::string& description, FrfEstimate& frf) {
@@ -234,10 +231,8 @@ std::map<Channel, const UffFunction*> table_of(const std::filesystem::path& file
       fail(file, f, "its frequencies differ from those of the first channel");
   }
   if (first != nullptr && table.size() != frf.outputs.size() * frf.inputs.size())
-    throw FormatError(
-        file, "",
-        fmt::format("got {} channels for {} outputs and {} inputs; every pair is required",
-                    table.size(), frf.outputs.size(), frf.inputs.size()));
+    fail_format(file, "", "got {} channels for {} outputs and {} inputs; every pair is required",
+                table.size(), frf.outputs.size(), frf.inputs.size());
   return table;
 }
 

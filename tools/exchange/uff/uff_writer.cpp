@@ -2,8 +2,8 @@
 
 #include <bit>
 #include <optional>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/raw_number.hpp"
@@ -19,8 +19,8 @@ constexpr const char* kEdgeLine = "    -1\n";
 
 std::string text_line(const std::string& text) {
   if (text.size() > 80)
-    throw std::invalid_argument(fmt::format(
-        "'{}' is longer than the 80 characters of a line of a universal file; shorten it", text));
+    fail_request("'{}' is longer than the 80 characters of a line of a universal file; shorten it",
+                 text);
   return fmt::format("{:<80}\n", text.empty() ? "NONE" : text);
 }
 
@@ -44,8 +44,8 @@ constexpr const char* kUnits =
 
 std::string axis_line(const UffAxis& axis) {
   if (axis.unit.size() > 20)
-    throw std::invalid_argument(fmt::format(
-        "unit '{}' is longer than the 20 characters of a universal file; shorten it", axis.unit));
+    fail_request("unit '{}' is longer than the 20 characters of a universal file; shorten it",
+                 axis.unit);
   return fmt::format("{:>10}{:>5}{:>5}{:>5} {:<20.20} {:<20}\n", axis.type, axis.exponents[0],
                      axis.exponents[1], axis.exponents[2], axis.label,
                      axis.unit.empty() ? "NONE" : axis.unit);
