@@ -1,12 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
-#include <string>
-#include <string_view>
 
-#include "excitation/words/words.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {
@@ -79,27 +74,6 @@ inline constexpr std::uint32_t kFlagEnabled = 1U << 1;
 inline constexpr std::uint32_t kReplyAccepted = 1;
 inline constexpr std::uint32_t kReplyRefused = 2;
 
-enum class Type : std::uint8_t { u32, u64, i32, f32 };
-enum class Access : std::uint8_t { read, write };
-
-struct Entry {
-  int address = 0;
-  std::string_view name;
-  std::string_view meaning;
-  Access access = Access::read;  ///< write: by FC 6, 16, 23; all entries are read by FC 3, 4, 23
-  Type type = Type::u32;
-  int count = 1;
-  std::string_view unit = "1";  ///< "1": dimensionless
-
-  constexpr int registers() const noexcept { return count * (type == Type::u64 ? 4 : 2); }
-};
-
-/// Every entry, by address.
-std::span<const Entry> entries() noexcept;
-
-/// The entries as the Markdown table of docs/modbus-map.md.
-std::string markdown_table();
-
 /// @throws std::invalid_argument if there are more channels than one transaction carries.
 void require_channels(const StageInfo& info);
 
@@ -108,8 +82,5 @@ void require_channels(const StageInfo& info);
 std::uint32_t channel_hash(const StageInfo& info);
 
 }  // namespace modbus_map
-
-template <>
-inline constexpr std::array kWords<modbus_map::Type> = {"uint32", "uint64", "int32", "float32"};
 
 }  // namespace stageid

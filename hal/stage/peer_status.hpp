@@ -54,11 +54,9 @@ struct PeerMeaning {
   PeerReaction reaction = PeerReaction::use;
   Outcome outcome = Outcome::ok;  ///< of the exchange; unused for `refuse`
   const char* words = "";         ///< for the user
-  const char* can = "";           ///< detection over CAN FD
-  const char* modbus = "";        ///< detection over Modbus
 };
 
-/// The meanings of all statuses, in order of the status. docs/stops.md has the same table.
+/// The meanings of all statuses, in order of the status. docs/stops.md has the same table, and how each is detected.
 std::span<const PeerMeaning> peer_meanings() noexcept;
 const PeerMeaning& meaning(PeerStatus status) noexcept;
 
@@ -81,8 +79,5 @@ Outcome outcome_of_code(std::uint8_t code) noexcept;
 
 /// @throws StageError "PLACE: WORDS DETAIL".
 [[noreturn]] void refuse(PeerStatus status, const std::string& place, const std::string& detail);
-
-/// The meanings as the Markdown table of docs/stops.md.
-std::string peer_meanings_table();
 
 }  // namespace stageid

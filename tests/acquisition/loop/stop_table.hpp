@@ -13,19 +13,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/process/docs_table.hpp"
+
 // The tables of docs/stops.md, whose cells are results of tests. With the environment variable STAGEID_STOP_TABLE, the
 // tests write their cells instead of comparing them.
 namespace stageid::test {
-
-inline std::vector<std::string> split(std::string_view text, std::string_view separator) {
-  std::vector<std::string> parts;
-  for (std::size_t end = 0; end != std::string_view::npos;) {
-    end = text.find(separator);
-    parts.emplace_back(text.substr(0, end));
-    if (end != std::string_view::npos) text.remove_prefix(end + separator.size());
-  }
-  return parts;
-}
 
 /// A value with a unit is measured and may differ by 5 % or two units; a count or a word may not.
 inline bool same_value(const std::string& a, const std::string& b) {
