@@ -1,8 +1,11 @@
+#include <fmt/ranges.h>
+
 #include <complex>
 #include <new>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_file.hpp"
+#include "acquisition/files/hdf5_matrices.hpp"
 #include "acquisition/files/hdf5_support.hpp"
 
 namespace stageid {
@@ -99,6 +102,18 @@ void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t coun
   H5Sselect_hyperslab(info.space.get(), H5S_SELECT_SET, start, nullptr, extent, nullptr);
   info.check_read(
       H5Dread(info.dataset, H5T_NATIVE_DOUBLE, memory.get(), info.space.get(), H5P_DEFAULT, out));
+}
+
+std::string join_shape(const std::vector<hsize_t>& shape) {
+  return fmt::format("[{}]", fmt::join(shape, " x "));
+}
+
+void require_shape(const Hdf5File& file, const std::string& dataset,
+                   const std::vector<hsize_t>& wanted) {
+  const std::vector<hsize_t> shape = file.shape(dataset);
+  if (shape != wanted)
+    fail_format(file.path(), dataset, "shape is {}; expected {}", join_shape(shape),
+                join_shape(wanted));
 }
 
 }  // namespace stageid

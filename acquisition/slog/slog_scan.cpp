@@ -197,6 +197,15 @@ class ScanStep {
 
 }  // namespace
 
+std::uint32_t slog_header_crc(const SlogBlockHeader& header) noexcept {
+  const auto bytes = std::as_bytes(std::span(&header, 1));
+  return crc32c(bytes.first(offsetof(SlogBlockHeader, header_crc)));
+}
+
+bool slog_header_intact(const SlogBlockHeader& header) noexcept {
+  return header.magic == kSlogMagic && header.header_crc == slog_header_crc(header);
+}
+
 SlogSource::SlogSource(std::filesystem::path file) : path_(std::move(file)) {
   note_input(path_);
   file_ = FileDescriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));

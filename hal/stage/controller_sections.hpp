@@ -26,4 +26,9 @@ struct BiquadSection {
 ///         finite values, a lead without pole (not proper), or an undamped pole.
 std::vector<BiquadSection> controller_sections(const AxisController& axis, double sample_rate_hz);
 
+/// Sections of second order in series with the given transfer function.
+/// @throws std::invalid_argument unless the coefficients are finite, the denominator is not zero, and the numerator has
+/// at most its degree (causal)
+std::vector<BiquadSection> transfer_sections(const ControllerTransfer& transfer);
+
 }  // namespace stageid

@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "hal/stage/linear_controller.hpp"
-
 namespace stageid {
 
 /// Linear controller of one logical axis in continuous time: integrator + lead + low pass (+ notches). It is
@@ -29,6 +27,26 @@ struct AxisController {
   std::vector<Notch> notches;
   /// In an emergency, the axis is braked using its known motion; false: its forces are cut.
   bool brake = true;
+};
+
+/// A discrete controller in state space, at the sample rate of the stage:
+///   x[n+1] = A x[n] + B y[n],   C(y)[n] = C x[n] + D y[n].
+/// Without states, only D has entries.
+struct ControllerStateSpace {
+  Eigen::MatrixXd a;  ///< states x states
+  Eigen::MatrixXd b;  ///< states x sensors
+  Eigen::MatrixXd c;  ///< actuators x states
+  Eigen::MatrixXd d;  ///< actuators x sensors
+
+  bool empty() const noexcept { return c.size() == 0 && d.size() == 0; }
+};
+
+/// One entry of a transfer matrix: coefficients of falling powers of z.
+struct ControllerTransfer {
+  Eigen::Index actuator = 0;
+  Eigen::Index sensor = 0;
+  std::vector<double> numerator;
+  std::vector<double> denominator;
 };
 
 /// The one description of a controller, u = f - C y + r. C is the sum of its parts; each may be empty:

@@ -1,6 +1,12 @@
 #include "tools/measure/measurement.hpp"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <thread>
+#include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
@@ -13,11 +19,11 @@
 #include "hal/stage/sample_clock.hpp"
 #include "tools/dashboard/dashboard.hpp"
 #include "tools/experiment/run_metadata.hpp"
-#include "tools/measure/live_watch.hpp"
 #include "tools/measure/measured_stage.hpp"
 #include "tools/measure/until_variance.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
 namespace {
@@ -177,6 +183,40 @@ void tell_reached(UntilVariance& until, MeasurementResult& result, const Console
   if (!until.failure().empty()) console.warning("--until: " + until.failure());
   result.variance = until.reached();
 }
+
+/// Watches a stage while it is measured, from the log only, in a thread of lowest priority. A failure ends the watch, not
+/// the measurement.
+class LiveWatch {
+ public:
+  /// Starts to follow the log. @param watch must outlive *this
+  LiveWatch(StageWatch& watch, std::filesystem::path log)
+      : thread_([this, &watch, log = std::move(log)] {
+          constexpr int kLowest = 19;
+          ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest);
+          try {
+            watch.run(log, true, [this](double) { return !stop_ && !interrupt_flag(); });
+            failure_ = watch.doubt();
+          } catch (const std::exception& error) {  // errors must not affect the measurement
+            failure_ = error.what();
+          }
+        }) {}
+  ~LiveWatch() { finish(false); }
+  LiveWatch(const LiveWatch&) = delete;
+  LiveWatch& operator=(const LiveWatch&) = delete;
+
+  /// To be called when nothing more is written. Returns when all of a closed log was watched, or after an interrupt.
+  /// @returns why the watch failed; empty if it did not
+  std::string finish(bool log_is_closed) {
+    if (!log_is_closed) stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    return failure_;
+  }
+
+ private:
+  std::atomic<bool> stop_ = false;
+  std::string failure_;
+  std::thread thread_;  // last: it uses all other members
+};
 
 /// Waits for the watch to reach the end of the log. Its failures are warnings.
 void conclude_watch(const StageWatch& watch, LiveWatch& live, MeasurementResult& result,

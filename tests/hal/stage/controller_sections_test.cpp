@@ -1,4 +1,4 @@
-#include "hal/stage/linear_controller.hpp"
+#include "hal/stage/controller_sections.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,6 @@
 #include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/loop_stability.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/stage/controller_sections.hpp"
 #include "tests/hal/measured_response.hpp"
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"

@@ -1,4 +1,4 @@
-#include "hal/can/can_arrival.hpp"
+#include "hal/can/can_socket.hpp"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 #include "hal/stage/pacer.hpp"
 
 namespace stageid {
-namespace test_can_arrival {
+namespace test_can_socket {
 
 /// A socket that receives what it sends to itself. The kernel stamps UDP as it stamps CAN.
 class Loopback {
@@ -121,5 +121,5 @@ TEST(CanArrival, TheControllersClockTakesTheJitterOfTheKernelAway) {
   }
 }
 
-}  // namespace test_can_arrival
+}  // namespace test_can_socket
 }  // namespace stageid
