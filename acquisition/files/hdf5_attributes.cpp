@@ -111,9 +111,8 @@ long long Hdf5File::read_integer_attribute(const std::string& object,
   double value = 0.0;
   attribute.read(H5T_NATIVE_DOUBLE, &value);
   constexpr double kLimit = 0x1p53;  // above it, a double cannot represent every integer
-  if (!(std::abs(value) <= kLimit) || value != std::trunc(value)) {
+  if (!(std::abs(value) <= kLimit) || value != std::trunc(value))
     attribute.fail("is " + std::to_string(value) + "; expected an integer");
-  }
   return static_cast<long long>(value);
 }
 

@@ -20,9 +20,8 @@ constexpr std::size_t kAlignment = 8;
 
 std::uint64_t little_endian(std::string_view bytes) {
   std::uint64_t value = 0;
-  for (std::size_t i = bytes.size(); i > 0; --i) {
+  for (std::size_t i = bytes.size(); i > 0; --i)
     value = value << 8U | static_cast<unsigned char>(bytes[i - 1]);
-  }
   return value;
 }
 

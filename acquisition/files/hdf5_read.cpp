@@ -36,10 +36,9 @@ template <typename Value>
 std::vector<Value> read_all(const DatasetInfo& info, hid_t memory_type) {
   try {
     std::vector<Value> values(info.count());
-    if (!values.empty()) {
+    if (!values.empty())
       info.check_read(
           H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()));
-    }
     return values;
   } catch (const std::bad_alloc&) {
     info.fail("has the size " + hdf5::text_of(info.shape) + ", which exceeds the available memory");
@@ -75,9 +74,8 @@ std::vector<std::complex<double>> Hdf5File::read_complex(const std::string& data
 std::vector<std::string> Hdf5File::read_texts(const std::string& dataset) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
   info.expect(info.kind == Hdf5Kind::text, "a list of strings");
-  if (info.shape.size() != 1) {
+  if (info.shape.size() != 1)
     info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected a list of strings");
-  }
   return info.read_texts(info.count(), [&info](hid_t memory_type, void* buffer) {
     return H5Dread(info.dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, buffer);
   });
@@ -88,13 +86,11 @@ void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t coun
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
   info.expect_number("real numbers");
   const std::size_t rank = info.shape.size();
-  if (rank != 1 && rank != 2) {
+  if (rank != 1 && rank != 2)
     info.fail("has the shape " + hdf5::text_of(info.shape) + "; expected rows x columns");
-  }
-  if (first > info.shape[0] || count > info.shape[0] - first) {
+  if (first > info.shape[0] || count > info.shape[0] - first)
     info.fail("has " + std::to_string(info.shape[0]) + " rows, fewer than the " +
               std::to_string(first + count) + " needed");
-  }
   if (count == 0 || (rank == 2 && info.shape[1] == 0)) return;
   const hsize_t start[2] = {first, 0};
   const hsize_t extent[2] = {count, rank == 2 ? info.shape[1] : 1};

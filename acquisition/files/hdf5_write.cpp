@@ -34,9 +34,8 @@ void fill_with_nan(hid_t properties, hid_t file_type) {
   const std::complex<double> nan(kNan, kNan);
   const Hdf5Kind kind = hdf5::kind_of(file_type);
   if (kind == Hdf5Kind::real) H5Pset_fill_value(properties, H5T_NATIVE_DOUBLE, &nan);
-  if (kind == Hdf5Kind::complex) {
+  if (kind == Hdf5Kind::complex)
     H5Pset_fill_value(properties, hdf5::complex_type(H5T_NATIVE_DOUBLE).get(), &nan);
-  }
 }
 
 /// Splits the dataset into blocks of rows of about a megabyte, each with a checksum, so that changed bytes are
@@ -156,9 +155,8 @@ void Hdf5File::append(const std::string& dataset, hsize_t count, hid_t memory_ty
   H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr);
   const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr),
                           H5Sclose);
-  if (H5Dwrite(handle, memory_type, memory.get(), space.get(), H5P_DEFAULT, data) < 0) {
+  if (H5Dwrite(handle, memory_type, memory.get(), space.get(), H5P_DEFAULT, data) < 0)
     fail(*this, dataset);
-  }
 }
 
 void Hdf5File::append_rows(const std::string& dataset, hsize_t count, const double* data) {

@@ -62,10 +62,9 @@ std::filesystem::path resolve_target(const std::filesystem::path& target) {
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     fail_file(target, "is {}; give the name of a file to write",
               std::filesystem::is_directory(status) ? "a directory" : "not a regular file");
-  if (!resolved.has_filename()) {
+  if (!resolved.has_filename())
     throw FileError("'" + target.string() +
                     "': is not a file name; give the name of a file to write");
-  }
   return resolved;
 }
 

@@ -69,9 +69,8 @@ Hdf5LogReader::Hdf5LogReader(const std::filesystem::path& file) : path_(file) {
   require_format(*file_, "stageid-log", "a log");
   require_version(*file_, 1);
   read_channels();
-  if (!file_->exists("/runs")) {
+  if (!file_->exists("/runs"))
     throw FormatError(path_, "/runs", "is missing; expected groups /runs/0000, /runs/0001, ...");
-  }
   for (const std::string& name : file_->children("/runs")) read_run(name);
   check_runs(path_, info_, runs_);
 }
@@ -85,9 +84,8 @@ void Hdf5LogReader::read_channels() {
   info_.sample_rate_hz = file_->read_real_attribute("/", "sample_rate_hz");
   info_.period_samples = read_int(*file_, "/", "period_samples");
   info_.transient_periods = read_int(*file_, "/", "transient_periods");
-  if (file_->has_attribute("/", "metadata_json")) {
+  if (file_->has_attribute("/", "metadata_json"))
     info_.metadata_json = file_->read_text_attribute("/", "metadata_json");
-  }
   info_.excitation = read_channel_list(*file_, "/channels/excitation");
   info_.actuators = read_channel_list(*file_, "/channels/actuators");
   info_.sensors = read_channel_list(*file_, "/channels/sensors");
@@ -106,12 +104,10 @@ void Hdf5LogReader::read_run(const std::string& name) {
   run.name = name;
   run.realization = read_int(*file_, group, "realization");
   run.experiment = read_int(*file_, group, "experiment");
-  if (file_->has_attribute(group, "complete")) {
+  if (file_->has_attribute(group, "complete"))
     run.complete = file_->read_integer_attribute(group, "complete") != 0;
-  }
-  if (file_->has_attribute(group, "started_utc")) {
+  if (file_->has_attribute(group, "started_utc"))
     run.started_utc = file_->read_text_attribute(group, "started_utc");
-  }
   Run place;
   place.excitation = open_dataset(group + "/excitation", info_.excitation.size());
   place.actuators = open_dataset(group + "/actuators", info_.actuators.size());
@@ -155,9 +151,8 @@ Hdf5LogReader::Scaling Hdf5LogReader::read_scaling(const std::string& dataset,
 
 void Hdf5LogReader::check_excitation_length(const LogRun& run, const Dataset& excitation) const {
   const auto period = static_cast<std::uint64_t>(info_.period_samples);
-  if (excitation.rows == period || (excitation.rows == run.samples && excitation.rows > period)) {
+  if (excitation.rows == period || (excitation.rows == run.samples && excitation.rows > period))
     return;
-  }
   fail_format(path_, excitation.name,
               "has {}; expected one period ({}) or the length of the run ({})",
               counted(excitation.rows, "row"), period, run.samples);
@@ -229,13 +224,10 @@ Eigen::MatrixXd Hdf5LogReader::excitation(std::size_t run) const {
   const Dataset& dataset = places_[run].excitation;
   Eigen::MatrixXd period(info_.period_samples, static_cast<Eigen::Index>(info_.excitation.size()));
   read_columns(dataset, 0, period);
-  if (!period.allFinite()) {
-    throw FormatError(path_, dataset.name, "contains a non-finite value");
-  }
+  if (!period.allFinite()) throw FormatError(path_, dataset.name, "contains a non-finite value");
   // The excitation of an incomplete run was ramped down, so it need not be periodic.
-  if (dataset.rows > static_cast<std::uint64_t>(info_.period_samples) && which.complete) {
+  if (dataset.rows > static_cast<std::uint64_t>(info_.period_samples) && which.complete)
     check_repetition(which, dataset, period);
-  }
   return period;
 }
 

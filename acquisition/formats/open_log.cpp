@@ -15,9 +15,8 @@ std::unique_ptr<LogReader> open_log(const std::filesystem::path& file, bool dama
   std::array<char, kSlogMagic.size()> head{};
   {
     const SlogSource source(file);
-    if (source.bytes() == 0) {
+    if (source.bytes() == 0)
       throw FormatError(file, "", "is empty; give a native log (.slog) or an HDF5 log");
-    }
     source.read(0, head.data(), std::min<std::uint64_t>(head.size(), source.bytes()));
   }
   if (std::memcmp(head.data(), kSlogMagic.data(), head.size()) == 0)

@@ -96,9 +96,8 @@ bool LogThread::work() {
       limit = std::min(limit, commands_.front().at_row);
       const bool wait = commands_.size() == 1 && commands_.front().excitation &&
                         unconfirmed_.load(std::memory_order_acquire);
-      if (ring_.popped() == limit && commands_.front().at_row == limit && !wait) {
+      if (ring_.popped() == limit && commands_.front().at_row == limit && !wait)
         next = std::move(commands_.front());
-      }
     }
   }
   if (next) {

@@ -423,11 +423,10 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, RunWriter& log,
                                 const RunExperimentOptions& options) {
-  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info()))) {
+  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info())))
     throw std::invalid_argument(
         "experiment: the log was created for a different plan or stage; create it with "
         "experiment_log_info()");
-  }
   return Experiment(plan, stage, controller, log, options).perform();
 }
 

@@ -85,9 +85,8 @@ MatrixXcd unmixed_spectrum(const MatrixXd& amplitude, const MatrixXd& phase_rad)
 
 int read_integer(const Hdf5File& file, const char* name, int least) {
   const long long value = file.read_integer_attribute("/", name);
-  if (value < least || value > std::numeric_limits<int>::max()) {
+  if (value < least || value > std::numeric_limits<int>::max())
     fail(file, "/", fmt::format("attribute '{}' is {}; must be at least {}", name, value, least));
-  }
   return static_cast<int>(value);
 }
 
@@ -126,9 +125,8 @@ std::uint64_t read_seed(const Hdf5File& file) {
   const std::string text = file.read_text_attribute("/", "seed");
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (error != std::errc() || end != text.data() + text.size()) {
+  if (error != std::errc() || end != text.data() + text.size())
     fail(file, "/", "attribute 'seed' is '" + text + "'; expected an unsigned decimal number");
-  }
   return seed;
 }
 
@@ -164,11 +162,10 @@ ExperimentSpec read_spec(const Hdf5File& file, const FrequencyGrid& grid) {
   spec.crest_iterations = read_integer(file, "crest_iterations", 0);
   spec.seed = read_seed(file);
   const std::size_t stored = file.children("/realizations").size();
-  if (stored != static_cast<std::size_t>(spec.realizations)) {
+  if (stored != static_cast<std::size_t>(spec.realizations))
     fail(file, "/realizations",
          fmt::format("contains {} realizations; expected {} according to attribute 'realizations'",
                      stored, spec.realizations));
-  }
   return spec;
 }
 
@@ -181,10 +178,9 @@ std::vector<MatrixXd> read_phases(const Hdf5File& file, const ExperimentSpec& sp
     const std::string dataset = realization_group(m) + "/phase_rad";
     phases.push_back(read_matrix(file, dataset, axes, grid.size()));
     const auto values = phases.back().array();
-    if (!(values >= 0.0 && values < kTurn).all()) {
+    if (!(values >= 0.0 && values < kTurn).all())
       fail(file, dataset,
            "contains phases that are out of range (0 to 2 pi) or NaN; run 'stageid design' again");
-    }
   }
   return phases;
 }
@@ -195,11 +191,10 @@ void check_agrees(const Hdf5File& file, const ExperimentPlan& plan) {
   const auto check = [&file](const auto& stored, const auto& wanted, const std::string& dataset) {
     const double largest = wanted.cwiseAbs().maxCoeff();
     const double difference = (stored - wanted).cwiseAbs().maxCoeff();
-    if (!stored.allFinite() || !(difference <= kTolerance * largest)) {
+    if (!stored.allFinite() || !(difference <= kTolerance * largest))
       fail(file, dataset,
            "does not match the seed and the other fields of this file, which was altered or is "
            "damaged; run 'stageid design' again");
-    }
   };
   const Index axes = plan.axes();
   const Index lines = plan.grid().size();

@@ -42,9 +42,8 @@ void check_log_info(const LogInfo& info) {
   check_channels(info.excitation, "excitation");
   check_channels(info.actuators, "actuators");
   check_channels(info.sensors, "sensors");
-  if (info.actuators.size() == 0 || info.sensors.size() == 0) {
+  if (info.actuators.size() == 0 || info.sensors.size() == 0)
     throw std::invalid_argument("log: at least one actuator and one sensor are required");
-  }
 }
 
 bool same_measurement(const LogInfo& a, const LogInfo& b) noexcept {

@@ -32,9 +32,8 @@ bool transpose_rows(const double* rows, std::size_t row_words, std::size_t count
   for (std::size_t first = 0; first < count; first += kTileRows) {
     const std::size_t tile = std::min(kTileRows, count - first);
     const double* from = rows + first * row_words;
-    for (std::size_t c = 0; c < column_count; ++c) {
+    for (std::size_t c = 0; c < column_count; ++c)
       finite &= copy_column(from + c, row_words, tile, columns + c * column_stride + first);
-    }
   }
   return finite;
 }

@@ -125,9 +125,8 @@ void SlogAppender::write_block(const SlogBlockHeader& header, std::span<const st
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) fail(count < 0 ? errno : ENOSPC);
     auto written = static_cast<std::size_t>(count);
-    while (first < parts.size() && written >= parts[first].iov_len) {
+    while (first < parts.size() && written >= parts[first].iov_len)
       written -= parts[first++].iov_len;
-    }
     if (written > 0) {
       parts[first].iov_base = static_cast<std::byte*>(parts[first].iov_base) + written;
       parts[first].iov_len -= written;

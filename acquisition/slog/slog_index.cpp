@@ -165,10 +165,9 @@ class SlogIndexer::Step {
   void take_samples(const SlogBlock& block) {
     SlogRunIndex& run = open_run(block);
     const SlogBlockHeader& header = block.header;
-    if (!are_slog_samples(header, index_.info)) {
+    if (!are_slog_samples(header, index_.info))
       throw std::invalid_argument(
           "has a different number of words per row than the log has channels");
-    }
     if (header.first_row != run.run.samples)
       fail_request("starts with row {}; expected row {}", header.first_row, run.run.samples);
     run.run.samples += header.rows;
@@ -184,9 +183,8 @@ class SlogIndexer::Step {
     if (end.samples != run.run.samples || end.realization != run.run.realization ||
         end.experiment != run.run.experiment)
       fail_request("ends a run of {} rows; {} were written", end.samples, run.run.samples);
-    if (end.complete && !run.excitation && !run.excitation_columns.empty()) {
+    if (end.complete && !run.excitation && !run.excitation_columns.empty())
       throw std::invalid_argument("the run's excitation is missing");
-    }
     run.run.complete = end.complete;
     run.run.health = end.health;
     run.run.timing = end.timing;
@@ -250,10 +248,9 @@ Eigen::MatrixXd read_slog_excitation(const SlogSource& source, const LogInfo& in
   if (!run.excitation) return excitation;
   const std::vector<std::byte> payload = read_payload(source, *run.excitation);
   const std::size_t column_bytes = sizeof(double) * static_cast<std::size_t>(info.period_samples);
-  for (std::size_t k = 0; k < run.excitation_columns.size(); ++k) {
+  for (std::size_t k = 0; k < run.excitation_columns.size(); ++k)
     std::memcpy(excitation.col(run.excitation_columns[k]).data(), payload.data() + k * column_bytes,
                 column_bytes);
-  }
   if (!excitation.allFinite())
     fail_format(source.path(), "", "the excitation of run {} contains a non-finite value",
                 run.run.name);

@@ -38,11 +38,10 @@ SlogReader::SlogReader(const std::filesystem::path& file, bool damaged_is_error,
                 "damaged at byte {}: {}; use 'stageid log recover' to copy the intact parts",
                 first.offset, first.what);
   }
-  if (damaged_is_error && !end()) {
+  if (damaged_is_error && !end())
     throw FormatError(file, "",
                       "was not closed because its writer crashed or is still running; continue it "
                       "with --resume, or use 'stageid log recover'");
-  }
 }
 
 void SlogReader::scan() {

@@ -58,10 +58,9 @@ class Recovery {
       }
     }
     close_run();
-    if (!ended_) {
+    if (!ended_)
       append_json(SlogBlockType::end,
                   to_json(SlogEnd{1, "recovered: the writer had not closed the log"}), 0);
-    }
     out_.close();
     count_losses();
     return std::move(report_);
@@ -190,9 +189,8 @@ class Recovery {
     if (missing > source_.bytes() || !may_add(missing * sizeof(double) * words)) return false;
     std::vector<double> rows(std::size_t{words} * kFillRows, 0.0);
     const std::uint64_t status = pack_status({0, true, 0});
-    for (std::size_t r = 0; r < kFillRows; ++r) {
+    for (std::size_t r = 0; r < kFillRows; ++r)
       rows[(r + 1) * words - 1] = std::bit_cast<double>(status);
-    }
     while (run_->begin.samples < row) {
       SlogBlockHeader made = header(SlogBlockType::samples, 0);
       made.cols = words;

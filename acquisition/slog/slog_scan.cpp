@@ -48,11 +48,10 @@ class ScanStep {
       scan_.damage.push_back(std::move(damage));
       offset = next;
     }
-    if (!log_id_) {
+    if (!log_id_)
       throw FormatError(
           source_.path(), "",
           "contains no intact block of a native log (.slog); give a log written by 'stageid run'");
-    }
     scan_.log_id = *log_id_;
     if (scan_.blocks.size() == most) leave_jumps(offset);
     keep_those_in_order();
@@ -91,9 +90,8 @@ class ScanStep {
 
   /// Records an intact header (and checks the payload if requested); returns the next offset.
   std::uint64_t take(const SlogBlock& block) {
-    if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block)) {
+    if (depth_ == SlogScanDepth::payloads && !payload_intact(source_, block))
       return skip_payload(block);
-    }
     if (!log_id_) log_id_ = block.header.log_id;
     scan_.blocks.push_back(block);
     return block.end();
@@ -282,11 +280,10 @@ bool payload_intact(const SlogSource& source, const SlogBlock& block) {
 std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block) {
   std::vector<std::byte> payload(slog_padded(block.header.payload_bytes));
   source.read(block.payload_offset(), payload.data(), payload.size());
-  if (crc32c(payload) != block.header.payload_crc) {
+  if (crc32c(payload) != block.header.payload_crc)
     throw FormatError(source.path(), "",
                       "the payload of " + describe(block) +
                           " is damaged; use 'stageid log recover' to copy the intact parts");
-  }
   payload.resize(block.header.payload_bytes);
   return payload;
 }

@@ -94,11 +94,10 @@ SlogWriter SlogWriter::resume(const std::filesystem::path& file, const LogInfo& 
   const SlogSource source(file);
   const SlogScan scan = scan_slog(source, SlogScanDepth::payloads);
   const SlogIndex index = index_slog(source, scan);
-  if (!same_measurement(index.info, info)) {
+  if (!same_measurement(index.info, info))
     throw FormatError(file, "",
                       "was written for a different experiment (sample rate, period or channels); "
                       "resume with the original configuration, or write a new log");
-  }
   const std::uint64_t end = intact_bytes(source, scan, index);
   if (end < source.bytes()) save_tail(source, end);
   appender.continue_at(end, scan.log_id, index.next_sequence);

@@ -150,9 +150,8 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
     const auto row = static_cast<Eigen::Index>(i);
     require_independent(sensor_jacobian, sensor_inverse, row, "sensors");
     require_independent(actuator_jacobian, actuator_inverse, row, "actuators");
-    if (axis.gain == 0.0) {
+    if (axis.gain == 0.0)
       axis.gain = unit_crossover_gain(axis, axis_inertia[i], kRigidAxisNames[i]);
-    }
   }
   static_cast<void>(MotionController(spec));  // checks the remaining values
   return spec;

@@ -138,9 +138,8 @@ TEST_F(Hdf5FileTest, IntegersAndFloatsStandForEachOtherInAttributes) {
   const Hdf5File file = Hdf5File::open(directory_ / "g.h5");
   EXPECT_EQ(file.read_integer_attribute("/", "float"), 40'000);
   EXPECT_EQ(file.read_real_attribute("/", "integer"), 3.0);
-  for (const char* name : {"half", "huge", "nan"}) {
+  for (const char* name : {"half", "huge", "nan"})
     expect_error<FormatError>([&] { file.read_integer_attribute("/", name); }, file.path(), name);
-  }
 }
 
 TEST_F(Hdf5FileTest, WritesTheSameBytesAtAnotherTime) {

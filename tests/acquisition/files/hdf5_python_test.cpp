@@ -98,9 +98,7 @@ f['zeros'][:] = 0
   std::vector<double> rows(9);
   for (const hsize_t first : {0, 998, 1999, 9997}) {
     f.read_rows("/packed", first, 3, rows.data());
-    for (std::size_t i = 0; i < 9; ++i) {
-      EXPECT_EQ(rows[i], static_cast<double>(3 * first + i));
-    }
+    for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(rows[i], static_cast<double>(3 * first + i));
   }
 }
 

@@ -29,9 +29,8 @@ class Hdf5Log : public testing::Test {
     file.write_attribute("/", "format", foreign.format);
     file.write_attribute("/", "format_version", foreign.version);
     file.write_attribute("/", "sample_rate_hz", foreign.sample_rate_hz);
-    if (foreign.left_out != "period_samples") {
+    if (foreign.left_out != "period_samples")
       file.write_attribute("/", "period_samples", foreign.period_samples);
-    }
     file.write_attribute("/", "transient_periods", foreign.transient_periods);
     file.create_group("/channels");
     const LogInfo info = test::small_info();
@@ -54,15 +53,12 @@ class Hdf5Log : public testing::Test {
       const std::string group = "/runs/000" + std::to_string(run);
       add_run(file, group, foreign.ids[run].first, foreign.ids[run].second);
       const std::uint64_t rows = foreign.whole_excitation ? kRows : kPeriod;
-      if (foreign.left_out != "excitation") {
+      if (foreign.left_out != "excitation")
         file.write_reals(group + "/excitation", Shape{rows, 3}, excitation(run, rows).data());
-      }
-      if (foreign.left_out != "actuators") {
+      if (foreign.left_out != "actuators")
         file.write_reals(group + "/actuators", Shape{kRows, 3}, actuators(run).data());
-      }
-      if (foreign.left_out != "sensors") {
+      if (foreign.left_out != "sensors")
         file.write_reals(group + "/sensors", Shape{kRows, 2}, sensors(run).data());
-      }
     }
   }
 
@@ -108,9 +104,8 @@ TEST_F(Hdf5Log, ReadsWhatAForeignProgramWrites) {
     for (std::uint64_t first = 0; first <= kRows; first += 5) {
       reader->read(run, first, kRows - first, samples);
       ASSERT_TRUE((samples.marked == 0).all());
-      for (Eigen::Index r = 0; r < samples.marked.size(); ++r) {
+      for (Eigen::Index r = 0; r < samples.marked.size(); ++r)
         samples.marked[r] = test::is_marked(run, first + static_cast<std::uint64_t>(r)) ? 1 : 0;
-      }
       ASSERT_TRUE(test::holds_rows(samples, run, first));
     }
   }

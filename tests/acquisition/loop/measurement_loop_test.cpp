@@ -37,9 +37,8 @@ TEST_F(MeasurementLoopTest, RecordsTheEquationsOfTheLoop) {
     if (n + 1 == kSamples) break;
     for (Eigen::Index i = 0; i < kSensors; ++i) {
       double y = AnalyticStage::kPole * all[n].y[i];
-      for (Eigen::Index j = 0; j < kActuators; ++j) {
+      for (Eigen::Index j = 0; j < kActuators; ++j)
         y += AnalyticStage::input_gain(i, j) * all[n].u[j];
-      }
       // One rounding may be fused differently; without the loop's delay, the error would be some percent.
       ASSERT_NEAR(all[n + 1].y[i], y, 1e-15 + 1e-14 * std::abs(y)) << "y[n+1] = P(y[n], u[n])";
     }

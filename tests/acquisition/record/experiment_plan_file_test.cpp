@@ -74,9 +74,8 @@ TEST_F(ExperimentPlanFile, GivesTheSamePlanBack) {
       EXPECT_EQ(back.spec().axes[p].level, plan.spec().axes[p].level);
       EXPECT_EQ(back.spec().axes[p].shape, plan.spec().axes[p].shape);
     }
-    for (const RunId run : plan.runs()) {
+    for (const RunId run : plan.runs())
       EXPECT_EQ(back.excitation(run), plan.excitation(run)) << "not the same bits";
-    }
   }
 }
 
@@ -180,9 +179,8 @@ TEST_F(ExperimentPlanFile, NamesWhatIsMissingOrOfTheWrongKind) {
                 [](hid_t f) { set_integer(f, "format_version", 2); });
   expect_spoilt(0, "/", "'scheme' is 'x'", [](hid_t f) { set_text(f, "scheme", "x"); });
   expect_spoilt(0, "/", "'scaling' is 'x'", [](hid_t f) { set_text(f, "scaling", "x"); });
-  for (const char* seed : {"", "-1", "1x", "99999999999999999999"}) {
+  for (const char* seed : {"", "-1", "1x", "99999999999999999999"})
     expect_spoilt(0, "/", "'seed' is", [seed](hid_t f) { set_text(f, "seed", seed); });
-  }
   for (const char* name : {"realizations", "periods", "transient_periods", "crest_iterations"}) {
     expect_spoilt(0, "/", name, [name](hid_t f) { set_integer(f, name, -1); });
     expect_spoilt(0, "/", name, [name](hid_t f) { set_integer(f, name, 1LL << 40); });

@@ -44,9 +44,8 @@ inline bool is_marked(std::size_t run, std::uint64_t row) { return (row + run) %
 /// Only the column of the run's experiment is nonzero.
 inline Eigen::MatrixXd excitation_of(std::size_t run) {
   Eigen::MatrixXd excitation = Eigen::MatrixXd::Zero(kPeriod, 3);
-  for (int n = 0; n < kPeriod; ++n) {
+  for (int n = 0; n < kPeriod; ++n)
     excitation(n, static_cast<Eigen::Index>(run % 3)) = 1.0 + n + 10.0 * static_cast<double>(run);
-  }
   return excitation;
 }
 
@@ -81,9 +80,8 @@ inline LogRun run_of(std::size_t run, bool complete = true) {
 inline void write_run(SlogWriter& log, std::size_t run, std::uint64_t rows = 3 * kPeriod,
                       std::uint64_t block_rows = 10) {
   log.begin_run(run_of(run), excitation_of(run));
-  for (std::uint64_t first = 0; first < rows; first += block_rows) {
+  for (std::uint64_t first = 0; first < rows; first += block_rows)
     log.write(rows_of(run, first, std::min(block_rows, rows - first)));
-  }
   log.end_run(run_of(run));
 }
 

@@ -40,9 +40,8 @@ TEST_P(Crc32c, AgreesWithTheDefinitionBitByBitAtEveryLengthAndCut) {
   std::uint32_t bitwise = 0xFFFFFFFFU;
   for (std::size_t size = 1; size <= bytes.size(); ++size) {
     bitwise ^= std::to_integer<std::uint32_t>(bytes[size - 1]);
-    for (int bit = 0; bit < 8; ++bit) {
+    for (int bit = 0; bit < 8; ++bit)
       bitwise = (bitwise >> 1) ^ ((bitwise & 1U) != 0 ? 0x82F63B78U : 0U);
-    }
     if (size % 61 != 0 && size > 300) continue;
     const std::span<const std::byte> whole(bytes.data(), size);
     ASSERT_EQ(GetParam()(whole, 0), ~bitwise) << size << " bytes";

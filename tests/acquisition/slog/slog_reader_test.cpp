@@ -204,9 +204,8 @@ TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {
       std::vector<double> rows(count * words);
       for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<double>(i);
       // The word after the columns is not a number and must be ignored.
-      for (std::size_t r = 0; r < count; ++r) {
+      for (std::size_t r = 0; r < count; ++r)
         rows[r * words + columns] = std::numeric_limits<double>::quiet_NaN();
-      }
       const std::size_t stride = count + 3;
       std::vector<double> out(columns * stride, -1.0);
       ASSERT_TRUE(transpose_rows(rows.data(), words, count, columns, out.data(), stride));
@@ -231,9 +230,8 @@ using SlogFormat = test::SmallLogTest;
 
 // The numpy code in docs/formats.md is meant to be copied.
 TEST_F(SlogFormat, TheNumpyLinesOfTheDocumentReadALog) {
-  if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0) {
+  if (std::system("/usr/bin/python3 -c 'import numpy' 2> /dev/null") != 0)
     GTEST_SKIP() << "needs python3 with numpy";
-  }
   test::write_small_log(directory_ / "run.slog", 2, 10);
   std::ifstream document(std::string(STAGEID_SOURCE_DIR) + "/docs/formats.md");
   std::ofstream script(directory_ / "read.py");
