@@ -20,37 +20,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollEvery{20};
 
-/// Writes downloaded rows to the log as they arrive.
-class LogSink final : public TraceSink {
- public:
-  LogSink(RunWriter& log, std::size_t columns) : log_(log), columns_(columns) {}
-
-  void rows(std::uint64_t, std::span<const double> values,
-            std::span<const Outcome> outcomes) override {
-    block_.clear();
-    for (std::size_t row = 0; row < outcomes.size(); ++row) {
-      const auto from = values.begin() + static_cast<std::ptrdiff_t>(row * columns_);
-      block_.insert(block_.end(), from, from + static_cast<std::ptrdiff_t>(columns_));
-      SampleStatus status;
-      status.outcome = static_cast<std::uint8_t>(outcomes[row]);
-      status.marked = outcomes[row] != Outcome::ok;
-      block_.push_back(std::bit_cast<double>(pack_status(status)));
-      ++health.cycles;
-      health.marked += status.marked ? 1U : 0U;
-      health.late += outcomes[row] == Outcome::late ? 1U : 0U;
-      health.missing += status.marked && outcomes[row] != Outcome::late ? 1U : 0U;
-    }
-    log_.write(block_);
-  }
-
-  RunHealth health;
-
- private:
-  RunWriter& log_;
-  std::size_t columns_;
-  std::vector<double> block_;
-};
-
 class ResidentExperiment {
  public:
   ResidentExperiment(const ExperimentPlan& plan, ResidentStage& stage, RunWriter& log,
@@ -94,20 +63,19 @@ class ResidentExperiment {
     run.experiment = id.experiment;
     run.started_utc = utc_now();
     log_.begin_run(run, plan_.excitation(id));
-    LogSink sink(log_, stage_.info().actuators.size() + stage_.info().sensors.size());
     try {
       static_cast<void>(stage_.upload(waveforms));
       play(id);
-      static_cast<void>(stage_.download(sink));
+      static_cast<void>(stage_.download(
+          [&](auto values, auto outcomes) { write_rows(values, outcomes, run.health); }));
     } catch (const StageError& error) {
       end_with(options_.interrupted() ? ExperimentEnd::interrupted : ExperimentEnd::fault,
                error.what());
     }
-    run.health = sink.health;
     run.health.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     run.complete = result_.end == ExperimentEnd::complete &&
-                   sink.health.cycles == static_cast<std::uint64_t>(plan_.samples_per_run());
+                   run.health.cycles == static_cast<std::uint64_t>(plan_.samples_per_run());
     log_.end_run(run);
     log_.synchronize();
     result_.health += run.health;
@@ -138,6 +106,26 @@ class ResidentExperiment {
     if (progress.status == JobStatus::failed)
       end_with(progress.outcome == Outcome::limit ? ExperimentEnd::limit : ExperimentEnd::fault,
                fmt::format("stage '{}': {}", stage_.info().name, progress.message));
+  }
+
+  /// Writes downloaded rows to the log as they arrive.
+  void write_rows(std::span<const double> values, std::span<const Outcome> outcomes,
+                  RunHealth& health) {
+    const std::size_t columns = stage_.info().actuators.size() + stage_.info().sensors.size();
+    std::vector<double> block;
+    for (std::size_t row = 0; row < outcomes.size(); ++row) {
+      const auto cells = values.subspan(row * columns, columns);
+      block.insert(block.end(), cells.begin(), cells.end());
+      SampleStatus status;
+      status.outcome = static_cast<std::uint8_t>(outcomes[row]);
+      status.marked = outcomes[row] != Outcome::ok;
+      block.push_back(std::bit_cast<double>(pack_status(status)));
+      ++health.cycles;
+      health.marked += status.marked ? 1U : 0U;
+      health.late += outcomes[row] == Outcome::late ? 1U : 0U;
+      health.missing += status.marked && outcomes[row] != Outcome::late ? 1U : 0U;
+    }
+    log_.write(block);
   }
 
   Waveforms waveforms_of(RunId id) const {

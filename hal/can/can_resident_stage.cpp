@@ -202,7 +202,7 @@ bool CanResidentStage::read(CanMemory memory, std::vector<std::uint8_t>& bytes,
   return chunks_done == total;
 }
 
-JobProgress CanResidentStage::download(TraceSink& sink) {
+JobProgress CanResidentStage::download(const TraceSink& sink) {
   const CanState node = link_.command({CanCommandCode::hello});
   const std::uint64_t rows = std::min(node.sample, samples_);
   const std::size_t row_bytes = can_trace_row_bytes(info_);
@@ -226,7 +226,7 @@ JobProgress CanResidentStage::download(TraceSink& sink) {
         values.push_back(can_float_at(trace_, at + kCanFloatBytes * i));
       outcomes.push_back(outcome_of_code(trace_[at + kCanFloatBytes * columns]));
     }
-    sink.rows(rows_given_, values, outcomes);
+    sink(values, outcomes);
     rows_given_ = end;
   }
   return {JobStatus::done, rows, samples_, ""};

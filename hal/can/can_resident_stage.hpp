@@ -30,7 +30,7 @@ class CanResidentStage final : public ResidentStage {
   JobProgress upload(const Waveforms& waveforms) override;
   JobProgress arm(const Trigger& trigger) override;
   JobProgress poll() override;
-  JobProgress download(TraceSink& sink) override;
+  JobProgress download(const TraceSink& sink) override;
   void stop() noexcept override;
 
  private:

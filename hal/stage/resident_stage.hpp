@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 
@@ -32,14 +33,9 @@ struct JobProgress {
   Outcome outcome = Outcome::ok;  ///< reason of a failure: Outcome::limit or another
 };
 
-/// Receives a downloaded trace in rows of actuators + sensors, SI, in order.
-class TraceSink {
- public:
-  virtual ~TraceSink() = default;
-  /// u[n] and y[n] of cycle n, and the Outcome of y[n], one per row.
-  virtual void rows(std::uint64_t first_cycle, std::span<const double> values,
-                    std::span<const Outcome> outcomes) = 0;
-};
+/// Receives a downloaded trace in order: rows of u[n] and y[n], SI, and one Outcome of y[n] per row.
+using TraceSink =
+    std::function<void(std::span<const double> values, std::span<const Outcome> outcomes)>;
 
 /// Interface for experiments that the node runs in its own closed loop: upload, arm, download.
 ///
@@ -59,7 +55,7 @@ class ResidentStage {
   /// Progress of the run; if `failed`, `message` contains the reason.
   virtual JobProgress poll() = 0;
   /// The recorded rows, starting after those that earlier calls passed to a sink.
-  virtual JobProgress download(TraceSink& sink) = 0;
+  virtual JobProgress download(const TraceSink& sink) = 0;
   /// Ends a run, disables the stage. Idempotent.
   virtual void stop() noexcept = 0;
 };

@@ -55,7 +55,7 @@ class PlayingStage final : public ResidentStage {
     return {JobStatus::failed, rows_, rows_, "the stage says no", failure};
   }
 
-  JobProgress download(TraceSink& sink) override {
+  JobProgress download(const TraceSink& sink) override {
     const std::size_t columns = info().actuators.size() + info().sensors.size();
     const bool lost = static_cast<int>(triggers.size()) - 1 == loses_download;
     const std::size_t rows = lost ? rows_ / 2 : rows_;
@@ -63,7 +63,7 @@ class PlayingStage final : public ResidentStage {
       const std::size_t count = std::min<std::size_t>(64, rows - row);
       std::vector<Outcome> outcomes(count, Outcome::ok);
       if (row == 0) outcomes[7] = odd_outcome;
-      sink.rows(row, {trace_.data() + row * columns, count * columns}, outcomes);
+      sink({trace_.data() + row * columns, count * columns}, outcomes);
     }
     if (lost) throw StageError("the node fell silent");
     return {JobStatus::done, 0, 0, ""};

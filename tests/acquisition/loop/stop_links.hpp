@@ -273,12 +273,6 @@ inline Stopped stop_over_can(const SimulatedSpec& spec, LinkEvent event) {
 /// @tparam Rig CanStopRig or ZeroMqStopRig
 template <typename Rig>
 Stopped stop_resident(const SimulatedSpec& spec, LinkEvent event, double pace) {
-  struct Outcomes final : TraceSink {
-    void rows(std::uint64_t, std::span<const double>, std::span<const Outcome> found) override {
-      for (const Outcome outcome : found) marked += outcome != Outcome::ok ? 1 : 0;
-    }
-    std::uint64_t marked = 0;
-  } trace;
   Rig rig(spec, pace);
   Stopped result;
   CanResidentStage stage(spec.info, rig.can(), rig.host_bus(), CanHostOptions{});
@@ -301,12 +295,14 @@ Stopped stop_resident(const SimulatedSpec& spec, LinkEvent event, double pace) {
       result.reason = progress.outcome == Outcome::limit ? StopReason::limit : StopReason::fault;
       result.message = progress.message;
     }
-    if (!result.host_lost) static_cast<void>(stage.download(trace));
+    if (!result.host_lost)
+      static_cast<void>(stage.download([&](auto, std::span<const Outcome> outcomes) {
+        for (const Outcome outcome : outcomes) result.marked += outcome != Outcome::ok ? 1 : 0;
+      }));
   } catch (const StageError& error) {
     result.reason = StopReason::fault;
     result.message = error.what();
   }
-  result.marked = trace.marked;
   take_motion(rig.at_rest(), spec, result);
   return result;
 }

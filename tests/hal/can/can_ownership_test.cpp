@@ -249,10 +249,7 @@ Waveforms waveforms(int periods) {
   return w;
 }
 
-class NoRows final : public TraceSink {
- public:
-  void rows(std::uint64_t, std::span<const double>, std::span<const Outcome>) override {}
-};
+void no_rows(std::span<const double>, std::span<const Outcome>) {}
 
 TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
   CanRig rig;
@@ -271,9 +268,8 @@ TEST(CanOwnership, AResidentRunBelongsToWhoArmedIt) {
   EXPECT_EQ(first->poll().status, JobStatus::running);
   first->stop();
   EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
-  NoRows rows;
-  EXPECT_THAT([&] { second->download(rows); }, refuses("belongs to another host"));
-  EXPECT_NO_THROW(first->download(rows));
+  EXPECT_THAT([&] { second->download(no_rows); }, refuses("belongs to another host"));
+  EXPECT_NO_THROW(first->download(no_rows));
 }
 
 // Otherwise another host's arm would overwrite a trace that its owner has not downloaded yet.
@@ -289,8 +285,7 @@ TEST(CanOwnership, AStageStaysReservedBetweenTheRunsOfAResidentExperiment) {
   EXPECT_THAT([&] { second->upload(waveforms(1)); }, refuses(held));
   Host streaming(rig);
   EXPECT_THAT([&] { streaming.start(); }, refuses(held));
-  NoRows rows;
-  EXPECT_EQ(first->download(rows).done, 100U);
+  EXPECT_EQ(first->download(no_rows).done, 100U);
   first->upload(waveforms(2));
   first->arm({});
   rig.serve_ms(100);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "hal/stage/motion_controller.hpp"
 #include "tests/hal/can/can_rig.hpp"
@@ -46,11 +47,8 @@ class LossyCan final : public CanThrough {
   std::uint64_t random_ = 1;
 };
 
-class Rows final : public TraceSink {
- public:
-  void rows(std::uint64_t first_cycle, std::span<const double> values,
-            std::span<const Outcome> outcomes) override {
-    EXPECT_EQ(first_cycle, outcome.size());
+struct Rows {
+  void operator()(std::span<const double> values, std::span<const Outcome> outcomes) {
     value.insert(value.end(), values.begin(), values.end());
     outcome.insert(outcome.end(), outcomes.begin(), outcomes.end());
   }
@@ -118,7 +116,7 @@ TEST(CanResidentStage, RecordsWhatTheLoopHereWouldHaveMeasured) {
     if (seed == 4U) stage->upload(waveforms());
     ASSERT_EQ(play(rig, *stage, seed).status, JobStatus::done);
     Rows rows;
-    EXPECT_EQ(stage->download(rows).done, 3U * kPeriod);
+    EXPECT_EQ(stage->download(std::ref(rows)).done, 3U * kPeriod);
     expect_rows(rows.value, expected_rows(rig.stage_spec(), seed));
     EXPECT_THAT(rows.outcome, testing::Each(Outcome::ok));
   }
@@ -134,7 +132,7 @@ TEST(CanResidentStage, TransfersHealOnABusThatLosesAFifth) {
   stage.upload(waveforms());
   ASSERT_EQ(play(rig, stage, 3).status, JobStatus::done);
   Rows rows;
-  stage.download(rows);
+  stage.download(std::ref(rows));
   expect_rows(rows.value, expected_rows(rig.stage_spec(), 3));
 }
 
@@ -151,9 +149,9 @@ TEST(CanResidentStage, ATransferThatBrokeOffGoesOn) {
   ASSERT_EQ(play(rig, stage, 3).status, JobStatus::done);
   Rows rows;
   wire.cut();
-  EXPECT_THROW(stage.download(rows), StageError);
+  EXPECT_THROW(stage.download(std::ref(rows)), StageError);
   wire.mend();
-  EXPECT_EQ(stage.download(rows).done, 3U * kPeriod);
+  EXPECT_EQ(stage.download(std::ref(rows)).done, 3U * kPeriod);
   EXPECT_EQ(rows.outcome.size(), 3U * kPeriod);
 }
 
@@ -168,7 +166,7 @@ TEST(CanResidentStage, ALimitEndsTheRunAndTheRowsUpToItAreThere) {
   EXPECT_EQ(progress.outcome, Outcome::limit);
   EXPECT_THAT(progress.message, testing::HasSubstr("actuator a2: |u| would be 0.4"));
   Rows rows;
-  stage->download(rows);
+  stage->download(std::ref(rows));
   ASSERT_GT(rows.outcome.size(), 1U);
   EXPECT_GT(std::abs(rows.value[3 * (rows.outcome.size() - 1) + 1]), 0.4);
   rig.serve_ms(200);
