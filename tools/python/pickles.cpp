@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "acquisition/files/output_file.hpp"
@@ -30,30 +31,31 @@ void fill(const std::filesystem::path& file, const py::bytes& content) {
   std::ofstream(file, std::ios::binary) << std::string(content);
 }
 
-py::tuple channels_state(const ChannelList& channels) {
-  return py::make_tuple(channels.names, channels.units);
+// The members that a pickle holds, in the order of its state: to be read from or assigned to.
+template <typename Rank>
+auto members_of_rank(Rank& t) {
+  return std::tie(t.submodel, t.natural_frequency_hz, t.rank, t.chi_square, t.parameters,
+                  t.probability);
 }
 
-ChannelList channels_of(const py::handle& state) {
-  const auto [names, units] =
-      state.cast<std::pair<std::vector<std::string>, std::vector<std::string>>>();
-  return {names, units};
+template <typename Fit>
+auto members_of_fit(Fit& fit) {
+  auto& c = fit.covariance;
+  return std::tie(fit.model.fit.message, fit.parameters, fit.cost, fit.decisions, fit.findings,
+                  fit.removal_cost, fit.held, fit.frozen, fit.response_variance, c.sandwich,
+                  c.likelihood, c.response_variance, c.response_radius);
 }
 
-py::list ranks_state(const std::vector<ResidueRankTest>& tests) {
-  py::list list;
-  for (const ResidueRankTest& t : tests)
-    list.append(py::make_tuple(t.submodel, t.natural_frequency_hz, t.rank, t.chi_square,
-                               t.parameters, t.probability));
-  return list;
+template <typename Info>
+auto members_of_info(Info& info) {
+  return std::tie(info.sample_rate_hz, info.period_samples, info.transient_periods,
+                  info.excitation.names, info.excitation.units, info.actuators.names,
+                  info.actuators.units, info.sensors.names, info.sensors.units, info.metadata_json);
 }
 
-std::vector<ResidueRankTest> ranks_of(const py::handle& state) {
-  std::vector<ResidueRankTest> tests;
-  for (const auto& [submodel, frequency_hz, rank, chi_square, parameters, probability] :
-       state.cast<std::vector<std::tuple<std::size_t, double, int, double, int, double>>>())
-    tests.push_back({submodel, frequency_hz, rank, chi_square, parameters, probability});
-  return tests;
+template <typename... Member>
+void assign(std::tuple<Member&...> members, const py::handle& state) {
+  members = state.cast<std::tuple<Member...>>();
 }
 
 }  // namespace
@@ -83,57 +85,36 @@ AdditiveModel model_of_state(const py::bytes& state) {
 }
 
 py::tuple state_of(const FitResult& fit) {
-  const FitCovariance& c = fit.covariance;
-  return py::make_tuple(
-      state_of(fit.model), fit.message(), fit.parameters, fit.cost, fit.decisions, fit.findings,
-      ranks_state(fit.residue_ranks), fit.removal_cost, fit.held, fit.frozen, fit.response_variance,
-      py::make_tuple(c.sandwich, c.likelihood, c.response_variance, c.response_radius));
+  py::list ranks;
+  for (const ResidueRankTest& test : fit.residue_ranks)
+    ranks.append(py::cast(members_of_rank(test)));
+  return py::make_tuple(state_of(fit.model), members_of_fit(fit), ranks);
 }
 
 FitResult fit_of_state(const py::tuple& state) {
   FitResult fit;
   fit.model = model_of_state(state[0].cast<py::bytes>());
-  fit.model.fit.message = state[1].cast<std::string>();
-  fit.parameters = state[2].cast<Eigen::Index>();
-  fit.cost = state[3].cast<std::vector<double>>();
-  fit.decisions = state[4].cast<std::vector<std::string>>();
-  fit.findings = state[5].cast<std::vector<std::string>>();
-  fit.residue_ranks = ranks_of(state[6]);
-  fit.removal_cost = state[7].cast<std::vector<double>>();
-  fit.held = state[8].cast<std::vector<std::size_t>>();
-  fit.frozen = state[9].cast<std::vector<Eigen::Index>>();
-  fit.response_variance = state[10].cast<Eigen::MatrixXd>();
-  const auto covariance = state[11].cast<py::tuple>();
-  fit.covariance = {covariance[0].cast<Eigen::MatrixXd>(), covariance[1].cast<Eigen::MatrixXd>(),
-                    covariance[2].cast<Eigen::MatrixXd>(), covariance[3].cast<Eigen::MatrixXd>()};
+  assign(members_of_fit(fit), state[1]);
+  for (const py::handle rank : state[2])
+    assign(members_of_rank(fit.residue_ranks.emplace_back()), rank);
   return fit;
 }
 
 py::tuple state_of(const LogReader& log) {
   const auto* in_memory = dynamic_cast<const ArrayLog*>(&log);
   if (in_memory == nullptr) return py::make_tuple(std::filesystem::absolute(log.path()).string());
-  const LogInfo& info = log.info();
   const ExperimentArrays& a = in_memory->arrays();
-  return py::make_tuple(log.path().string(), info.sample_rate_hz, info.period_samples,
-                        info.transient_periods, channels_state(info.excitation),
-                        channels_state(info.actuators), channels_state(info.sensors),
-                        info.metadata_json, a.excitation, a.actuators, a.sensors,
-                        a.marked ? py::object(*a.marked) : py::object(py::none()));
+  return py::make_tuple(log.path().string(), members_of_info(log.info()), a.excitation, a.actuators,
+                        a.sensors, a.marked ? py::object(*a.marked) : py::object(py::none()));
 }
 
 std::shared_ptr<LogReader> log_of_state(const py::tuple& state) {
   const auto name = state[0].cast<std::string>();
   if (state.size() == 1) return open_log(name);
   LogInfo info;
-  info.sample_rate_hz = state[1].cast<double>();
-  info.period_samples = state[2].cast<int>();
-  info.transient_periods = state[3].cast<int>();
-  info.excitation = channels_of(state[4]);
-  info.actuators = channels_of(state[5]);
-  info.sensors = channels_of(state[6]);
-  info.metadata_json = state[7].cast<std::string>();
+  assign(members_of_info(info), state[1]);
   return std::make_shared<ArrayLog>(name, std::move(info),
-                                    experiment_arrays(state[8], state[9], state[10], state[11]));
+                                    experiment_arrays(state[2], state[3], state[4], state[5]));
 }
 
 }  // namespace stageid
