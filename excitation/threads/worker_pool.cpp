@@ -1,5 +1,7 @@
 #include "excitation/threads/worker_pool.hpp"
 
+#include <sched.h>
+
 #include <algorithm>
 #include <atomic>
 #include <exception>
@@ -16,6 +18,9 @@ constexpr Eigen::Index kLinesATask = 64;
 
 int worker_count(int requested) {
   if (requested > 0) return requested;
+  cpu_set_t allowed;
+  if (::sched_getaffinity(0, sizeof allowed, &allowed) == 0)
+    return std::max(1, CPU_COUNT(&allowed));
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 

@@ -6,7 +6,7 @@
 
 namespace stageid {
 
-/// `requested` threads, or one per core if it is not positive; at least one.
+/// `requested` threads, or one per core that the process may use if it is not positive; at least one.
 int worker_count(int requested);
 
 /// Calls task(worker, i) once for every i = 0 .. count - 1 from worker_count(threads) threads, the caller
