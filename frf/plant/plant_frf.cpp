@@ -7,13 +7,14 @@
 #include <iterator>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "excitation/threads/parcel.hpp"
+#include "excitation/threads/team.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
 #include "frf/plant/frf_provenance.hpp"
@@ -61,6 +62,7 @@ class PlantEstimation {
       : realizations_(std::move(chosen.realizations)),
         incomplete_(std::move(chosen.incomplete)),
         options_(options),
+        team_(options.team != nullptr ? *options.team : Team::one()),
         info_(realizations_.front().runs.front().log->info()),
         workers_(worker_count(options.threads)),
         run_workers_(options.threads, most_runs(realizations_), info_.period_samples),
@@ -179,20 +181,42 @@ class PlantEstimation {
   void measure(std::size_t m, const std::vector<RunExcitation>& excitation, HealthGathering* health,
                RealizationSpectra& spectra) {
     const RealizationRuns& realization = realizations_[m];
-    std::mutex mutex;
-    run_workers_.for_each(realization.runs.size(), [&](RunWorkspace& workspace, std::size_t e) {
-      const auto read_done = [this](double bytes) { bytes_.add(bytes); };
-      HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
-      RunSpectra run =
-          options_.method == FrfMethod::lpm
-              ? measure_record(realization.runs[e], excitation[e], channels_, options_.periods,
-                               workspace, part, read_done)
-              : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
-                            options_.periods, workspace, part, read_done);
-      if (part != nullptr) part->forget_deviating(run);
-      const std::lock_guard lock(mutex);
-      spectra.add(e, std::move(run));
-    });
+    const auto count = std::ssize(realization.runs);
+    std::vector<RunSpectra> runs(realization.runs.size());
+    const TileShare own = team_.share(count);
+    run_workers_.for_each(
+        static_cast<std::size_t>(own.count), [&](RunWorkspace& workspace, std::size_t i) {
+          const std::size_t e = static_cast<std::size_t>(own.first) + i;
+          const auto read_done = [this](double bytes) { bytes_.add(bytes); };
+          HealthPart* part = health != nullptr ? &health->part(m, e) : nullptr;
+          RunSpectra run =
+              options_.method == FrfMethod::lpm
+                  ? measure_record(realization.runs[e], excitation[e], channels_, options_.periods,
+                                   workspace, part, read_done)
+                  : measure_run(realization.runs[e], lines_, channels_, excitation[e].period,
+                                options_.periods, workspace, part, read_done);
+          if (part != nullptr) part->forget_deviating(run);
+          runs[e] = std::move(run);
+        });
+    if (team_.divides(count)) exchange(m, health, runs);
+    for (std::size_t e = 0; e < runs.size(); ++e) spectra.add(e, std::move(runs[e]));
+  }
+
+  /// Gives the runs of each process to all others.
+  void exchange(std::size_t m, HealthGathering* health, std::vector<RunSpectra>& runs) {
+    for (int owner = 0; owner < team_.size(); ++owner) {
+      const TileShare of_owner = team_.share(std::ssize(runs), owner);
+      for (Eigen::Index i = 0; i < of_owner.count; ++i) {
+        const auto e = static_cast<std::size_t>(of_owner.first + i);
+        if (owner != team_.rank()) {
+          runs[e].scatter_re = run_workers_.pool().take();
+          runs[e].scatter_im = run_workers_.pool().take();
+          bytes_.add(ByteCounter::bytes_of(realizations_[m].runs[e]));
+        }
+        broadcast(team_, owner, runs[e]);
+        if (health != nullptr) broadcast(team_, owner, health->part(m, e));
+      }
+    }
   }
 
   void prepare(const RealizationRuns& realization, const std::vector<RunExcitation>& excitation) {
@@ -309,6 +333,7 @@ class PlantEstimation {
   std::vector<RealizationRuns> realizations_;
   std::vector<LeftOutRealization> incomplete_;
   const FrfOptions& options_;
+  const Team& team_;
   const LogInfo& info_;
   int workers_;
   RunWorkers run_workers_;

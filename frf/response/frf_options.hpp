@@ -24,6 +24,8 @@ enum class PeriodChoice : std::uint8_t {
 template <>
 inline constexpr std::array kWords<PeriodChoice> = {"consistent", "unmarked"};
 
+class Team;
+
 struct FrfOptions {
   std::vector<std::string> inputs{};       ///< actuator names; empty: the excited ones
   std::vector<std::string> outputs{};      ///< sensor names; empty: all
@@ -34,6 +36,7 @@ struct FrfOptions {
   int covariance_lines = 1;         ///< number of lines for smooth_covariance(), odd
   std::vector<int> realizations{};  ///< 0-based; empty: all complete ones
   int threads = 0;                  ///< 0: one per core; does not affect the result
+  const Team* team = nullptr;       ///< of processes that share the runs; null: one
   /// In bytes; called from one thread at a time.
   std::function<void(double done, double total)> progress{};
 };

@@ -15,12 +15,13 @@ class ByteCounter {
   ByteCounter(const FrfOptions& options, const std::vector<RealizationRuns>& realizations)
       : tell_(options.progress) {
     for (const RealizationRuns& realization : realizations) {
-      for (const UsedRun& used : realization.runs) {
-        const LogInfo& info = used.log->info();
-        total_ += static_cast<double>(used.periods) * info.period_samples *
-                  static_cast<double>(info.actuators.size() + info.sensors.size()) * sizeof(double);
-      }
+      for (const UsedRun& used : realization.runs) total_ += bytes_of(used);
     }
+  }
+  static double bytes_of(const UsedRun& used) {
+    const LogInfo& info = used.log->info();
+    return static_cast<double>(used.periods) * info.period_samples *
+           static_cast<double>(info.actuators.size() + info.sensors.size()) * sizeof(double);
   }
   void add(double bytes) {
     if (!tell_) return;

@@ -142,6 +142,24 @@ void HealthPart::forget_deviating(const RunSpectra& run) {
   if (of_start < std::ssize(run.deviating) || !run.replaced.empty()) start_ = RunStart();
 }
 
+void carry(Parcel& parcel, SampleSlip& slip) {
+  parcel(slip.run), parcel(slip.realization), parcel(slip.experiment), parcel(slip.row);
+  parcel(slip.lost), parcel(slip.sensors), parcel(slip.actuators), parcel(slip.channel);
+  parcel(slip.spoilt);
+}
+
+void carry(Parcel& parcel, RunStart& start) {
+  parcel(start.along), parcel(start.bend), parcel(start.start), parcel(start.slope);
+  parcel(start.first), parcel(start.last), parcel(start.noise), parcel(start.noise_dof);
+  parcel(start.periods), parcel(start.start_used);
+}
+
+void carry(Parcel& parcel, HealthPart& part) {
+  parcel(part.periods_), parcel(part.numbers_), parcel(part.scan_), parcel(part.slips_);
+  parcel(part.sensors_), parcel(part.start_lines_), parcel(part.start_sensors_);
+  parcel(part.start_transient_periods_), parcel(part.start_);
+}
+
 void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation, RunWorkspace& w,
                   HealthPart* health, const ReadDone& read_done,
                   const std::function<const KnownSpectra*(int period)>& take,

@@ -36,6 +36,9 @@ class HealthPart {
   /// is kept in any case. What is known of the start's transient is kept if only the first periods were dropped.
   void forget_deviating(const RunSpectra& run);
 
+  /// Packs or unpacks what a filled part contains.
+  friend void carry(Parcel& parcel, HealthPart& part);
+
  private:
   friend class HealthGathering;
   friend void read_periods(const UsedRun& run, const Eigen::MatrixXd& excitation,

@@ -204,6 +204,23 @@ RunSpectra measure_run(const UsedRun& used, const SpectrumLines& lines,
   return run;
 }
 
+void carry(Parcel& parcel, DroppedPeriod& one) {
+  parcel(one.realization), parcel(one.experiment), parcel(one.period), parcel(one.reason);
+}
+
+void carry(Parcel& parcel, ReplacedSamples& one) {
+  parcel(one.realization), parcel(one.experiment), parcel(one.period);
+  parcel(one.first), parcel(one.samples), parcel(one.reason);
+}
+
+void carry(Parcel& parcel, RunSpectra& run) {
+  parcel(run.mean), parcel(run.scatter_re), parcel(run.scatter_im), parcel(run.scatter_dof);
+  parcel(run.line_dof), parcel(run.scatter_window), parcel(run.scatter_first);
+  parcel(run.slope), parcel(run.slope_spread), parcel(run.common_sum), parcel(run.own_sum);
+  parcel(run.periods), parcel(run.excluded_power), parcel(run.fingerprint);
+  parcel(run.dropped), parcel(run.replaced), parcel(run.deviating);
+}
+
 void RunSpectra::drop(const LogRun& of, int period, std::string reason) {
   const auto at = std::ranges::upper_bound(dropped, period, {}, &DroppedPeriod::period);
   dropped.insert(at, {of.realization, of.experiment, period, std::move(reason)});

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "excitation/multisine/dft.hpp"
+#include "excitation/threads/parcel.hpp"
 #include "frf/runs/channel_choice.hpp"
 #include "frf/runs/run_table.hpp"
 #include "frf/statistics/matrix_pool.hpp"
@@ -49,6 +50,9 @@ struct RunSpectra {
   /// The scatter of line k as a full matrix. @pre degrees of freedom
   Eigen::MatrixXcd scatter(Eigen::Index k) const;
 };
+
+/// Packs or unpacks all of it.
+void carry(Parcel& parcel, RunSpectra& run);
 
 /// Common part of two lines' scatters: the squared correlation of their mean squares; 1 for k = l. For two windows with
 /// m of n bins in common, without the local polynomials, it is approximately x (2 + x) / 3, x = m / n.

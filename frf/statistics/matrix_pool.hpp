@@ -11,16 +11,16 @@ namespace stageid {
 /// than filling it. Safe for concurrent use.
 class MatrixPool {
  public:
-  /// A matrix with arbitrary contents.
+  /// A matrix with arbitrary contents and shape.
+  Eigen::MatrixXd take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) return {};
+    Eigen::MatrixXd matrix = std::move(free_.back());
+    free_.pop_back();
+    return matrix;
+  }
   Eigen::MatrixXd take(Eigen::Index rows, Eigen::Index cols) {
-    Eigen::MatrixXd matrix;
-    {
-      const std::lock_guard lock(mutex_);
-      if (!free_.empty()) {
-        matrix = std::move(free_.back());
-        free_.pop_back();
-      }
-    }
+    Eigen::MatrixXd matrix = take();
     matrix.resize(rows, cols);
     return matrix;
   }

@@ -93,8 +93,12 @@ void estimate_response(const FrfFlags& flags, Console& console) {
         "--delay");
   require_writable(flags.output, flags.logs);
   require_frf_ending(flags.output);
+  if (!flags.fft_wisdom.empty() && console.team->size() > 1)
+    throw std::invalid_argument(
+        "--fft-wisdom: each process would time its own plans; omit it, or use one process");
   std::optional<FftWisdomFile> wisdom;
   if (!flags.fft_wisdom.empty()) wisdom.emplace(flags.fft_wisdom);
+  options.team = console.team;
   FrfStep step = estimate_frf(flags.logs, options, {!flags.no_health, flags.stage}, console);
   if (wisdom) note_fft_plans(step.frf, wisdom->save());
   std::vector<std::string> notes = dropped_lines(step.frf);
@@ -104,7 +108,7 @@ void estimate_response(const FrfFlags& flags, Console& console) {
       notes.push_back(fmt::format("--compensate: delay {} s, as declared in the log", delay_s));
     step.frf = compensate(step.frf, flags.compensate, delay_s);
   }
-  write_frf(flags.output, step.frf);
+  if (console.team->rank() == 0) write_frf(flags.output, step.frf);
   const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
   console.result(fmt::format("{}: {}", flags.output.string(), describe(step.frf)));
   console.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,

@@ -99,6 +99,7 @@ void validate_model(const ValidateFlags& flags, Console& console) {
   options.inputs = model.inputs.names;
   options.outputs = model.outputs.names;
   options.threads = flags.threads;
+  options.team = console.team;
   FrfStep step;
   if (from_frf)
     step.frf = read_frf(flags.data);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "excitation/threads/team.hpp"
 #include "excitation/words/words.hpp"
 
 namespace stageid {
@@ -15,12 +16,13 @@ enum class Verbosity : std::uint8_t { quiet, normal, debug };
 template <>
 inline constexpr std::array kWords<Verbosity> = {"quiet", "normal", "debug"};
 
-/// Output of a command: results on stdout (a text, or with --json one object), messages and progress on stderr.
+/// Output of a command, and who executes it: results on stdout (a text, or with --json one object), messages and progress on stderr.
 class Console {
  public:
   Verbosity verbosity = Verbosity::normal;
   bool json = false;
-  int exit_code = 0;  ///< of the executed command
+  int exit_code = 0;                ///< of the executed command
+  const Team* team = &Team::one();  ///< of the processes that execute it
 
   /// A line of the result; not printed with --json.
   void result(const std::string& line) const;
