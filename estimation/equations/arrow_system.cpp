@@ -41,6 +41,20 @@ void hold_unknowns(const std::vector<Eigen::Index>& frozen, Eigen::MatrixXd& M) 
   }
 }
 
+struct ArrowSystem::GlobalSums {
+  explicit GlobalSums(Eigen::Index globals)
+      : size(globals), numbers(Eigen::VectorXd::Zero(sums_size(globals))) {}
+
+  Eigen::Map<Eigen::MatrixXd> M() { return {numbers.data(), size, size}; }
+  Eigen::Map<Eigen::MatrixXd> schur() { return {numbers.data() + size * size, size, size}; }
+  Eigen::Map<Eigen::VectorXd> e() { return {numbers.data() + 2 * size * size, size}; }
+  Eigen::Map<Eigen::VectorXd> schur_e() { return {numbers.data() + (2 * size + 1) * size, size}; }
+  double& irregular() { return numbers[numbers.size() - 1]; }  ///< channels that are singular
+
+  Eigen::Index size;
+  Eigen::VectorXd numbers;
+};
+
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method,
                          ChannelEquationsUse use)
@@ -50,68 +64,83 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
                          ChannelEquationsUse use)
     : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
-  const Eigen::Index globals = problem.globals();
-  M_.setZero(globals, globals);
-  e_.setZero(globals);
-  schur_.setZero(globals, globals);
-  schur_e_.setZero(globals);
   if (keeps()) channels_.resize(static_cast<std::size_t>(part.count));
+  const Eigen::Index first_tile = part.first / kTileChannels;
+  const Eigen::Index tiles = channel_tiles(part.first + part.count) - first_tile;
+  const Team& team = keeps() ? Team::one() : *problem.team;
+  const TileShare own = team.share(tiles);
+  const Eigen::Index first = std::max(part.first, (first_tile + own.first) * kTileChannels);
+  const Eigen::Index end =
+      std::min(part.first + part.count, (first_tile + own.first + own.count) * kTileChannels);
+  std::vector<GlobalSums> sums(static_cast<std::size_t>(own.count), GlobalSums(problem.globals()));
   for (const BasisGroup& group : groups) {
-    const Eigen::Index* all = group.channels.data();
-    const Eigen::Index* all_end = all + group.channels.size();
-    // the channels are sorted
-    const Eigen::Index* begin = std::lower_bound(all, all_end, part.first);
-    const Eigen::Index* end = std::lower_bound(begin, all_end, part.first + part.count);
-    if (begin == end) continue;
+    const std::vector<TileRange> blocks =
+        member_blocks(group, {first, end - first}, problem.size());
+    if (blocks.empty()) continue;
     const GroupProducts products(shared_, group);
-    for (const TileRange& block : member_blocks(begin - all, end - begin, problem.size()))
-      if (regular_) add_block(products, block);
+    for (const TileRange& block : blocks) {
+      const Eigen::Index tile =
+          group.channels[static_cast<std::size_t>(block.first_member)] / kTileChannels;
+      GlobalSums& out = sums[static_cast<std::size_t>(tile - first_tile - own.first)];
+      if (out.irregular() == 0.0) add_block(products, block, out);
+    }
   }
-  schur_ += M_;
-  schur_e_ += e_;
+  std::vector<Eigen::VectorXd> parts;
+  for (GlobalSums& of_tile : sums) parts.push_back(std::move(of_tile.numbers));
+  GlobalSums all(problem.globals());
+  all.numbers = team.sum(tiles, all.numbers.size(), parts);
+  regular_ = all.irregular() == 0.0;
+  M_ = all.M();
+  e_ = all.e();
+  schur_ = all.schur() + M_;
+  schur_e_ = all.schur_e() + e_;
 }
 
-void ArrowSystem::add_block(const GroupProducts& products, const TileRange& block) {
+void ArrowSystem::add_block(const GroupProducts& products, const TileRange& block,
+                            GlobalSums& out) {
   const auto first_member = products.group.channels.begin() + block.first_member;
   const std::vector<Eigen::Index> members(first_member, first_member + block.members);
   const Eigen::MatrixXd B = beta_.B(members, Eigen::all);
   const LineSums sums = line_sums(products, block, B);
-  add_denominators(sums);
+  add_denominators(sums, out);
   std::vector<Channel> channels;
-  for (Eigen::Index first = 0; first < block.members && regular_; first += kAtOnce) {
+  for (Eigen::Index first = 0; first < block.members && out.irregular() == 0.0; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, block.members - first);
     channels.resize(static_cast<std::size_t>(count));
     for (Eigen::Index i = 0; i < count; ++i) {
       Channel& channel = channels[static_cast<std::size_t>(i)];
       set_channel(sums, B, first + i, channel);
       if (problem_.delays() > 0)
-        add_delays(sums, B, first + i, members[static_cast<std::size_t>(first + i)], channel);
+        add_delays(sums, B, first + i, members[static_cast<std::size_t>(first + i)], channel, out);
     }
-    add_channels(members.data() + first, channels);
+    add_channels(members.data() + first, channels, out);
   }
 }
 
-void ArrowSystem::add_channels(const Eigen::Index* places, std::vector<Channel>& channels) {
-  if (use_ != ChannelEquationsUse::only_kept) eliminate(channels);
+void ArrowSystem::add_channels(const Eigen::Index* places, std::vector<Channel>& channels,
+                               GlobalSums& out) {
+  if (use_ != ChannelEquationsUse::only_kept) eliminate(channels, out);
   for (std::size_t i = 0; keeps() && i < channels.size(); ++i)
     channels_[static_cast<std::size_t>(places[i] - range_.first)] = std::move(channels[i]);
 }
 
-void ArrowSystem::add_denominators(const LineSums& sums) {
+void ArrowSystem::add_denominators(const LineSums& sums, GlobalSums& out) const {
+  auto M = out.M();
+  auto e = out.e();
   const Eigen::Index n_a = problem_.denominators();
   const auto n_d = static_cast<Eigen::Index>(shared_.columns.size());
   for (Eigen::Index d = 0; d < n_d; ++d)
     for (Eigen::Index o = 0; o < n_d; ++o) {
       const Eigen::Index p = shared_.columns[static_cast<std::size_t>(d)].parameter;
       const Eigen::Index q = shared_.columns[static_cast<std::size_t>(o)].parameter;
-      M_(p, q) += d >= o ? sums.DD(d, o) : sums.DD(o, d);
+      M(p, q) += d >= o ? sums.DD(d, o) : sums.DD(o, d);
     }
-  e_.head(n_a) += sums.ZE;
+  e.head(n_a) += sums.ZE;
   if (shared_.method == FitMethod::gn) return;
-  M_.topLeftCorner(n_a, n_a) -= sums.ZY;
+  M.topLeftCorner(n_a, n_a) -= sums.ZY;
   if (shared_.method != FitMethod::sk) return;
-  M_.topLeftCorner(n_a, n_a) += sums.YY - sums.ZY.transpose();
-  e_.head(n_a) -= sums.YE;
+  M.topLeftCorner(n_a, n_a) += sums.YY - sums.ZY.transpose();
+  e.head(n_a) -= sums.YE;
 }
 
 void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
@@ -135,27 +164,28 @@ void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Ei
 }
 
 void ArrowSystem::add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
-                             Eigen::Index index, Channel& channel) {
+                             Eigen::Index index, Channel& channel, GlobalSums& out) const {
+  auto M = out.M();
   const Eigen::Index n_a = problem_.denominators();
   const std::vector<Eigen::Index> delays = delay_parameters(problem_, index);
   for (const Eigen::Index t : delays) {
     channel.ab.row(t) += sums.TF.col(member).transpose();
     channel.ba.col(t) += sums.TF.col(member);
-    e_[t] += sums.TE[member];
-    for (const Eigen::Index o : delays) M_(t, o) += sums.TT[member];
+    out.e()[t] += sums.TE[member];
+    for (const Eigen::Index o : delays) M(t, o) += sums.TT[member];
     for (std::size_t d = 0; d < shared_.columns.size(); ++d) {
       const auto [f, p] = shared_.columns[d];
       const double value = B(member, f) * sums.TD(static_cast<Eigen::Index>(d), member);
-      M_(t, p) += value;
-      M_(p, t) += value;
+      M(t, p) += value;
+      M(p, t) += value;
     }
     if (shared_.method == FitMethod::gn) continue;
-    M_.row(t).head(n_a) -= sums.TY.col(member).transpose();
-    if (shared_.method == FitMethod::sk) M_.col(t).head(n_a) -= sums.TY.col(member);
+    M.row(t).head(n_a) -= sums.TY.col(member).transpose();
+    if (shared_.method == FitMethod::sk) M.col(t).head(n_a) -= sums.TY.col(member);
   }
 }
 
-void ArrowSystem::eliminate(std::vector<Channel>& channels) {
+void ArrowSystem::eliminate(std::vector<Channel>& channels, GlobalSums& out) const {
   std::vector<char> solved(channels.size());
   const int threads = problem_.functions() < kWorthThreads ? 1 : problem_.threads;
   for_each_task(threads, static_cast<int>(channels.size()), [&](int i) {
@@ -169,11 +199,13 @@ void ArrowSystem::eliminate(std::vector<Channel>& channels) {
     channel.x = solution.rightCols(1);
   });
   for (std::size_t i = 0; i < channels.size(); ++i) {
-    regular_ = regular_ && solved[i] != 0;
-    if (!regular_) return;
+    if (solved[i] == 0) {
+      out.irregular() += 1.0;
+      return;
+    }
     const Channel& channel = channels[i];
-    schur_.noalias() -= channel.ab * channel.Z;
-    schur_e_.noalias() -= channel.ab * channel.x;
+    out.schur().noalias() -= channel.ab * channel.Z;
+    out.schur_e().noalias() -= channel.ab * channel.x;
   }
 }
 

@@ -26,7 +26,8 @@ enum class ChannelEquationsUse : std::uint8_t {
 /// Phi differs from J only in the denominator columns: those of J minus (j omega)^q E / A_i.
 ///
 /// With diagonal W, the numerators of different channels are not coupled, so M is an arrow: channels are
-/// eliminated one by one and the Schur complement on the globals is solved.
+/// eliminated one by one and the Schur complement on the globals is solved. Each process of a team eliminates its own
+/// channels if they are not kept; only the sums for the globals, sums_size() numbers, are sent.
 class ArrowSystem {
  public:
   /// @pre `groups` were evaluated with derivatives at `beta`.
@@ -67,17 +68,23 @@ class ArrowSystem {
   /// Whether all channels could be eliminated; if not, those after the first failure are missing.
   bool regular() const noexcept { return regular_; }
 
+  /// Numbers that a process sends to sum the equations of `globals` unknowns over all channels.
+  static Eigen::Index sums_size(Eigen::Index globals) { return 2 * globals * (globals + 1) + 1; }
+
  private:
+  /// M and e of the globals and their Schur complement, summed over the channels of a tile.
+  struct GlobalSums;
+
   bool keeps() const noexcept { return use_ != ChannelEquationsUse::eliminated; }
-  void add_block(const GroupProducts& products, const TileRange& block);
-  void add_denominators(const LineSums& sums);
+  void add_block(const GroupProducts& products, const TileRange& block, GlobalSums& out);
+  void add_denominators(const LineSums& sums, GlobalSums& out) const;
   void set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
                    Channel& channel) const;
   void add_delays(const LineSums& sums, const Eigen::MatrixXd& B, Eigen::Index member,
-                  Eigen::Index index, Channel& channel);
+                  Eigen::Index index, Channel& channel, GlobalSums& out) const;
   /// Eliminates the channels in the given order, and stores them if they are kept.
-  void add_channels(const Eigen::Index* places, std::vector<Channel>& channels);
-  void eliminate(std::vector<Channel>& channels);
+  void add_channels(const Eigen::Index* places, std::vector<Channel>& channels, GlobalSums& out);
+  void eliminate(std::vector<Channel>& channels, GlobalSums& out) const;
   Eigen::VectorXd solve_schur(const Eigen::VectorXd& right_side, double damping,
                               const std::vector<Eigen::Index>& frozen) const;
 

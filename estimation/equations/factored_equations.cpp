@@ -30,9 +30,9 @@ Eigen::VectorXd stacked_data(const FitProblem& problem, const Eigen::VectorXd& r
 }
 
 /// Orthogonal factors take as long as sums for sixteen times as many channels.
-void add_work(const FitProblem& problem, Eigen::Index channels, Eigen::Index columns) {
+void add_work(const FitProblem& problem, double channels, Eigen::Index columns) {
   if (problem.limit)
-    problem.limit->add(static_cast<double>(problem.size()), 16.0 * static_cast<double>(channels),
+    problem.limit->add(static_cast<double>(problem.size()), 16.0 * channels,
                        static_cast<double>(columns));
 }
 
@@ -57,9 +57,9 @@ FactoredEquations::FactoredEquations(const FitProblem& problem, const FitParamet
                                      const std::vector<BasisGroup>& groups) {
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
   const Eigen::Index globals = problem.globals();
-  add_work(problem, problem.channels(), problem.functions() + globals);
+  add_work(problem, static_cast<double>(problem.channels()), problem.functions() + globals);
   const Eigen::MatrixXd whole =
-      stacked_triangle(problem.channels(), problem.threads, [&](Eigen::Index c) {
+      stacked_triangle(problem.channels(), {problem.threads, problem.team}, [&](Eigen::Index c) {
         return triangle_of_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c);
       });
   R_ = whole.topLeftCorner(globals, globals);
@@ -86,9 +86,12 @@ Eigen::VectorXd FactoredEquations::solve_globals(double damping,
   return step;
 }
 
+void add_work_of_factors(const FitProblem& problem, double channels) {
+  add_work(problem, channels, problem.functions());
+}
+
 bool factored_numerators(const FitProblem& problem, const BasisGroup& group, const TileRange& block,
                          Eigen::MatrixXd& B, double& squares) {
-  add_work(problem, block.members, problem.functions());
   B.setZero(block.members, problem.functions());
   Eigen::VectorXd of_channel = Eigen::VectorXd::Zero(block.members);
   std::atomic<bool> regular = true;

@@ -16,7 +16,7 @@ namespace stageid {
 /// |R step - r|.
 class FactoredEquations {
  public:
-  /// @pre `groups` were evaluated with derivatives at `beta`, whose numerators are solved.
+  /// @pre `groups` were evaluated with derivatives at `beta`, whose numerators are solved and gathered.
   FactoredEquations(const FitProblem& problem, const FitParameters& beta,
                     const std::vector<BasisGroup>& groups);
 
@@ -31,6 +31,9 @@ class FactoredEquations {
   Eigen::MatrixXd schur_;
   Eigen::VectorXd schur_e_;
 };
+
+/// Counts the work of factored_numerators() for so many channels.
+void add_work_of_factors(const FitProblem& problem, double channels);
 
 /// Numerators of a block of channels, members x n_f, and their sum W |E|^2, by orthogonal factors.
 /// @returns false if the functions of a channel depend on each other to rounding

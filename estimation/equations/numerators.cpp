@@ -1,5 +1,6 @@
 #include "estimation/equations/numerators.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -127,21 +128,27 @@ void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit 
   }
 }
 
-/// Calls visit(group, pairs, block) for all channels in blocks until it returns false. @returns whether it never did
+/// The channels whose work this process does.
+IndexRange own_channels(const FitProblem& problem) {
+  const TileShare own = problem.team->share(channel_tiles(problem.channels()));
+  const Eigen::Index first = std::min(own.first * kTileChannels, problem.channels());
+  return {first, std::min((own.first + own.count) * kTileChannels, problem.channels()) - first};
+}
+
+/// Calls visit(group, pairs, block) for its own channels in blocks.
 template <typename Visit>
-bool visit_blocks(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+void visit_blocks(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+  const IndexRange own = own_channels(problem);
   for (const BasisGroup& group : groups) {
     // The products of all functions, shared by all blocks.
     const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
                               triangular_pairs(problem.functions()));
-    for (const TileRange& block :
-         member_blocks(0, static_cast<Eigen::Index>(group.channels.size()), problem.size()))
-      if (!visit(group, pairs, block)) return false;
+    for (const TileRange& block : member_blocks(group, own, problem.size()))
+      visit(group, pairs, block);
   }
-  return true;
 }
 
-/// Calls visit(c, M) for every channel with its normal equations, the members of a block in parallel.
+/// Calls visit(c, M) for every own channel with its normal equations, the members of a block in parallel.
 template <typename Visit>
 void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
   visit_blocks(problem, groups, [&](const auto& group, const auto& pairs, const auto& block) {
@@ -150,7 +157,6 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
       visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
             from_triangle(FF.col(r), problem.functions()));
     });
-    return true;
   });
 }
 
@@ -160,33 +166,49 @@ std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
                                                  const std::vector<BasisGroup>& groups,
                                                  Eigen::MatrixXd& B) {
   B.setZero(problem.channels(), problem.functions());
-  SolvedNumerators out;
-  double sum = 0.0;
+  const Eigen::Index tiles = channel_tiles(problem.channels());
+  const TileShare own = problem.team->share(tiles);
+  enum : Eigen::Index { kSquares, kTried, kByFactors, kFailed, kNumbers };
+  std::vector<Eigen::VectorXd> parts(static_cast<std::size_t>(own.count),
+                                     Eigen::VectorXd::Zero(kNumbers));
   Eigen::MatrixXd of_block;
   Eigen::MatrixXd by_factors;
   const auto solve = [&](const auto& group, const auto& pairs, const auto& block) {
+    const Eigen::Index tile =
+        group.channels[static_cast<std::size_t>(block.first_member)] / kTileChannels;
+    Eigen::VectorXd& part = parts[static_cast<std::size_t>(tile - own.first)];
+    if (part[kFailed] > 0.0) return;
     double squares = 0.0;
     const Digits digits = solve_by_sums(problem, group, pairs, block, of_block, squares);
     if (digits != Digits::enough) {
       double squares_by_factors = 0.0;
+      part[kTried] += static_cast<double>(block.members);
       if (factored_numerators(problem, group, block, by_factors, squares_by_factors)) {
-        out.factored = true;
+        part[kByFactors] += 1.0;
         of_block.swap(by_factors);
         squares = squares_by_factors;
       } else if (digits == Digits::none) {
-        return false;
+        part[kFailed] += 1.0;
+        return;
       } else {
         squares = residual_sums(problem, group, block, of_block).squares;
       }
     }
-    sum += squares;
+    part[kSquares] += squares;
     for (Eigen::Index r = 0; r < block.members; ++r)
       B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
-    return true;
   };
-  if (!visit_blocks(problem, groups, solve)) return std::nullopt;
-  out.cost = sum / (2.0 * static_cast<double>(problem.size()));
+  visit_blocks(problem, groups, solve);
+  const Eigen::VectorXd sum = problem.team->sum(tiles, kNumbers, parts);
+  if (sum[kTried] > 0.0) add_work_of_factors(problem, sum[kTried]);
+  if (sum[kFailed] > 0.0) return std::nullopt;
+  const SolvedNumerators out{sum[kSquares] / (2.0 * static_cast<double>(problem.size())),
+                             sum[kByFactors] > 0.0};
   return std::isfinite(out.cost) ? std::optional(out) : std::nullopt;
+}
+
+void gather_numerators(const FitProblem& problem, Eigen::MatrixXd& B) {
+  problem.team->gather_rows(kTileChannels, B);
 }
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
@@ -199,10 +221,13 @@ std::vector<double> removal_costs(const FitProblem& problem, const std::vector<B
       costs(static_cast<Eigen::Index>(i), c) = b.dot(inverse * b);
     });
   });
-  std::vector<double> out(problem.shapes.size(), 0.0);
-  for (Eigen::Index c = 0; c < costs.cols(); ++c)
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] += costs(static_cast<Eigen::Index>(i), c);
-  return out;
+  const Eigen::VectorXd sum =
+      sum_over_tiles(*problem.team, problem.channels(), costs.rows(), [&](IndexRange tile) {
+        Eigen::VectorXd part = Eigen::VectorXd::Zero(costs.rows());
+        for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) part += costs.col(c);
+        return part;
+      });
+  return {sum.begin(), sum.end()};
 }
 
 double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
@@ -219,7 +244,10 @@ double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup
     rise[c] = change.dot(M * change);
     B.row(c) += change.transpose();
   });
-  return rise.sum();
+  gather_numerators(problem, B);
+  return sum_over_tiles(*problem.team, problem.channels(), 1, [&](IndexRange tile) {
+    return Eigen::VectorXd::Constant(1, rise.segment(tile.first, tile.count).sum()).eval();
+  })[0];
 }
 
 }  // namespace stageid

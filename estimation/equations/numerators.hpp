@@ -15,11 +15,15 @@ struct SolvedNumerators {
 
 /// Solves the convex problem, numerators for fixed denominators, per channel, by normal equations scaled to unit
 /// diagonal and one step of refinement; by orthogonal factors where the refinement shows that products have too few
-/// digits, as for nearly exact data or modes that cancel each other. `B` is overwritten.
+/// digits, as for nearly exact data or modes that cancel each other. `B` is overwritten; each process of a team solves
+/// the rows of its own channels, see gather_numerators().
 /// @returns nothing if the equations of a channel are singular to rounding
 std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
                                                  const std::vector<BasisGroup>& groups,
                                                  Eigen::MatrixXd& B);
+
+/// Gives the numerators of each process to all others.
+void gather_numerators(const FitProblem& problem, Eigen::MatrixXd& B);
 
 /// Rise of sum W |E|^2 if the numerators of a submodel were removed and the others re-solved; one entry per submodel.
 /// @pre `B` solves the convex problem.

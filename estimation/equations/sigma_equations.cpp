@@ -26,17 +26,18 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
 }
 
 /// Fraction of the path up to each line: kPathShare by the change of log H over all channels, the rest by line index.
-Eigen::VectorXd path_of(const Eigen::MatrixXcd& H) {
+Eigen::VectorXd path_of(const Eigen::MatrixXcd& H, const Team& team) {
   const Eigen::Index last = H.cols() - 1;
-  Eigen::VectorXd path = Eigen::VectorXd::Zero(H.cols());
-  for (Eigen::Index k = 1; k <= last; ++k) {
-    double step = 0.0;
+  Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(H.cols(), 1);
+  const TileShare own = team.share(H.cols());
+  for (Eigen::Index k = std::max<Eigen::Index>(1, own.first); k < own.first + own.count; ++k)
     for (Eigen::Index c = 0; c < H.rows(); ++c) {
       const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
-      if (std::isfinite(turn)) step += turn;
+      if (std::isfinite(turn)) steps(k) += turn;
     }
-    path[k] = path[k - 1] + step;
-  }
+  team.gather_rows(1, steps);
+  Eigen::VectorXd path = Eigen::VectorXd::Zero(H.cols());
+  for (Eigen::Index k = 1; k <= last; ++k) path[k] = path[k - 1] + steps(k);
   return kPathShare / std::max(path[last], 1e-300) * path +
          (1.0 - kPathShare) * Eigen::VectorXd::LinSpaced(H.cols(), 0.0, 1.0);
 }
@@ -104,15 +105,15 @@ Eigen::MatrixXd remaining_products(const Eigen::VectorXd& w, const Eigen::Vector
 
 SigmaEquations::SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen::MatrixXcd& G,
                                const Eigen::VectorXcd& factor, const Eigen::MatrixXd& weights,
-                               SplitMatrix own, int threads)
+                               SplitMatrix own, const Workers& workers)
     : x_(std::move(x)),
       unit_circle_(unit_circle),
       H_(G * factor.cwiseInverse().asDiagonal()),
-      path_(path_of(H_)),
+      path_(path_of(H_, channel_tiles(G.rows()) > 1 ? *workers.team : Team::one())),
       power_(factor.cwiseAbs2()),
       weights_(weights),
       own_(std::move(own)),
-      threads_(threads) {}
+      workers_(workers) {}
 
 Eigen::MatrixXd SigmaEquations::triangle(const PoleSet& poles, bool accurate) const {
   const SplitMatrix phi = partial_fractions(poles, x_);
@@ -148,7 +149,7 @@ Eigen::MatrixXd SigmaEquations::by_factors(const SplitMatrix& phi) const {
     const Eigen::VectorXcd response = H_.row(c)(lines).transpose();
     return factor_of_channel(weight.cwiseProduct(thin_power), response, thin_phi, thin_own);
   };
-  return stacked_triangle(H_.rows(), threads_, triangle_of) *
+  return stacked_triangle(H_.rows(), workers_, triangle_of) *
          std::sqrt(static_cast<double>(x_.size()) / static_cast<double>(lines.size()));
 }
 
@@ -157,15 +158,17 @@ std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
                                                        const SplitMatrix& phi) const {
   const Eigen::Index n = phi.cols();
   const FractionGram products(poles, x_, unit_circle_);
-  std::vector<Eigen::MatrixXd> shares(kShares, Eigen::MatrixXd::Zero(n + 1, n + 1));
-  for_each_task(threads_, kShares, [&](int share) {
-    for (Eigen::Index c = share; c < H_.rows(); c += kShares)
-      shares[static_cast<std::size_t>(share)] +=
-          remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
-                             H_.row(c).transpose(), phi, own_, products);
+  const Team& team = channel_tiles(H_.rows()) > 1 ? *workers_.team : Team::one();
+  const TileShare own = team.share(kShares);
+  std::vector<Eigen::VectorXd> shares(static_cast<std::size_t>(own.count));
+  for_each_task(workers_.threads, static_cast<int>(own.count), [&](int task) {
+    Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);
+    for (Eigen::Index c = own.first + task; c < H_.rows(); c += kShares)
+      S += remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
+                              H_.row(c).transpose(), phi, own_, products);
+    shares[static_cast<std::size_t>(task)] = S.reshaped();
   });
-  Eigen::MatrixXd S = shares[0];
-  for (std::size_t share = 1; share < kShares; ++share) S += shares[share];
+  const Eigen::MatrixXd S = team.sum(kShares, (n + 1) * (n + 1), shares).reshaped(n + 1, n + 1);
   const Eigen::VectorXd scale = inverse_root(S.diagonal());
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(scale.asDiagonal() * S *
                                                          scale.asDiagonal());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimation/model/pole_set.hpp"
+#include "excitation/threads/team.hpp"
 
 namespace stageid {
 
@@ -18,10 +19,10 @@ class SigmaEquations {
   /// @param own N x any: functions of the numerators besides the fractions
   SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen::MatrixXcd& G,
                  const Eigen::VectorXcd& factor, const Eigen::MatrixXd& weights, SplitMatrix own,
-                 int threads);
+                 const Workers& workers);
 
   /// R, n+1 x n+1: |R (c, d)|^2 is the squared residual of the equations. The norm of its last column is that of the
-  /// residual with numerators alone. The result does not depend on the number of threads.
+  /// residual with numerators alone. The result does not depend on the workers.
   /// @param accurate to rounding; else to about half of the digits, in a tenth of the time
   Eigen::MatrixXd triangle(const PoleSet& poles, bool accurate) const;
 
@@ -42,7 +43,7 @@ class SigmaEquations {
   Eigen::VectorXd power_;  // |factor|^2
   const Eigen::MatrixXd& weights_;
   SplitMatrix own_;
-  int threads_;
+  Workers workers_;
 };
 
 }  // namespace stageid

@@ -174,6 +174,7 @@ class Iteration {
 
   /// By Gauss-Newton: without a residual, the refined-IV equations are the same.
   bool factored_step(const std::vector<BasisGroup>& groups) {
+    gather_numerators(problem_, beta_.B);
     const FactoredEquations system(problem_, beta_, groups);
     if (!may_continue(system)) return false;
     if (!at_rounding() && attempt_learned()) return still_moving();
@@ -306,12 +307,19 @@ double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,
 }
 
 double signal_cost(const FitProblem& problem) {
-  return (problem.W->array() * problem.G->array().abs2()).sum() /
-         (2.0 * static_cast<double>(problem.size()));
+  const Eigen::VectorXd sum =
+      sum_over_tiles(*problem.team, problem.channels(), 1, [&](IndexRange tile) {
+        const auto W = problem.W->middleRows(tile.first, tile.count).array();
+        const auto G = problem.G->middleRows(tile.first, tile.count).array();
+        return Eigen::VectorXd::Constant(1, (W * G.abs2()).sum()).eval();
+      });
+  return sum[0] / (2.0 * static_cast<double>(problem.size()));
 }
 
 IterationResult iterate(const FitProblem& problem, FitParameters& beta, const FitOptions& options) {
-  return Iteration(problem, beta, options).run();
+  IterationResult result = Iteration(problem, beta, options).run();
+  gather_numerators(problem, beta.B);
+  return result;
 }
 
 }  // namespace stageid

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "estimation/problem/fit_problem.hpp"
+#include "excitation/threads/team.hpp"
 #include "frf/response/neighbour_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 
@@ -40,7 +43,10 @@ struct Part {
 /// The parts of the data, judged by one variance.
 class Parts {
  public:
-  Parts(const FrfEstimate& frf, double dof) : frf_(frf), dof_(dof) {
+  Parts(const FrfEstimate& frf, double dof)
+      : frf_(frf),
+        dof_(dof),
+        rounding_(kRounding * frf.response.colwise().squaredNorm().transpose()) {
     parts_.push_back({});
     for (const std::string& name : frf.outputs.names) parts_.push_back({"output " + name});
     for (const std::string& name : frf.inputs.names) parts_.push_back({"input " + name});
@@ -52,30 +58,49 @@ class Parts {
     seen_.resize(parts_.size());
   }
 
-  /// Adds one line: its residual, variance and weights (empty: all count), n_c each.
-  void add_line(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXcd>& residual,
+  /// Adds one line of some channels: residual, variance and weights (empty: all count).
+  void add_line(Eigen::Index k, Eigen::Index first_channel,
+                const Eigen::Ref<const Eigen::VectorXcd>& residual,
                 const Eigen::Ref<const Eigen::VectorXd>& variance,
                 const Eigen::Ref<const Eigen::VectorXd>& weights) {
-    const Eigen::Index n_y = frf_.n_outputs();
-    const double rounding = kRounding * frf_.response.col(k).squaredNorm();
-    std::fill(seen_.begin(), seen_.end(), false);
-    for (Eigen::Index c = 0; c < residual.size(); ++c) {
-      // A variance of zero is unknown.
-      if (!(variance[c] > 0.0) || (weights.size() > 0 && !(weights[c] > 0.0))) continue;
-      const double r = std::norm(residual[c]) / (variance[c] + rounding);
-      const double scaled = r / kAllowed;
+    for (Eigen::Index r = 0; r < residual.size(); ++r) {
+      if (!counts(variance[r], weights.size() > 0 ? weights[r] : 1.0)) continue;
+      const double ratio = std::norm(residual[r]) / (variance[r] + rounding_[k]);
+      const double scaled = ratio / kAllowed;
       const double t = dof_ > 0.0 ? dof_ * std::log1p(scaled / dof_) : scaled;
-      const Eigen::Index outputs = 1;
-      const Eigen::Index inputs = outputs + n_y;
-      const Eigen::Index runs = inputs + frf_.n_inputs();
-      for (const Eigen::Index p :
-           {Eigen::Index{0}, outputs + c % n_y, inputs + c / n_y, runs + k / kRun}) {
-        parts_[static_cast<std::size_t>(p)].add(t, r);
-        seen_[static_cast<std::size_t>(p)] = true;
-      }
+      for (const std::size_t p : parts_of(first_channel + r, k)) parts_[p].add(t, ratio);
     }
+  }
+
+  /// Counts the lines of every part. Like add_line(), but for all channels.
+  void count_line(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXd>& variance,
+                  const Eigen::Ref<const Eigen::VectorXd>& weights) {
+    std::fill(seen_.begin(), seen_.end(), false);
+    for (Eigen::Index c = 0; c < variance.size(); ++c)
+      if (counts(variance[c], weights.size() > 0 ? weights[c] : 1.0))
+        for (const std::size_t p : parts_of(c, k)) seen_[p] = true;
     for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].lines += seen_[p] ? 1.0 : 0.0;
   }
+
+  /// The sums of add_line() as numbers.
+  Eigen::VectorXd take_sums() {
+    Eigen::VectorXd sums(size());
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      Part& part = parts_[p];
+      sums.segment<3>(3 * static_cast<Eigen::Index>(p)) << part.t, part.r, part.entries;
+      part.t = part.r = part.entries = 0.0;
+    }
+    return sums;
+  }
+  void set_sums(const Eigen::VectorXd& sums) {
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      const auto of_part = sums.segment<3>(3 * static_cast<Eigen::Index>(p));
+      parts_[p].t = of_part[0];
+      parts_[p].r = of_part[1];
+      parts_[p].entries = of_part[2];
+    }
+  }
+  Eigen::Index size() const { return 3 * std::ssize(parts_); }
 
   const Part& all() const { return parts_.front(); }
 
@@ -104,6 +129,17 @@ class Parts {
   }
 
  private:
+  /// A variance of zero is unknown.
+  static bool counts(double variance, double weight) { return variance > 0.0 && weight > 0.0; }
+
+  std::array<std::size_t, 4> parts_of(Eigen::Index c, Eigen::Index k) const {
+    const Eigen::Index n_y = frf_.n_outputs();
+    const Eigen::Index inputs = 1 + n_y;
+    const Eigen::Index runs = inputs + frf_.n_inputs();
+    return {0, static_cast<std::size_t>(1 + c % n_y), static_cast<std::size_t>(inputs + c / n_y),
+            static_cast<std::size_t>(runs + k / kRun)};
+  }
+
   /// If r has no mean, the mean of t is used as size of the excess.
   double excess(const Part& part) const {
     return expected() > 0.0 ? part.mean_r() / expected() : kAllowed * part.mean_t();
@@ -121,34 +157,49 @@ class Parts {
 
   const FrfEstimate& frf_;
   double dof_;
+  Eigen::VectorXd rounding_;  // of every line
   std::vector<Part> parts_;
   std::vector<bool> seen_;
 };
 
 constexpr Eigen::Index kTile = 64;  // lines
 
-/// The variance of lines from `first` on, whose residual is E.
-using VarianceOfTile =
-    std::function<Eigen::MatrixXd(Eigen::Index first, const Eigen::MatrixXcd& E)>;
+/// The residual of some channels, line tile by line tile: use(block, E).
+template <typename Use>
+void for_each_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
+                       const IndexRange& channels, const Use& use) {
+  for (Eigen::Index first = 0, count = 0; first < frf.lines(); first += count) {
+    count = frf.lines() - first;
+    if (count >= 2 * kTile) count = kTile;  // the last tile has enough lines for a scatter
+    const ResponseBlock block{channels.first, channels.count, first, count};
+    use(block, Eigen::MatrixXcd(frf.response.block(channels.first, first, channels.count, count) -
+                                model(block)));
+  }
+}
 
-/// Judges by one variance, with so many degrees of freedom.
-ResidualVerdict judge_by(const FrfEstimate& frf, const ModelLinesResponse& model,
+/// Judges by one variance of the data, n_c x N, with so many degrees of freedom; tiles of channels are summed by a team.
+ResidualVerdict judge_by(const FrfEstimate& frf, const ModelBlockResponse& model,
                          const Eigen::MatrixXd& weights, ResidualVariance kind, double dof,
-                         const VarianceOfTile& variance_of, const char* causes) {
+                         const Eigen::MatrixXd& variance, const char* causes, const Team& team) {
   ResidualVerdict verdict;
   verdict.variance = kind;
   verdict.dof = dof;
   Parts parts(frf, dof);
-  const Eigen::MatrixXd none(0, 1);
-  for (Eigen::Index first = 0, count = 0; first < frf.lines(); first += count) {
-    count = frf.lines() - first;
-    if (count >= 2 * kTile) count = kTile;  // the last tile has enough lines for a scatter
-    const Eigen::MatrixXcd E = frf.response.middleCols(first, count) - model(first, count);
-    const Eigen::MatrixXd variance = variance_of(first, E);
-    for (Eigen::Index i = 0; i < count; ++i)
-      parts.add_line(first + i, E.col(i), variance.col(i),
-                     weights.size() > 0 ? weights.col(first + i) : none.col(0));
-  }
+  const Eigen::MatrixXd none(0, frf.lines());
+  const Eigen::MatrixXd& W = weights.size() > 0 ? weights : none;
+  const auto sums = [&](const IndexRange& channels) {
+    for_each_residual(frf, model, channels, [&](const ResponseBlock& block, const auto& E) {
+      for (Eigen::Index i = 0; i < block.lines; ++i) {
+        const Eigen::Index k = block.first_line + i;
+        parts.add_line(
+            k, channels.first, E.col(i), variance.col(k).segment(channels.first, channels.count),
+            W.col(k).segment(W.rows() > 0 ? channels.first : 0, W.rows() > 0 ? channels.count : 0));
+      }
+    });
+    return parts.take_sums();
+  };
+  parts.set_sums(sum_over_tiles(team, frf.response.rows(), parts.size(), sums));
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) parts.count_line(k, variance.col(k), W.col(k));
   verdict.chi_square = parts.all().mean_r();
   verdict.expected = parts.expected();
   const Part* unexplained = parts.unexplained();
@@ -159,36 +210,34 @@ ResidualVerdict judge_by(const FrfEstimate& frf, const ModelLinesResponse& model
 
 /// For data without variances: their variance is the scatter of the residual from line to line. What a model misses is
 /// smooth.
-ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelLinesResponse& model,
-                                const Eigen::MatrixXd& weights, int threads) {
+ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelBlockResponse& model,
+                                const Eigen::MatrixXd& weights, int threads, const Team& team) {
   if (!has_line_scatter(frf.lines())) return {};
   Eigen::MatrixXd scatter(frf.response.rows(), frf.lines());
-  ResidualVerdict verdict = judge_by(
-      frf, model, weights, ResidualVariance::scatter, kScatterDof,
-      [&](Eigen::Index first, const Eigen::MatrixXcd& E) -> Eigen::MatrixXd {
-        return scatter.middleCols(first, E.cols()) =
-                   scatter_variance(frf.frequency_hz.segment(first, E.cols()), E, threads);
-      },
-      "neighbouring lines differ by");
+  for_each_residual(
+      frf, model, {0, frf.response.rows()}, [&](const ResponseBlock& block, const auto& E) {
+        scatter.middleCols(block.first_line, block.lines) =
+            scatter_variance(frf.frequency_hz.segment(block.first_line, block.lines), E, threads);
+      });
+  ResidualVerdict verdict = judge_by(frf, model, weights, ResidualVariance::scatter, kScatterDof,
+                                     scatter, "neighbouring lines differ by", team);
   verdict.scatter = std::move(scatter);
   return verdict;
 }
 
 }  // namespace
 
-ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
-                               const Eigen::MatrixXd& weights, int threads,
-                               const Distortion& known) {
+ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
+                               const Eigen::MatrixXd& weights, int threads, const Distortion& known,
+                               const Team* of_processes) {
+  const Team& team = of_processes != nullptr ? *of_processes : Team::one();
   if (weights.size() > 0 &&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
     throw std::invalid_argument("residual: the weights must have the shape of the response");
   const auto judge_with = [&](ResidualVariance kind, const Eigen::MatrixXd& variance, double dof) {
     return judge_by(
-        frf, model, weights, kind, dof,
-        [&](Eigen::Index first, const Eigen::MatrixXcd& E) {
-          return Eigen::MatrixXd(variance.middleCols(first, E.cols()));
-        },
-        kind == ResidualVariance::noise ? "noise explains" : "noise and distortion explain");
+        frf, model, weights, kind, dof, variance,
+        kind == ResidualVariance::noise ? "noise explains" : "noise and distortion explain", team);
   };
   const bool has_noise = frf.noise_variance.size() > 0;
   const bool has_total = frf.total_variance.size() > 0;
@@ -199,7 +248,7 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse&
     ResidualVerdict total = judge_with(ResidualVariance::total, frf.total_variance, frf.total_dof);
     return total.explained || !has_noise ? total : verdict;
   }
-  if (!has_noise) return judge_by_itself(frf, model, weights, threads);
+  if (!has_noise) return judge_by_itself(frf, model, weights, threads, team);
   if (known.level.cols() > 0 && known.level.rows() == frf.response.rows()) {
     Eigen::MatrixXd variance = variance_with(known, frf);
     ResidualVerdict distorted = judge_with(ResidualVariance::total, variance, frf.noise_dof);

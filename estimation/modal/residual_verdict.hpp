@@ -13,6 +13,8 @@
 
 namespace stageid {
 
+class Team;
+
 /// The variance of the data with which a residual is compared.
 enum class ResidualVariance : std::uint8_t {
   none,   ///< the data have no variances, and too few lines
@@ -37,10 +39,18 @@ struct ResidualVerdict {
   std::string reason;     ///< the reason if not explained, one sentence
 };
 
-/// The response of a model on the lines [first, first + count), (n_y n_u) x count, as measured.
-using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Eigen::Index count)>;
+/// Neighbouring channels on neighbouring lines.
+struct ResponseBlock {
+  Eigen::Index first_channel;
+  Eigen::Index channels;
+  Eigen::Index first_line;
+  Eigen::Index lines;
+};
 
-/// Compares the residual of a model with the variances of the data, one tile of lines after another.
+/// The response of a model in a block, channels x lines, as measured.
+using ModelBlockResponse = std::function<Eigen::MatrixXcd(const ResponseBlock& block)>;
+
+/// Compares the residual of a model with the variances of the data, one block after another.
 ///
 /// A residual whose power is a times the variance has r/a ~ F(2, 2 nu), so that
 ///   t = nu ln(1 + r/(a nu))  is exponential with mean 1, for any nu (t = r/a for an exact variance).
@@ -56,9 +66,10 @@ using ModelLinesResponse = std::function<Eigen::MatrixXcd(Eigen::Index first, Ei
 /// distribution.
 /// @param known distortion of one realization, from the fit of the model; used if there is no total variance
 /// @param weights of a fit, (n_y n_u) x N: entries of weight 0 are not judged; empty: all are judged
+/// @param team of processes that share the channels; null: one
 /// @throws std::invalid_argument if shapes do not match
-ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelLinesResponse& model,
+ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
                                const Eigen::MatrixXd& weights = {}, int threads = 0,
-                               const Distortion& known = {});
+                               const Distortion& known = {}, const Team* team = nullptr);
 
 }  // namespace stageid

@@ -87,8 +87,11 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Di
       responding.select(relative_channel_error(squared, power).array(), kUnknown).matrix();
   ResidualVerdict verdict = judge_residual(
       frf,
-      [&](Eigen::Index first, Eigen::Index count) {
-        return Eigen::MatrixXcd(frf.response.middleCols(first, count) - E.middleCols(first, count));
+      [&](const ResponseBlock& block) {
+        const auto of = [&](const Eigen::MatrixXcd& matrix) {
+          return matrix.block(block.first_channel, block.first_line, block.channels, block.lines);
+        };
+        return Eigen::MatrixXcd(of(frf.response) - of(E));
       },
       {}, 0, known);
   out.variance = verdict.variance;

@@ -1,5 +1,6 @@
 #include "estimation/model/additive_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -33,6 +34,12 @@ double AdditiveModel::mean_delay_s() const {
 
 Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold) {
+  return response(model, frequency_hz, hold, 0, model.n_outputs() * model.n_inputs());
+}
+
+Eigen::MatrixXcd response(const AdditiveModel& model,
+                          const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold,
+                          Eigen::Index first, Eigen::Index count) {
   if (hold != HoldModel::none && !(model.sample_rate_hz > 0.0))
     throw std::invalid_argument(
         "model: a hold needs a sample rate, but the model has none; use hold none");
@@ -42,11 +49,13 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
         "model: a frequency is above half the sample rate; omit it or use hold none");
   const ModelLines lines{2.0 * std::numbers::pi * frequency_hz,
                          model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0, hold};
-  const Eigen::Index channels = model.n_outputs() * model.n_inputs();
-  Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(channels, frequency_hz.size());
+  Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(count, frequency_hz.size());
   SubmodelBasis basis;
   for (const auto& [delay, members] :
        channels_by_delay(model.input_delays_s(), model.output_delays_s())) {
+    const auto begin = std::lower_bound(members.begin(), members.end(), first);
+    const auto end = std::lower_bound(begin, members.end(), first + count);
+    if (begin == end) continue;
     const HoldEquivalent through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
       const SubmodelShape shape = shape_of(submodel);
@@ -54,7 +63,7 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
       for (Eigen::Index k = 0; k < out.cols(); ++k)
         for (int m = 0; m <= shape.numerator_degree; ++m) {
           const double* B = submodel.numerator[static_cast<std::size_t>(m)].data();
-          for (const Eigen::Index c : members) out(c, k) += B[c] * basis.value(k, m);
+          for (auto c = begin; c != end; ++c) out(*c - first, k) += B[*c] * basis.value(k, m);
         }
     }
   }

@@ -118,6 +118,10 @@ struct AdditiveModel {
 /// @throws std::invalid_argument if `hold` needs an unknown sample rate, or a frequency is not below Nyquist.
 Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold);
+/// The same for `count` channels from `first` on.
+Eigen::MatrixXcd response(const AdditiveModel& model,
+                          const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold,
+                          Eigen::Index first, Eigen::Index count);
 
 /// Writes model.json as in docs/formats.md, atomically.
 /// @throws FileError, FormatError

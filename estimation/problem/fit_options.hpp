@@ -46,7 +46,9 @@ template <>
 inline constexpr std::array kWords<FitMethod> = {"riv", "gn", "sk"};
 
 class SearchLimit;
+class Team;
 struct CovarianceParts;
+struct Workers;
 
 enum class DelayModel : std::uint8_t { fixed, estimate, per_channel };
 template <>
@@ -80,11 +82,14 @@ struct FitOptions {
   bool response_variance = true;  ///< false: only the standard deviations
   bool covariance = false;        ///< also FitResult::covariance
   int threads = 0;                ///< 0: all cores; the result does not depend on it
+  const Team* team = nullptr;     ///< of processes that share the channels; null: one
   std::function<void(int iteration, double cost)> progress;
   std::function<bool()>
       interrupted;  ///< checked between steps; then the best model so far is completed
   std::shared_ptr<SearchLimit>
       limit;  ///< of the search that this fit is part of; created by automatic_fit()
+
+  Workers workers() const;
 };
 
 /// Covariances of the parameters and the response of a fit, see dense_covariances(). Parameters: denominator

@@ -12,6 +12,8 @@ std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most) {
   return out;
 }
 
+Workers FitOptions::workers() const { return {threads, team}; }
+
 Eigen::ArrayXd LineVariance::channel(Eigen::Index c) const {
   return matrix->row(c).transpose().array() / divisor;
 }

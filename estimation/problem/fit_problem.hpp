@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "estimation/problem/fit_options.hpp"
 #include "estimation/problem/fraction_columns.hpp"
 #include "estimation/problem/shared_matrix.hpp"
+#include "excitation/threads/team.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/response/frf_estimate.hpp"
 
@@ -63,6 +65,8 @@ struct FitProblem {
   std::vector<Eigen::Index> held;   ///< globals that are known and fixed
   DelayModel delay = DelayModel::fixed;
   int threads = 1;
+  const Team* team =
+      &Team::one();  ///< each process sums over the tiles of channels that are its own
   std::shared_ptr<SearchLimit> limit;  ///< each evaluation counts; empty: no limit
 
   Eigen::Index channels() const noexcept { return G->rows(); }
@@ -75,6 +79,30 @@ struct FitProblem {
   Eigen::Index globals() const noexcept { return denominators() + delays(); }
   Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };
+
+/// Channels that are multiplied together. The work of a fit is divided between processes by such tiles, so that the
+/// products are the same for any number of them.
+constexpr Eigen::Index kTileChannels = 256;
+inline Eigen::Index channel_tiles(Eigen::Index channels) {
+  return (channels + kTileChannels - 1) / kTileChannels;
+}
+/// The channels of a tile.
+inline IndexRange channels_of_tile(Eigen::Index tile, Eigen::Index channels) {
+  const Eigen::Index first = tile * kTileChannels;
+  return {first, std::min(kTileChannels, channels - first)};
+}
+
+/// The sum of part(channels) over all tiles, `numbers` long each; each process computes its own tiles.
+template <typename Part>
+Eigen::VectorXd sum_over_tiles(const Team& team, Eigen::Index channels, Eigen::Index numbers,
+                               const Part& part) {
+  const Eigen::Index tiles = channel_tiles(channels);
+  const TileShare own = team.share(tiles);
+  std::vector<Eigen::VectorXd> parts;
+  for (Eigen::Index t = own.first; t < own.first + own.count; ++t)
+    parts.push_back(part(channels_of_tile(t, channels)));
+  return team.sum(tiles, numbers, parts);
+}
 
 /// beta: all estimated parameters.
 struct FitParameters {

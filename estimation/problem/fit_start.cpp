@@ -98,6 +98,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   problem.delay = options.delay;
   problem.limit = options.limit;
   problem.threads = worker_count(options.threads);
+  if (options.team != nullptr) problem.team = options.team;
   const Eigen::Index per_channel = problem.functions();
   require(
       2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=

@@ -9,30 +9,34 @@ namespace {
 
 constexpr Eigen::Index kTileEntries = 1 << 18;
 
-/// E = G - P on some lines, in memory that can be used again.
+/// E = G - P of some channels on some lines, in memory that can be used again.
 void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                   const Eigen::MatrixXd& B, IndexRange lines, SplitMatrix& E) {
-  E.re = problem.G->middleCols(lines.first, lines.count).real();
-  E.im = problem.G->middleCols(lines.first, lines.count).imag();
+                   const Eigen::MatrixXd& B, IndexRange channels, IndexRange lines,
+                   SplitMatrix& E) {
+  const auto G = problem.G->block(channels.first, lines.first, channels.count, lines.count);
+  E.re = G.real();
+  E.im = G.imag();
   for (const BasisGroup& group : groups) {
     const auto F_re = group.F.re.middleRows(lines.first, lines.count);
     const auto F_im = group.F.im.middleRows(lines.first, lines.count);
     const bool all = group.channels.size() == static_cast<std::size_t>(problem.channels());
     if (all) {
-      E.re.noalias() -= B * F_re.transpose();
-      E.im.noalias() -= B * F_im.transpose();
+      E.re.noalias() -= B.middleRows(channels.first, channels.count) * F_re.transpose();
+      E.im.noalias() -= B.middleRows(channels.first, channels.count) * F_im.transpose();
     } else {
       for (const Eigen::Index c : group.channels) {
-        E.re.row(c) -= (F_re * B.row(c).transpose()).transpose();
-        E.im.row(c) -= (F_im * B.row(c).transpose()).transpose();
+        const Eigen::Index r = c - channels.first;
+        if (r < 0 || r >= channels.count) continue;
+        E.re.row(r) -= (F_re * B.row(c).transpose()).transpose();
+        E.im.row(r) -= (F_im * B.row(c).transpose()).transpose();
       }
     }
   }
 }
 
-/// All channels on some lines; tiles depend on sizes only, never on the number of threads.
-std::vector<IndexRange> line_tiles(const FitProblem& problem) {
-  return ranges_of(problem.size(), std::max<Eigen::Index>(1, kTileEntries / problem.channels()));
+/// So many channels on some lines; tiles depend on sizes only, never on the number of threads.
+std::vector<IndexRange> line_tiles(const FitProblem& problem, Eigen::Index channels) {
+  return ranges_of(problem.size(), std::max<Eigen::Index>(1, kTileEntries / channels));
 }
 
 }  // namespace
@@ -40,41 +44,47 @@ std::vector<IndexRange> line_tiles(const FitProblem& problem) {
 SplitMatrix residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B) {
   SplitMatrix E;
-  load_residual(problem, groups, B, {0, problem.size()}, E);
+  load_residual(problem, groups, B, {0, problem.channels()}, {0, problem.size()}, E);
   return E;
 }
 
 double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B) {
-  const double squares = ordered_sum(line_tiles(problem), problem.threads, [&](IndexRange tile) {
-    SplitMatrix E;
-    load_residual(problem, groups, B, tile, E);
-    const auto W = problem.W->middleCols(tile.first, tile.count).array();
-    return (W * (E.re.array().square() + E.im.array().square())).sum();
-  });
+  const double squares =
+      ordered_sum(line_tiles(problem, problem.channels()), problem.threads, [&](IndexRange tile) {
+        SplitMatrix E;
+        load_residual(problem, groups, B, {0, problem.channels()}, tile, E);
+        const auto W = problem.W->middleCols(tile.first, tile.count).array();
+        return (W * (E.re.array().square() + E.im.array().square())).sum();
+      });
   return squares / (2.0 * static_cast<double>(problem.size()));
 }
 
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                            const Eigen::MatrixXd& B, const ChannelFlags& responding) {
-  ResidualSize out;
-  double sum = 0.0;
-  Eigen::Index count = 0;
-  SplitMatrix E;
-  for (const IndexRange tile : line_tiles(problem)) {
-    load_residual(problem, groups, B, tile, E);
-    out.finite = out.finite && E.re.allFinite() && E.im.allFinite();
-    for (Eigen::Index k = 0; k < tile.count; ++k)
-      for (Eigen::Index c = 0; c < problem.channels(); ++c) {
-        const double power = std::norm((*problem.G)(c, tile.first + k));
-        if (!responding[c] || !(power > 0.0)) continue;
-        sum += (E.re(c, k) * E.re(c, k) + E.im(c, k) * E.im(c, k)) / power;
-        ++count;
-      }
-  }
-  out.relative_rms = count > 0 ? std::sqrt(sum / static_cast<double>(count))
-                               : std::numeric_limits<double>::quiet_NaN();
-  return out;
+  enum : Eigen::Index { kSquares, kCount, kInfinite, kNumbers };
+  const auto of_channels = [&](IndexRange channels) {
+    Eigen::VectorXd part = Eigen::VectorXd::Zero(kNumbers);
+    SplitMatrix E;
+    for (const IndexRange lines : line_tiles(problem, channels.count)) {
+      load_residual(problem, groups, B, channels, lines, E);
+      if (!E.re.allFinite() || !E.im.allFinite()) part[kInfinite] = 1.0;
+      for (Eigen::Index k = 0; k < lines.count; ++k)
+        for (Eigen::Index r = 0; r < channels.count; ++r) {
+          const Eigen::Index c = channels.first + r;
+          const double power = std::norm((*problem.G)(c, lines.first + k));
+          if (!responding[c] || !(power > 0.0)) continue;
+          part[kSquares] += (E.re(r, k) * E.re(r, k) + E.im(r, k) * E.im(r, k)) / power;
+          part[kCount] += 1.0;
+        }
+    }
+    return part;
+  };
+  const Eigen::VectorXd sum =
+      sum_over_tiles(*problem.team, problem.channels(), kNumbers, of_channels);
+  return {sum[kCount] > 0.0 ? std::sqrt(sum[kSquares] / sum[kCount])
+                            : std::numeric_limits<double>::quiet_NaN(),
+          sum[kInfinite] == 0.0};
 }
 
 }  // namespace stageid

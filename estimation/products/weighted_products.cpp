@@ -48,10 +48,15 @@ std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   return pairs;
 }
 
-std::vector<TileRange> member_blocks(Eigen::Index first, Eigen::Index members, Eigen::Index lines) {
+std::vector<TileRange> member_blocks(const BasisGroup& group, IndexRange part, Eigen::Index lines) {
   std::vector<TileRange> blocks;
-  for (Eigen::Index m = 0; m < members; m += kMostMembers)
-    blocks.push_back({first + m, std::min(kMostMembers, members - m), 0, lines});
+  const auto begin = group.channels.begin();  // the channels are sorted
+  const auto end = std::lower_bound(begin, group.channels.end(), part.first + part.count);
+  for (auto at = std::lower_bound(begin, end, part.first); at != end;) {
+    const auto next = std::lower_bound(at, end, (*at / kTileChannels + 1) * kTileChannels);
+    blocks.push_back({at - begin, next - at, 0, lines});
+    at = next;
+  }
   return blocks;
 }
 

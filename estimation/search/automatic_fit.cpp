@@ -157,7 +157,7 @@ class AutomaticFit {
   }
 
   std::vector<ProposedMode> proposals(std::size_t most) const {
-    return proposed_modes(frf_, best_.model, quick_.user_weights, most, quick_.threads);
+    return proposed_modes(frf_, best_.model, quick_.user_weights, most, quick_.workers());
   }
 
   /// Whether the residual contains a mode that may be worth its parameters.
@@ -193,7 +193,7 @@ class AutomaticFit {
     AdditiveModel model = start_of({});
     const auto wanted = static_cast<std::size_t>(selection_.exactly);
     const std::vector<ModeCandidate> modes =
-        relocate_poles(frf_, model, quick_.user_weights, wanted, quick_.threads);
+        relocate_poles(frf_, model, quick_.user_weights, wanted, quick_.workers());
     say("start: {} by pole relocation", counted(modes.size(), "mode"));
     FitOptions still = quick_;
     still.max_iterations = 0;
@@ -215,7 +215,7 @@ class AutomaticFit {
     if (limit_reached()) return;
     const auto modes = static_cast<std::size_t>(count_modes(best_.model));
     const AdditiveModel relocated =
-        start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.threads));
+        start_of(relocate_poles(frf_, best_.model, quick_.user_weights, modes, quick_.workers()));
     FitResult fit = fit_additive_model(frf_, relocated, quick_);
     if (!is_better(fit)) return;
     say("pole relocation: cost {:.6g} -> {:.6g}", cost(), fit.model.fit.cost);

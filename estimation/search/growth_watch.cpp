@@ -42,8 +42,9 @@ bool is_coloured(const FitResult& fit, std::size_t i) {
 bool rests_on_single_lines(const FrfEstimate& frf, const FitOptions& options,
                            const FitResult& before, const FitResult& now, std::size_t added) {
   const SharedMatrix<Eigen::MatrixXd> weights = make_weights(frf, options);
-  Eigen::VectorXd gain =
-      squares_of_lines(frf, before.model, weights) - squares_of_lines(frf, now.model, weights);
+  const Team& team = *options.workers().team;
+  Eigen::VectorXd gain = squares_of_lines(frf, before.model, weights, team) -
+                         squares_of_lines(frf, now.model, weights, team);
   const auto n = static_cast<Eigen::Index>(added);
   std::sort(gain.begin(), gain.end());
   const auto parameters = static_cast<double>(now.parameters - before.parameters);

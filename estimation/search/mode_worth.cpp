@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/problem/fit_problem.hpp"
+
 namespace stageid {
 
 double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
@@ -33,9 +35,14 @@ double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parame
 }
 
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
-                                 const Eigen::MatrixXd& weights) {
-  const Eigen::MatrixXcd E = frf.response - response(model, frf.frequency_hz, model.hold);
-  return weights.cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose();
+                                 const Eigen::MatrixXd& weights, const Team& team) {
+  return sum_over_tiles(team, weights.rows(), weights.cols(), [&](IndexRange tile) {
+    const Eigen::MatrixXcd E =
+        frf.response.middleRows(tile.first, tile.count) -
+        response(model, frf.frequency_hz, model.hold, tile.first, tile.count);
+    const auto W = weights.middleRows(tile.first, tile.count);
+    return Eigen::VectorXd(W.cwiseProduct(E.cwiseAbs2()).colwise().sum().transpose());
+  });
 }
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,

@@ -19,7 +19,7 @@ double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parame
 
 /// sum W |E|^2 of a model on every line. @param weights n_c x N
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
-                                 const Eigen::MatrixXd& weights);
+                                 const Eigen::MatrixXd& weights, const Team& team);
 
 /// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen, Biometrika 95
 /// (2008) 759) with unknown scale of the variances. With correct variances it decides like the criterion with known

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "estimation/model/basis.hpp"
 #include "estimation/model/model_structure.hpp"
@@ -16,7 +15,6 @@ namespace {
 constexpr double kDampings[] = {0.002, 0.006, 0.02, 0.06};
 constexpr double kLeastOwnShare = 0.02;
 constexpr Eigen::Index kBlock = 64;
-constexpr Eigen::Index kChannels = 256;  // residuals stored at a time
 
 /// Frequencies spaced by a fraction of the half-power width, at least by the line spacing.
 std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const AdditiveModel& model) {
@@ -89,30 +87,26 @@ Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model
 }
 
 /// Square root of the mean over channels, each scaled to the same size.
-Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights) {
-  const Eigen::VectorXd channel_scale = weights.rowwise().mean().cwiseInverse();
-  Eigen::VectorXd out(weights.cols());
-  for (Eigen::Index k = 0; k < out.size(); ++k)
-    out[k] = std::sqrt(weights.col(k).cwiseProduct(channel_scale).mean());
-  return out;
+Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights, const Team& team) {
+  const Eigen::VectorXd sum =
+      sum_over_tiles(team, weights.rows(), weights.cols(), [&](IndexRange tile) {
+        const auto W = weights.middleRows(tile.first, tile.count);
+        const Eigen::VectorXd channel_scale = W.rowwise().mean().cwiseInverse();
+        Eigen::VectorXd part(W.cols());
+        for (Eigen::Index k = 0; k < part.size(); ++k)
+          part[k] = W.col(k).cwiseProduct(channel_scale).sum();
+        return part;
+      });
+  return (sum / static_cast<double>(weights.rows())).cwiseSqrt();
 }
 
-/// Ranges of some hundred channels each, because temporaries must not need as much memory as the data.
-std::vector<IndexRange> input_ranges(const FrfEstimate& frf) {
-  return ranges_of(frf.n_inputs(), std::max<Eigen::Index>(1, kChannels / frf.n_outputs()));
-}
-
-/// W E; real parts of all lines, then imaginary parts.
+/// W E of some channels; real parts of all lines, then imaginary parts.
 Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
-                                  const Eigen::MatrixXd& weights, const IndexRange& inputs) {
-  const Eigen::Index N = frf.lines();
-  const Eigen::Index first = inputs.first * frf.n_outputs();
-  const Eigen::Index rows = inputs.count * frf.n_outputs();
-  std::vector<Eigen::Index> at(static_cast<std::size_t>(inputs.count));
-  std::iota(at.begin(), at.end(), inputs.first);
+                                  const Eigen::MatrixXd& weights, const IndexRange& channels) {
+  const auto [first, rows] = channels;
   const Eigen::MatrixXcd E = frf.response.middleRows(first, rows) -
-                             response(of_inputs(frf, model, at), frf.frequency_hz, model.hold);
-  Eigen::MatrixXd WE(rows, 2 * N);
+                             response(model, frf.frequency_hz, model.hold, first, rows);
+  Eigen::MatrixXd WE(rows, 2 * frf.lines());
   WE << weights.middleRows(first, rows).cwiseProduct(E.real()),
       weights.middleRows(first, rows).cwiseProduct(E.imag());
   return WE;
@@ -122,20 +116,21 @@ Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& m
 
 std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
-                                         int threads) {
+                                         const Workers& workers) {
   const Eigen::Index N = frf.lines();
-  const Eigen::VectorXd root_weight = mean_root_weight(weights);
+  const Eigen::VectorXd root_weight = mean_root_weight(weights, *workers.team);
   const Eigen::VectorXcd factor = delay_factor(frf, model);
   const Eigen::MatrixXd own = own_functions(frf, model, factor, root_weight);
 
   const std::vector<ModeCandidate> grid = candidate_grid(frf, model);
-  Eigen::VectorXd raw = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(grid.size()));
-  Eigen::VectorXd share = Eigen::VectorXd::Ones(raw.size());
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(grid.size()));
   const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
-  for (const IndexRange& inputs : input_ranges(frf)) {
-    const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, inputs);
-    const auto W = weights.middleRows(inputs.first * frf.n_outputs(), WE.rows());
-    for_each_task(threads, blocks, [&](int block) {
+  bool share_is_known = own.cols() == 0;
+  const auto raw_gain = [&](IndexRange channels) {
+    const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, channels);
+    const auto W = weights.middleRows(channels.first, channels.count);
+    Eigen::VectorXd raw(share.size());
+    for_each_task(workers.threads, blocks, [&](int block) {
       const auto first = static_cast<Eigen::Index>(block) * kBlock;
       const Eigen::Index count = std::min<Eigen::Index>(kBlock, raw.size() - first);
       Eigen::MatrixXd phi(2 * N, count);
@@ -148,19 +143,24 @@ std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveM
       }
       const Eigen::MatrixXd correlation = WE * phi;
       const Eigen::MatrixXd norm = W * power;
-      raw.segment(first, count) += (correlation.array().square() / norm.array().max(1e-300))
-                                       .colwise()
-                                       .sum()
-                                       .matrix()
-                                       .transpose();
-      if (inputs.first > 0 || own.cols() == 0) return;
+      raw.segment(first, count) = (correlation.array().square() / norm.array().max(1e-300))
+                                      .colwise()
+                                      .sum()
+                                      .matrix()
+                                      .transpose();
+      if (share_is_known) return;
       phi.topRows(N).array().colwise() *= root_weight.array();
       phi.bottomRows(N).array().colwise() *= root_weight.array();
       const Eigen::ArrayXd total = phi.colwise().squaredNorm().transpose();
       const Eigen::ArrayXd imitated = (own.transpose() * phi).colwise().squaredNorm().transpose();
       share.segment(first, count) = (1.0 - imitated / total).max(kLeastOwnShare);
     });
-  }
+    share_is_known = true;
+    return raw;
+  };
+  const Eigen::VectorXd raw =
+      sum_over_tiles(*workers.team, frf.response.rows(), share.size(), raw_gain);
+  if (!share_is_known) raw_gain(channels_of_tile(0, frf.response.rows()));  // without own tiles
   std::vector<ProposedMode> scored(grid.size());
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);

@@ -4,6 +4,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "estimation/model/cmif.hpp"
+#include "excitation/threads/team.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -24,6 +25,6 @@ struct ProposedMode {
 /// @param weights n_c x N   @returns at most `most`, best first, none two closer than their widths
 std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
-                                         int threads);
+                                         const Workers& workers);
 
 }  // namespace stageid

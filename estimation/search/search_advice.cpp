@@ -77,7 +77,7 @@ FitResult with_missing_modes(const FrfEstimate& frf, const FitOptions& trial, co
     const double price = ModeWorth(frf, structure, trial.user_weights).price(out);
     AdditiveModel model = out.model;
     for (const ProposedMode& missed :
-         proposed_modes(frf, out.model, trial.user_weights, together, trial.threads))
+         proposed_modes(frf, out.model, trial.user_weights, together, trial.workers()))
       if (missed.gain > price) model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
     if (model.submodels.size() == out.model.submodels.size()) break;
     FitResult fit = fit_additive_model(frf, model, trial);
@@ -157,7 +157,8 @@ void advise_structure(const FrfEstimate& frf, const FitOptions& options, const F
 /// The band without its worse end, if the smaller part of the lines has the larger part of the cost.
 void advise_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit,
                  FitReason& reason) {
-  const Eigen::VectorXd squares = squares_of_lines(frf, fit.model, trial.user_weights);
+  const Eigen::VectorXd squares =
+      squares_of_lines(frf, fit.model, trial.user_weights, *trial.workers().team);
   const auto end = static_cast<Eigen::Index>(kSmallEnd * static_cast<double>(frf.lines()));
   const double most = kMostOfCost * squares.sum();
   const Eigen::Index last = frf.lines() - 1;

@@ -175,11 +175,12 @@ class PoleSearch {
 std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOptions& options,
                                          ModeNumber number, bool cut_short,
                                          const FitResult& result) {
-  const auto lines = [&](Eigen::Index first, Eigen::Index count) {
-    return response(result.model, frf.frequency_hz.segment(first, count), result.model.hold);
+  const auto model = [&](const ResponseBlock& block) {
+    return response(result.model, frf.frequency_hz.segment(block.first_line, block.lines),
+                    result.model.hold, block.first_channel, block.channels);
   };
   const ResidualVerdict verdict =
-      judge_residual(frf, lines, *options.user_weights, options.threads);
+      judge_residual(frf, model, *options.user_weights, options.threads, {}, options.team);
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);

@@ -32,7 +32,7 @@ Eigen::VectorXcd complex(const SplitMatrix& column) {
 class Relocation {
  public:
   Relocation(const FrfEstimate& frf, const AdditiveModel& model, const Eigen::MatrixXd& weights,
-             int threads)
+             const Workers& workers)
       : exact_(model.hold == HoldModel::exact),
         lines_{frf.omega_rad_s(), frf.sample_rate_hz > 0.0 ? 1.0 / frf.sample_rate_hz : 0.0,
                model.hold} {
@@ -46,7 +46,7 @@ class Relocation {
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);
     }
     constant_ = constant_ || exact_;  // a held input adds a constant
-    equations_.emplace(x, exact_, frf.response, factor, weights, beside(x), threads);
+    equations_.emplace(x, exact_, frf.response, factor, weights, beside(x), workers);
   }
 
   std::vector<ModeCandidate> run(std::size_t modes) {
@@ -194,9 +194,9 @@ class Relocation {
 
 std::vector<ModeCandidate> relocate_poles(const FrfEstimate& frf, const AdditiveModel& model,
                                           const Eigen::MatrixXd& weights, std::size_t modes,
-                                          int threads) {
+                                          const Workers& workers) {
   if (modes == 0 || frf.lines() < 2) return {};
-  return Relocation(frf, model, weights, threads).run(modes);
+  return Relocation(frf, model, weights, workers).run(modes);
 }
 
 }  // namespace stageid

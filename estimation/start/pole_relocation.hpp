@@ -5,6 +5,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "estimation/model/cmif.hpp"
+#include "excitation/threads/team.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -25,6 +26,6 @@ namespace stageid {
 /// @returns at most `modes` modes, sorted by frequency; two real poles form an overdamped one
 std::vector<ModeCandidate> relocate_poles(const FrfEstimate& frf, const AdditiveModel& model,
                                           const Eigen::MatrixXd& weights, std::size_t modes,
-                                          int threads);
+                                          const Workers& workers);
 
 }  // namespace stageid

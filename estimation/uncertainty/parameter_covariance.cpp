@@ -37,7 +37,7 @@ std::vector<IndexRange> channel_parts(const FitProblem& problem, const DataNoise
                                 : noise.correlation.known()        ? problem.n_outputs
                                                                    : 1;
   return ranges_of(problem.channels(),
-                   std::max<Eigen::Index>(1, kMostMembers / together) * together);
+                   std::max<Eigen::Index>(1, kTileChannels / together) * together);
 }
 
 /// The equations of some channels, M and K = sum Re{J^H W C W J}, with uncorrelated noise of the channels.
@@ -254,17 +254,33 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
                                  ChannelEquationsUse::only_kept);
   };
 
-  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(problem.globals(), problem.globals());
-  Eigen::MatrixXd K = S;
+  // Each process has the equations of its own parts; nothing but S and K is summed, and the variances gathered.
+  const Team& team = wanted.parts ? Team::one() : *problem.team;
+  const auto tiles = static_cast<Eigen::Index>(parts.size());
+  const TileShare own = team.share(tiles);
+  const Eigen::Index globals = problem.globals();
+  std::vector<Eigen::VectorXd> sums;
   std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
                                                : std::size_t{0});
-  for (const IndexRange part : parts) {
+  for (Eigen::Index p = own.first; p < own.first + own.count; ++p) {
+    const IndexRange part = parts[static_cast<std::size_t>(p)];
     make_equations(part);
-    if (!equations->gn.regular()) return {};
-    S += equations->gn.schur();
-    K += correlate ? correlated_middle(problem, beta, group_of, *equations, part, noise, cross)
-                   : projected_middle(*equations, part);
+    Eigen::VectorXd& sum = sums.emplace_back(Eigen::VectorXd::Zero(2 * globals * globals + 1));
+    if (!equations->gn.regular()) {
+      sum.tail(1).setOnes();
+      continue;
+    }
+    sum << equations->gn.schur().reshaped(),
+        (correlate ? correlated_middle(problem, beta, group_of, *equations, part, noise, cross)
+                   : projected_middle(*equations, part))
+            .reshaped(),
+        0.0;
   }
+  const Eigen::VectorXd sum = team.sum(tiles, 2 * globals * globals + 1, sums);
+  if (sum.tail(1)[0] > 0.0) return {};
+  const Eigen::MatrixXd S = sum.head(globals * globals).reshaped(globals, globals);
+  const Eigen::MatrixXd K =
+      sum.segment(globals * globals, globals * globals).reshaped(globals, globals);
   const Eigen::MatrixXd inverse = free_inverse(S, frozen);
   if (problem.globals() > 0)
     out.globals = half * inverse * definite_middle(K) * inverse.transpose();
@@ -276,9 +292,11 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
         out.globals, inverse, out.residual_scale,
         std::vector<ChannelCovariance>(static_cast<std::size_t>(problem.channels()))});
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
-  for (const IndexRange part : parts) {
-    if (parts.size() > 1) make_equations(part);
-    const bool determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
+  bool all_determined = true;
+  for (Eigen::Index p = own.first; p < own.first + own.count && all_determined; ++p) {
+    const IndexRange part = parts[static_cast<std::size_t>(p)];
+    if (own.count > 1) make_equations(part);
+    all_determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
       const ArrowSystem::Channel& gn = equations->gn.channel(c);
       const ArrowSystem::Channel& k = equations->middle().channel(c);
       if (has_no_weight(problem, c)) {
@@ -296,8 +314,13 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
       if (out.parts) out.parts->channels[at] = std::move(channel);
       return true;
     });
-    if (!determined) return {};
   }
+  if (team.divides(tiles)) {
+    if (team.any(!all_determined)) return {};
+    team.gather_rows(parts.front().count, out.numerator_variance);
+    team.gather_rows(parts.front().count, out.response_variance);
+  }
+  if (!all_determined) return {};
   return out;
 }
 

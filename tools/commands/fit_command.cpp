@@ -55,6 +55,7 @@ void fit(const FitCommandFlags& flags, Console& console) {
   require_model_ending(flags.output);
   require_covariance_file(flags);
   FitSetup setup = make_fit_setup(request, read_frf(flags.frf));
+  setup.options.team = console.team;
   setup.options.response_variance = false;  // that of the covariance is exact for all weights
   setup.options.covariance = !flags.covariance.empty();
   for (const std::string& doubt :
@@ -63,9 +64,10 @@ void fit(const FitCommandFlags& flags, Console& console) {
   const FitStep step = fit_with_progress(setup, flags.frf.filename().string(),
                                          fingerprint_of_file(flags.frf), console);
   const FitResult& result = step.result;
-  write_model(flags.output, result.model);
+  const bool writes = console.team->rank() == 0;
+  if (writes) write_model(flags.output, result.model);
   const bool told = result.covariance.sandwich.size() > 0;
-  if (told) write_covariance(flags.covariance, result, setup.frf.frequency_hz);
+  if (told && writes) write_covariance(flags.covariance, result, setup.frf.frequency_hz);
 
   for (const std::string& line : result.decisions) console.result(line);
   console.result(cost_line(result.cost));

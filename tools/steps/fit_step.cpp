@@ -94,7 +94,8 @@ FitStep fit_with_progress(const FitSetup& setup, const std::string& frf_name,
   Progress progress(console, "fit", "iterations");
   throw_if_interrupted();
   const ControlledStop keeps_the_best_model;
-  options.interrupted = [] { return interrupt_flag().load(); };
+  // A signal may reach the processes of a team at different steps.
+  options.interrupted = [&] { return console.team->any(interrupt_flag()); };
   options.progress = [&](int iteration, double cost) {
     progress.update(iteration, 0.0, fmt::format("cost {:.6g}", cost));
   };

@@ -43,8 +43,8 @@ ResidualVerdict judge(const FrfEstimate& frf, double level = 0.0,
                       const Eigen::MatrixXd& weights = {}) {
   return judge_residual(
       frf,
-      [&](Eigen::Index, Eigen::Index count) {
-        return Eigen::MatrixXcd::Constant(frf.response.rows(), count, level).eval();
+      [&](const ResponseBlock& block) {
+        return Eigen::MatrixXcd::Constant(block.channels, block.lines, level).eval();
       },
       weights, 1);
 }

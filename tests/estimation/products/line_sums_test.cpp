@@ -174,7 +174,9 @@ TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
                                        {257, 257},
                                        {1000, 5000}}) {
     Eigen::MatrixXi seen = Eigen::MatrixXi::Zero(members, lines);
-    for (const TileRange& block : member_blocks(0, members, lines))
+    BasisGroup group;
+    group.channels = indices(0, members);
+    for (const TileRange& block : member_blocks(group, {0, members}, lines))
       for (const TileRange& share : line_shares(block))
         for_each_tile(share, [&, rows = share](Eigen::Index first, Eigen::Index n) {
           seen.block(rows.first_member, first, rows.members, n).array() += 1;

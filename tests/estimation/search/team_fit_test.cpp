@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdint>
+
+#include "estimation/equations/arrow_system.hpp"
+#include "estimation/search/automatic_fit.hpp"
+#include "estimation/search/fit_additive_model.hpp"
+#include "tests/support/process/thread_team.hpp"
+#include "tests/support/stages/random_stage.hpp"
+
+namespace stageid::test_team_fit {
+
+using test::run_team;
+
+/// More channels than two tiles, of two inputs.
+const test::RandomStage& wide_stage() {
+  static const test::RandomStage stage = test::draw_random_stage(
+      3, {.outputs = 300, .inputs = 2, .least_modes = 4, .most_modes = 4, .line_spacing_hz = 8.0});
+  return stage;
+}
+
+FitOptions options_of(const test::RandomStage& stage) {
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = HoldModel::exact;
+  options.delay = DelayModel::estimate;
+  options.delay_s = stage.delay_s;
+  options.threads = 1;
+  return options;
+}
+
+void expect_same_bytes(const FitResult& a, const FitResult& b) {
+  EXPECT_EQ(a.cost, b.cost);
+  EXPECT_EQ(a.removal_cost, b.removal_cost);
+  EXPECT_EQ(a.model.fit.relative_rms_error, b.model.fit.relative_rms_error);
+  ASSERT_EQ(a.model.submodels.size(), b.model.submodels.size());
+  for (std::size_t i = 0; i < a.model.submodels.size(); ++i) {
+    const Submodel& s = a.model.submodels[i];
+    const Submodel& t = b.model.submodels[i];
+    EXPECT_EQ(s.denominator, t.denominator);
+    EXPECT_EQ(s.natural_frequency_std_hz, t.natural_frequency_std_hz);
+    EXPECT_TRUE(s.numerator == t.numerator);
+    EXPECT_TRUE(s.numerator_std == t.numerator_std);
+  }
+}
+
+TEST(TeamFit, AFitHasTheSameBytesInEveryTeam) {
+  const test::RandomStage& stage = wide_stage();
+  for (const FitMethod method : {FitMethod::riv, FitMethod::gn, FitMethod::sk}) {
+    FitOptions options = options_of(stage);
+    options.method = method;
+    const FitResult alone = fit_additive_model(stage.frf, stage.truth, options);
+    for (const int size : {2, 3, 4})  // with 4, a process has no tile
+      run_team(size, [&](const Team& team) {
+        FitOptions shared = options;
+        shared.team = &team;
+        expect_same_bytes(fit_additive_model(stage.frf, stage.truth, shared), alone);
+      });
+  }
+}
+
+TEST(TeamFit, ASearchHasTheSameBytesInEveryTeam) {
+  const test::RandomStage& stage = wide_stage();
+  const ModelStructure structure{.rigid_body = true};
+  const ModeSelection search;
+  const FitOptions options = options_of(stage);
+  const FitResult alone = automatic_fit(stage.frf, structure, search, options);
+  for (const int size : {2, 4})
+    run_team(size, [&](const Team& team) {
+      FitOptions shared = options;
+      shared.team = &team;
+      const FitResult fit = automatic_fit(stage.frf, structure, search, shared);
+      expect_same_bytes(fit, alone);
+      EXPECT_EQ(fit.decisions, alone.decisions);
+    });
+}
+
+TEST(TeamFit, AnIterationSendsTheEquationsOfThePoles) {
+  const test::RandomStage& stage = wide_stage();
+  FitOptions options = options_of(stage);
+  options.method = FitMethod::gn;
+  options.uncertainty = false;
+  const FitResult alone = fit_additive_model(stage.frf, stage.truth, options);
+  const auto iterations = static_cast<Eigen::Index>(alone.cost.size()) - 1;
+  Eigen::Index unknowns = 1;  // the delay
+  for (const Submodel& s : stage.truth.submodels) unknowns += s.order();
+  const auto submodels = std::ssize(stage.truth.submodels);
+  constexpr Eigen::Index kOfNumerators = 4;
+  constexpr Eigen::Index kOfTheEnd = 4;  // power of the data, relative error
+  const Eigen::Index sums =
+      (iterations + 1) * (ArrowSystem::sums_size(unknowns) + kOfNumerators) + kOfTheEnd + submodels;
+  const Eigen::Index numerators = submodels * stage.frf.response.rows();
+  for (const int size : {2, 3}) {
+    std::atomic<std::uint64_t> bytes = 0;
+    run_team(size, [&](const Team& team) {
+      FitOptions shared = options;
+      shared.team = &team;
+      fit_additive_model(stage.frf, stage.truth, shared);
+      bytes += team.traffic().bytes;
+    });
+    const auto formula = static_cast<double>((size - 1) * 8 * (2 * sums + numerators));
+    EXPECT_NEAR(static_cast<double>(bytes), formula, 0.05 * formula) << iterations;
+  }
+}
+
+}  // namespace stageid::test_team_fit
