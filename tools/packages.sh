@@ -13,7 +13,7 @@ test_packages="libgtest-dev libgmock-dev libbenchmark-dev
   python3-dev pybind11-dev python3-venv dpkg-dev python3 python3-numpy python3-scipy python3-h5py python3-xarray chromium
   clang-format
   doxygen mkdocs python3-pygments libjs-katex groff-base git zsh lintian mypy
-  postgresql slurm-wlm munge
+  postgresql slurm-wlm munge libopenmpi-dev openmpi-bin
   mbpoll python3-pymodbus python3-serial-asyncio socat
   user-mode-linux busybox-static iproute2 kmod can-utils"
 

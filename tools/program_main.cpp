@@ -1,3 +1,5 @@
+#include "tools/program_main.hpp"
+
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -35,6 +37,7 @@ void open_standard_streams() {
 
 bool has_ended = false;
 bool json_wanted = false;  // --json
+const stageid::Team* the_team = &stageid::Team::one();
 
 /// HDF5 calls exit() when it is out of memory.
 void end_after_library() {
@@ -48,6 +51,7 @@ void end_after_library() {
 
 int report(const std::vector<std::string>& errors, int exit_code) {
   has_ended = true;
+  the_team->fail(errors.front(), exit_code);
   stageid::wait_if_ending();
   stageid::Console console;
   console.json = json_wanted;
@@ -68,7 +72,8 @@ std::vector<std::string> texts_of(const stageid::FormatErrors& errors) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int stageid::program_main(int argc, char** argv, const Team& team) {
+  the_team = &team;
   open_standard_streams();
   std::atexit(end_after_library);
   json_wanted = std::find(argv, argv + argc, std::string_view("--json")) != argv + argc;
@@ -76,9 +81,11 @@ int main(int argc, char** argv) {
     stageid::catch_signals();  // as early as possible
     stageid::protect_inputs();
     stageid::keep_freed_memory();
-    const int exit_code = stageid::run_program(argc, argv);
+    const int exit_code = stageid::run_program(argc, argv, team);
     has_ended = true;
     return exit_code;
+  } catch (const stageid::TeamFailed& failure) {
+    return report(failure, failure.exit_code());
   } catch (const stageid::Interrupted& error) {
     return report(error, stageid::kInterrupted);
   } catch (const stageid::FormatErrors& errors) {

@@ -48,6 +48,7 @@ DOORS = {
     "modbus": {"hal"},
     "zmq.h": {"hal"},
     "matio": {"tools"},
+    "mpi.h": {"tools"},
     "zlib": {"tools"},
     "zip.h": {"tools"},
     "sqlite3.h": {"tools"},
@@ -62,7 +63,8 @@ DOORS = {
 INSTALLED_HEADERS_MAY_INCLUDE = ("Eigen/", "hdf5.h")
 
 GRAB_BAGS = {"common", "util", "utils", "helpers", "misc", "base", "core", "shared"}
-NO_ROOM = ("tools/python", "tools/main.cpp")  # the bindings and main(): above every room
+# The bindings and both main(): above every room.
+NO_ROOM = ("tools/python", "tools/main.cpp", "tools/mpi_main.cpp", "tools/program_main")
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTILINE)
 COMMENT = re.compile(r"#[^\n]*")
@@ -198,7 +200,7 @@ def link_faults(tree):
         for other in sorted(links - {"warnings"} - ARROWS.get(library, links)):
             if other != library:
                 yield f"stageid_{library}: may not link stageid::{other}"
-    for library in sorted(set(tree.links) - set(ARROWS) - {"program", "python"}):
+    for library in sorted(set(tree.links) - set(ARROWS) - {"program", "mpi", "python"}):
         yield f"stageid_{library}: has no place among the arrows (tests/integration/layering_test.py)"
 
 

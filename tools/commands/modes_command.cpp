@@ -41,7 +41,7 @@ void find_modes(const ModesFlags& flags, Console& console) {
   options.kind = flags.kind;
   options.minimum_prominence_db = flags.prominence_db;
   const std::vector<ModeCandidate> modes = pick_modes(frf, options);
-  if (!flags.output.empty()) write_modes(flags.output, modes);
+  if (!flags.output.empty() && console.team->rank() == 0) write_modes(flags.output, modes);
 
   std::vector<std::vector<std::string>> rows = {{"mode", "frequency/Hz", "damping", "curve"}};
   nlohmann::ordered_json list = nlohmann::ordered_json::array();

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <memory>
@@ -48,6 +49,12 @@ constexpr const char* kFooter =
     R"(Exit codes: 0 done; 1 file, link or interlock failed; 2 invalid request; 3 done, but do
 not rely on the result (see the printed reason); 4 stopped for safety; 130 interrupted, recorded
 data are kept.)";
+
+constexpr const char* kMpiFooter =
+    R"(mpirun -n COUNT stageid-mpi COMMAND ...: the processes divide the work of frf, modes, fit and
+validate. Files, output and exit code are those of one process. See docs/scale.md.
+
+)";
 
 /// The text before and after `middle`.
 std::optional<std::pair<std::string, std::string>> split_at(const std::string& text,
@@ -102,7 +109,8 @@ std::string usage_problem(const CLI::ParseError& error) {
 /// The CLI11 parser and the commands.
 class Program {
  public:
-  Program() {
+  explicit Program(const Team& team) {
+    console_.team = &team;
     app_.formatter(std::make_shared<HelpText>(help_columns()));  // the commands inherit it
     for (const auto command :
          {identify_command, design_command, run_command, log_command, frf_command, modes_command,
@@ -117,7 +125,7 @@ class Program {
         app_, "--verbosity", console_.verbosity,
         "messages on stderr: quiet: only warnings and errors | normal, debug: also progress");
     app_.require_subcommand(0, 1);
-    app_.footer(kFooter);
+    app_.footer((&team == &Team::one() ? "" : kMpiFooter) + std::string(kFooter));
   }
 
   int run(int argc, const char* const* argv) {
@@ -126,14 +134,28 @@ class Program {
       return kDone;
     }
     refuse_unknown_command(argc, argv);
+    refuse_undivided_command(argc, argv);
     refuse_empty_words(argc, argv);
     if (!parse(argc, argv)) return kDone;
     if (app_.get_subcommands().empty())
       throw std::invalid_argument("no command given; 'stageid --help' lists the commands");
+    meet_team();
     return console_.exit_code;
   }
 
  private:
+  /// Waits until all processes have ended the command, or one has failed.
+  void meet_team() const {
+    const Team& team = *console_.team;
+    const Team::Traffic sent = team.traffic();
+    const Eigen::VectorXd all = team.sum(
+        team.size(), 2,
+        {Eigen::Vector2d(static_cast<double>(sent.messages), static_cast<double>(sent.bytes))});
+    if (team.size() > 1 && console_.verbosity == Verbosity::debug)
+      console_.message(
+          fmt::format("{} processes sent {} messages with {} bytes", team.size(), all[0], all[1]));
+  }
+
   /// An empty word is a variable without value in a script. As the name of an output it would mean none.
   static void refuse_empty_words(int argc, const char* const* argv) {
     for (int k = 2; k < argc; ++k)
@@ -142,11 +164,28 @@ class Program {
             "the word after '{}' is empty; write a value, or leave both out", argv[k - 1]));
   }
 
-  void refuse_unknown_command(int argc, const char* const* argv) const {
-    const std::vector<std::string> names = names_of(command_tree(app_).commands);
+  /// Index of the first word that is not an option.
+  static int command_at(int argc, const char* const* argv) {
     int first = 1;
     while (first < argc && argv[first][0] == '-')
       first += std::string_view(argv[first]) == "--verbosity" ? 2 : 1;
+    return first;
+  }
+
+  /// Several processes would write the same files.
+  void refuse_undivided_command(int argc, const char* const* argv) const {
+    const int at = command_at(argc, argv);
+    if (console_.team->size() == 1 || at >= argc) return;
+    constexpr std::array kDivided = {"frf", "modes", "fit", "validate", "help"};
+    if (std::find(kDivided.begin(), kDivided.end(), std::string_view(argv[at])) == kDivided.end())
+      throw std::invalid_argument(fmt::format(
+          "{0}: cannot be divided between {1} processes; run 'stageid {0}' without mpirun",
+          argv[at], console_.team->size()));
+  }
+
+  void refuse_unknown_command(int argc, const char* const* argv) const {
+    const std::vector<std::string> names = names_of(command_tree(app_).commands);
+    const int first = command_at(argc, argv);
     if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
     const std::string nearest = nearest_word(argv[first], names);
     throw std::invalid_argument(fmt::format("unknown command '{}'; {}", argv[first],
@@ -211,8 +250,8 @@ class Program {
 
 }  // namespace
 
-int run_program(int argc, const char* const* argv) {
-  Program program;
+int run_program(int argc, const char* const* argv, const Team& team) {
+  Program program(team);
   const int exit_code = program.run(argc, argv);
   // A full disk or a closed pipe at stdout must be reported. A closed terminal is an interrupt and keeps its exit
   // code.

@@ -24,6 +24,16 @@ install(FILES ${documents} DESTINATION ${doc_dir}/stageid COMPONENT program)
 install(FILES ${documents} DESTINATION ${doc_dir}/libstageid-dev)
 
 set(components program Unspecified)
+if(TARGET stageid_mpi)
+  list(APPEND components mpi)
+  install(TARGETS stageid_mpi RUNTIME COMPONENT mpi)
+  # The manual is that of stageid.
+  set(mpi_manual ${CMAKE_CURRENT_BINARY_DIR}/stageid-mpi.1)
+  file(WRITE ${mpi_manual} ".so man1/stageid.1\n")
+  execute_process(COMMAND ${STAGEID_GZIP} -9nc ${mpi_manual} OUTPUT_FILE ${mpi_manual}.gz COMMAND_ERROR_IS_FATAL ANY)
+  install(FILES ${mpi_manual}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT mpi)
+  install(FILES ${documents} DESTINATION ${doc_dir}/stageid-mpi COMPONENT mpi)
+endif()
 if(STAGEID_BUILD_PYTHON)
   list(APPEND components python)
   # The search path of Debian's python3 for any minor version.
@@ -66,6 +76,11 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME stageid)
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
   "The program: from an experiment file to a continuous-time modal model with
 standard deviations; excitation, measurement, frequency response, fit, report.")
+set(CPACK_DEBIAN_MPI_PACKAGE_NAME stageid-mpi)
+set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "stageid (= ${PROJECT_VERSION}-${debian_revision}), openmpi-bin")
+set(CPACK_COMPONENT_MPI_DESCRIPTION
+  "The program for MPI: many processes, also of several machines, divide the work
+of one frequency response, fit or validation. The results are those of stageid.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-stageid)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
