@@ -45,6 +45,7 @@ NAVIGATION = [
         {"Theory": "docs/theory.md"},
         {"Benchmarks": "docs/benchmarks.md"},
         {"Comparison": "docs/comparison.md"},
+        {"Several processes": "docs/scale.md"},
     ]},
     {"Development": [
         {"Contributing": "CONTRIBUTING.md"},

@@ -43,10 +43,13 @@ class Parcel {
  private:
   void raw(void* value, std::size_t size) {
     if (size == 0) return;
-    if (!opened_) bytes_.resize(at_ + size);
-    std::byte* place = bytes_.data() + at_;
-    opened_ ? std::memcpy(value, place, size) : std::memcpy(place, value, size);
-    at_ += size;
+    if (opened_) {
+      std::memcpy(value, bytes_.data() + at_, size);
+      at_ += size;
+    } else {
+      const auto* first = static_cast<const std::byte*>(value);
+      bytes_.insert(bytes_.end(), first, first + size);
+    }
   }
 
   std::vector<std::byte> bytes_;
