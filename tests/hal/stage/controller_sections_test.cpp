@@ -14,7 +14,7 @@
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
-namespace test_linear_controller {
+namespace test_controller_sections {
 
 constexpr double kRateHz = 1000.0;
 
@@ -217,5 +217,5 @@ TEST(FeedForward, RisesOnceTheLoopIsClosedAndStays) {
   EXPECT_EQ(MotionController(open_spec(2, 1)).feed_forward_samples(), 0U);
 }
 
-}  // namespace test_linear_controller
+}  // namespace test_controller_sections
 }  // namespace stageid
