@@ -15,6 +15,7 @@
 
 #include "excitation/threads/team.hpp"
 #include "tools/program_main.hpp"
+#include "tools/terminal/interrupt.hpp"
 
 namespace {
 
@@ -117,6 +118,8 @@ int main(int argc, char** argv) {
     if (team.rank() > 0) be_silent();
     exit_code = stageid::program_main(argc, argv, team);
   }
+  // Once one process has ended with an error, mpirun sends SIGTERM to the others, which have reported already.
+  const stageid::ControlledStop ends_by_itself;
   MPI_Finalize();
   return exit_code;
 }
