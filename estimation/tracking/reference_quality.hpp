@@ -8,8 +8,10 @@ namespace stageid {
 struct ReferenceQuality {
   /// Mean square of the constant residual, relative to noise alone: 1 for an exact model, by sensor.
   Eigen::VectorXd chi_square;
-  Eigen::VectorXd
-      relative_error;  ///< rms of the constant residual over that of the output, without noise
+  /// rms of the constant residual over that of the output, without noise.
+  Eigen::VectorXd relative_error;
+  /// The same of the model itself, without tracked changes.
+  Eigen::VectorXd model_error;
 };
 
 }  // namespace stageid

@@ -211,9 +211,14 @@ void TrackingReference::judge(const PeriodSpectra& mean) {
   const Eigen::VectorXd white = whitened(residual_);
   const Eigen::MatrixXd squares = white.cwiseAbs2().reshaped(n_y, white.size() / n_y);
   quality_.chi_square = periods_ * squares.rowwise().mean();
-  const Eigen::ArrayXd excess = residual_.rowwise().squaredNorm().array() *
-                                (1.0 - 1.0 / quality_.chi_square.array().max(1.0));
-  quality_.relative_error = (excess / mean.Y.rowwise().squaredNorm().array()).sqrt();
+  const Eigen::ArrayXd noise =
+      residual_.rowwise().squaredNorm().array() / quality_.chi_square.array().max(1.0);
+  const auto relative = [&](const Eigen::MatrixXcd& e) -> Eigen::VectorXd {
+    const Eigen::ArrayXd excess = e.rowwise().squaredNorm().array() - noise;
+    return (excess.max(0.0) / mean.Y.rowwise().squaredNorm().array()).sqrt();
+  };
+  quality_.relative_error = relative(residual_);
+  quality_.model_error = relative(residual(mean, response_.at(Eigen::VectorXd::Zero(x_.size()))));
 }
 
 }  // namespace stageid

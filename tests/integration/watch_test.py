@@ -283,6 +283,12 @@ class WatchTest(ProcessTest):
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertIn("does not describe the response of sensor", done.stderr)
 
+    def test_a_stage_that_differs_from_the_start(self):
+        self.record("other", "kind: actuator_gain, channel: a1, value: 0.5")
+        told = self.watch("other.slog", 3)
+        self.assertEqual(told["changes"], [])
+        self.assertIn("the stage differs from the model", self.call("watch", "model/model.json", "other.slog").stderr)
+
     def test_inputs_are_not_overwritten(self):
         before = (WORK / "model/model.json").read_bytes()
         for flag in ("--events", "-o"):

@@ -184,13 +184,25 @@ std::string StageWatch::doubt() const {
     return fmt::format(
         "{} of {} periods to learn from; nothing was watched. Record more periods, or use --learn",
         periods_, options_.learn);
-  const Eigen::VectorXd& error = tracker_->reference().relative_error;
-  for (Eigen::Index i = 0; i < error.size(); ++i)
-    if (!(error[i] < kDescribes))
-      return fmt::format(
-          "the model {} does not describe the response of sensor '{}' ({:.2g} times the response "
-          "remain); changes are not told reliably. Check this sensor, or identify the stage again",
-          options_.model.string(), model_.outputs.name(i), error[i]);
+  const ReferenceQuality& quality = tracker_->reference();
+  const auto worst = [](const Eigen::VectorXd& error) {
+    Eigen::Index sensor = 0;
+    const double value = error.maxCoeff<Eigen::PropagateNaN>(&sensor);
+    return std::pair(value, sensor);
+  };
+  if (const auto [error, sensor] = worst(quality.relative_error); !(error < kDescribes))
+    return fmt::format(
+        "the model {} does not describe the response of sensor '{}' ({:.2g} times the response "
+        "remain); changes are not told reliably. Check this sensor, or identify the stage again",
+        options_.model.string(), model_.outputs.name(sensor), error);
+  // A change that was told is not told again.
+  if (const auto [error, sensor] = worst(quality.model_error);
+      !stage_changed_ && !(error < kDescribes))
+    return fmt::format(
+        "the stage differs from the model {} since the first period ({:.2g} times the response of "
+        "sensor '{}'), see the values above; only changes from there are told. Use the model of "
+        "this stage, or identify it again",
+        options_.model.string(), error, model_.outputs.name(sensor));
   return "";
 }
 

@@ -117,6 +117,19 @@ TEST(ModelTracker, AWrongResidueShowsInTheReferenceAndCausesNoAlarms) {
   EXPECT_LT(tracker.reference().relative_error[1], 0.3);
 }
 
+TEST(ModelTracker, TheErrorOfTheModelIsThatBeforeTrackedChanges) {
+  StageProperties other;
+  other.sensor_gain[1] = 1.4;
+  LoopSpectra loop(3);
+  loop.become(other);
+  ModelTracker tracker = tracker_of();
+  watch(tracker, loop, 32);
+  // The response of y2 is 1.4 times that of the model.
+  EXPECT_NEAR(tracker.reference().model_error[1], 0.4 / 1.4, 0.01);
+  EXPECT_LT(tracker.reference().model_error[0], 0.01);
+  EXPECT_LT(tracker.reference().relative_error.maxCoeff(), 0.01);
+}
+
 struct Case {
   std::string name;
   double size;

@@ -229,6 +229,19 @@ class Units(Case):
         self.one(rate="")
         self.refuses("needs sample_rate_hz", "x.npz")
 
+    def test_pauses_of_a_time_axis(self):
+        even = np.arange(200) / 65536
+        pause = even + 0.1 * (np.arange(200) >= 100)
+        restart = np.arange(200) % 120 / 65536
+        rounded = np.round(np.arange(200) / 1500, 3)
+        for time, rate in ((pause, 65536), (restart, 65536), (rounded, 1500)):
+            self.one(rate="", time=time)
+            self.imports("x.npz", "run.h5")
+            self.assertAlmostEqual(content("run.h5")["@sample_rate_hz"] / rate, 1, delta=5e-3 if rate == 1500 else 1e-9)
+        lost = even + 3 / 65536 * (np.arange(200) > 30)
+        self.one(rate="", time=lost)
+        self.refuses("'time' of x.npz jumps by 6.1e-05 s behind sample 31: samples are missing", "x.npz")
+
     def test_the_rate_of_a_universal_file(self):
         r, u, y = signals()
         time = np.arange(200) / 65536

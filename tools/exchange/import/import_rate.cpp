@@ -16,6 +16,8 @@ namespace {
 
 /// Largest relative error of a rate or a step that was rounded to four digits.
 constexpr double kRounding = 5e-4;
+/// Samples are missing behind a step of this many times the usual one. Half of it is left for rounded and irregular times.
+constexpr double kJump = 2.5;
 
 struct FileRate {
   double hz = 0.0;
@@ -42,19 +44,42 @@ std::optional<double> rate_of_scalar(const std::string& name, double value) {
   return std::nullopt;
 }
 
-/// Rate of a rising axis in seconds, by the median, because the axis may restart with every run.
-std::optional<double> rate_of_axis(const std::vector<double>& time_s) {
+/// A time axis in seconds: its rate, and where it jumps ahead although its pieces do not have one length, as runs do.
+struct TimeAxis {
+  double hz = 0.0;
+  std::optional<std::size_t> jump;  ///< index of the last sample before it
+};
+
+/// @returns nothing if the axis does not rise. It may restart with every run.
+std::optional<TimeAxis> time_axis_of(const std::vector<double>& time_s) {
   if (time_s.size() < 3) return std::nullopt;
   std::vector<double> steps;
   for (std::size_t k = 1; k < time_s.size(); ++k) steps.push_back(time_s[k] - time_s[k - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  double step = *middle;
+  std::vector<double> sorted = steps;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double step = *middle;
   if (!(step > 0.0)) return std::nullopt;
-  // On a long axis, single steps have few digits; the mean over the whole axis is more precise if it is even.
-  const double mean = (time_s.back() - time_s.front()) / static_cast<double>(steps.size());
-  if (std::abs(mean - step) < 0.5 * step) step = mean;
-  return 1.0 / step;
+  // Single steps have few digits; the mean within the pieces is more precise.
+  TimeAxis axis;
+  std::set<std::size_t> lengths;
+  std::size_t begin = 0;
+  double within_s = 0.0;
+  double count = 0.0;
+  for (std::size_t k = 0; k <= steps.size(); ++k) {
+    const bool ends = k == steps.size() || steps[k] < -0.5 * step || steps[k] > kJump * step;
+    if (!ends) {
+      within_s += steps[k];
+      ++count;
+      continue;
+    }
+    lengths.insert(k + 1 - begin);
+    begin = k + 1;
+    if (k < steps.size() && steps[k] > 0.0 && !axis.jump) axis.jump = k;
+  }
+  if (lengths.size() == 1) axis.jump.reset();
+  axis.hz = count / within_s;
+  return axis;
 }
 
 std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
@@ -68,7 +93,15 @@ std::vector<FileRate> rates_of(const ArrayList& arrays, const ImportMap& map) {
     if (values == nullptr || values->empty()) continue;
     const bool axis = abscissas.contains(array.name) ||
                       (values->size() > 1 && kAxes.contains(plain_name(array.name)));
-    const auto rate = axis ? rate_of_axis(*values)
+    const auto time = axis ? time_axis_of(*values) : std::nullopt;
+    if (time && time->jump)
+      refuse_map(map,
+                 "'{}' of {} jumps by {:.3g} s behind sample {}: samples are missing, or runs of "
+                 "different length follow each other. Split the file there, or write "
+                 "sample_rate_hz and file_sample_rate: ignored",
+                 array.name, arrays.file.string(),
+                 (*values)[*time->jump + 1] - (*values)[*time->jump], *time->jump + 1);
+    const auto rate = time ? std::optional(time->hz)
                       : values->size() == 1
                           ? rate_of_scalar(plain_name(array.name), values->front())
                           : std::nullopt;
