@@ -99,6 +99,12 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Di
   out.expected_chi_square = verdict.expected;
   out.explained = verdict.explained;
   out.reason = std::move(verdict.reason);
+  // Distortion of any size is in the total variance, so the residual may be no larger than that.
+  if (out.explained && out.normalized_error >= 1.0) {
+    out.explained = false;
+    out.reason = fmt::format("the model is worse than none: its error is {:.3g} times the response",
+                             out.normalized_error);
+  }
   const Eigen::MatrixXd& variance = verdict.scatter.size() > 0 ? verdict.scatter
                                     : verdict.variance == ResidualVariance::total
                                         ? frf.total_variance

@@ -17,8 +17,9 @@ struct Validation {
   /// freedom; 1 for an exact one; 0 if infinite.
   double expected_chi_square = 0.0;
   ResidualVariance variance = ResidualVariance::none;  ///< the variance used for the figures
-  bool explained = true;  ///< see judge_residual(); true also if nothing can be compared
-  std::string reason;     ///< why the error is not explained, one sentence; else empty
+  /// See judge_residual(); true also if nothing can be compared. False if the model is worse than none.
+  bool explained = true;
+  std::string reason;  ///< why the error is not explained, one sentence; else empty
   double whitened_above_95 =
       0.0;  ///< share of |e|^2 above the 95 % point of noise alone; 0.05 is expected
   double whiteness =

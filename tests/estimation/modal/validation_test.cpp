@@ -182,6 +182,19 @@ TEST_F(ValidationOfAStage, TotalVarianceServesWhereNoNoiseVarianceIs) {
   EXPECT_NEAR(validate(model, frf).chi_square_per_dof, 1.0, 0.06);
 }
 
+// A plant so nonlinear that its realizations differ by more than the response: distortion alone would explain any model.
+TEST_F(ValidationOfAStage, AModelThatIsWorseThanNoneIsNotExplained) {
+  frf.total_variance = 4.0 * frf.response.cwiseAbs2();
+  frf.realizations = 3;
+  EXPECT_TRUE(validate(model, frf).explained);
+  for (Submodel& s : model.submodels)
+    for (Eigen::MatrixXd& numerator : s.numerator) numerator *= -0.3;
+  const Validation result = validate(model, frf);
+  EXPECT_NEAR(result.normalized_error, 1.3, 1e-9);
+  EXPECT_FALSE(result.explained);
+  EXPECT_THAT(result.reason, testing::HasSubstr("worse than none"));
+}
+
 // A variance that is itself the mean of nu squares: the ratio is F(2, 2 nu).
 TEST_F(ValidationOfAStage, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
   EXPECT_EQ(validate(model, frf).expected_chi_square, 9.0 / 8.0)
