@@ -18,8 +18,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kEventsShown = 60;
-constexpr std::chrono::seconds kReload{
-    2};  // a page that is loaded again has no stream for a moment
+// A page that is loaded again has no stream for a moment.
+constexpr std::chrono::seconds kReload{2};
 
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);

@@ -77,8 +77,8 @@ class Dashboard {
   std::function<PlantSnapshot()> plant_;
   std::shared_ptr<StageWatch> shared_watch_;
   std::shared_ptr<EventLog> shared_events_;
-  std::atomic<const StageWatch*> watch_ =
-      nullptr;  // what was shared, for the threads of the server
+  // What was shared, for the threads of the server.
+  std::atomic<const StageWatch*> watch_ = nullptr;
   std::atomic<EventLog*> events_ = nullptr;
   std::atomic<bool> aborted_ = false;
   LiveLevels levels_;

@@ -199,9 +199,9 @@ std::string StageWatch::doubt() const {
   if (const auto [error, sensor] = worst(quality.model_error);
       !stage_changed_ && !(error < kDescribes))
     return fmt::format(
-        "the stage differs from the model {} since the first period ({:.2g} times the response of "
-        "sensor '{}'), see the values above; only changes from there are told. Use the model of "
-        "this stage, or identify it again",
+        "the stage differs from the model {} since the first period: {:.2g} times the response of "
+        "sensor '{}' are not explained. The values above show how it differs; later changes are "
+        "reported relative to this state. Use the model of this stage, or identify it again",
         options_.model.string(), error, model_.outputs.name(sensor));
   return "";
 }

@@ -16,7 +16,7 @@ namespace {
 
 /// Largest relative error of a rate or a step that was rounded to four digits.
 constexpr double kRounding = 5e-4;
-/// Samples are missing behind a step of this many times the usual one. Half of it is left for rounded and irregular times.
+/// A step of this many times the usual one means that samples are missing. Rounded times have steps of up to twice.
 constexpr double kJump = 2.5;
 
 struct FileRate {
