@@ -123,13 +123,13 @@ function facts(pairs) {
 // A table that scrolls by itself. Heads are titles or elements, rows are lists of texts or elements.
 function table(heads, rows, caption, kind) {
   const head = heads.map((title) => (typeof title === 'string' ? element('th', { scope: 'col' }, title) : title));
-  const node = element('div', { class: 'table-scroll' }, element('table', { class: kind }, caption ? element('caption', null, caption) : null,
+  const node = element('div', { class: 'table-scroll', tabindex: '0' }, element('table', { class: kind }, caption ? element('caption', null, caption) : null,
     heads.length ? element('thead', null, element('tr', null, ...head)) : null, element('tbody', null, ...rows.map((cells) => tableRow(cells)))));
   overflowing.observe(node);
   return node;
 }
 
-// What is too large for its place is scrolled with the keyboard, so it can have the focus.
+// What is too large for its place is scrolled with the keyboard, so it can have the focus; what fits loses it once its size is known.
 const overflowing = new ResizeObserver((seen) => {
   for (const { target } of seen) target.tabIndex = target.scrollWidth > target.clientWidth || target.scrollHeight > target.clientHeight ? 0 : -1;
 });
