@@ -8,7 +8,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kRigidGrowth = 1.5;
 constexpr double kBelowGrowth = 0.7;
 
 }  // namespace

@@ -33,6 +33,8 @@ class Examination {
   void find_drowned(const std::vector<Eigen::Index>& sensors);
   void check_arrival();
   void check_excitation();
+  std::string difference_of_stage() const;
+  void check_declared();
   void check_injection();
   void check_without_stage();
   void check_recording();

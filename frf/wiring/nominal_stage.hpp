@@ -12,6 +12,9 @@ namespace stageid {
 struct NominalStage {
   std::vector<std::string> actuators;
   std::vector<std::string> sensors;
+  double sample_rate_hz = 0.0;              ///< 0: unknown
+  std::vector<std::string> actuator_units;  ///< of the first names; those of others are unknown
+  std::vector<std::string> sensor_units;    ///< likewise
   /// -C(e^{j omega T}) from y to u, actuators x sensors; empty: unknown, the stage closes the loop itself.
   std::function<Eigen::MatrixXcd(double frequency_hz)> controller;
   double controller_from_hz = 0.0;  ///< band in which it is known

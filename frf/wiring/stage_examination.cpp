@@ -15,6 +15,7 @@ namespace {
 using Index = Eigen::Index;
 
 constexpr double kResponds = 1e-3;  // of the largest nominal response
+constexpr double kSameRate = 1e-4;  // relative; clocks of recorders differ by less
 constexpr double kFedBack = 1e-4;   // of an actuator: ten times the limit of equality
 
 }  // namespace
@@ -35,7 +36,41 @@ std::optional<bool> Examination::expected_to_respond(Index sensor) const {
   return here > kResponds * G.cwiseAbs().maxCoeff();
 }
 
+/// How sample rate or units of the log differ from those of the stage file; empty: they are equal or unknown.
+std::string Examination::difference_of_stage() const {
+  if (!nominal_) return "";
+  const double rate_hz = record_.info.sample_rate_hz;
+  if (nominal_->sample_rate_hz > 0.0 &&
+      std::abs(rate_hz / nominal_->sample_rate_hz - 1.0) > kSameRate)
+    return fmt::format("a sample rate of {:.8g} Hz in the log, {:.8g} Hz in the stage file",
+                       rate_hz, nominal_->sample_rate_hz);
+  const auto differing = [](const ChannelList& logged, const std::vector<std::string>& names,
+                            const std::vector<std::string>& units) -> std::string {
+    for (std::size_t i = 0; i < units.size(); ++i) {
+      const auto at = std::ranges::find(logged.names, names[i]) - logged.names.begin();
+      if (at == std::ssize(logged.names) || logged.unit(at).empty() || logged.unit(at) == units[i])
+        continue;
+      return fmt::format("{} in {} in the log, in {} in the stage file", names[i], logged.unit(at),
+                         units[i]);
+    }
+    return "";
+  };
+  const std::string sensor =
+      differing(record_.info.sensors, nominal_->sensors, nominal_->sensor_units);
+  return sensor.empty()
+             ? differing(record_.info.actuators, nominal_->actuators, nominal_->actuator_units)
+             : sensor;
+}
+
+void Examination::check_declared() {
+  const std::string difference = difference_of_stage();
+  if (difference.empty()) return;
+  find(Severity::fault, Cause::controller, "", "the log does not belong to the stage file",
+       difference, "correct what the log declares, or give the stage file of this log: --stage");
+}
+
 std::string Examination::why_no_nominal(bool all_sensors) const {
+  if (!difference_of_stage().empty()) return "the sample rate and the units of the stage file";
   if (excited_actuators().empty()) return kNamedExcitation;
   std::string missing;
   if (positions_in(nominal_->actuators, record_.info.actuators.names, &missing).empty() ||

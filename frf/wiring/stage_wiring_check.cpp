@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "frf/response/rigid_lines.hpp"
+#include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
 namespace {
@@ -22,7 +23,7 @@ constexpr double kLeastLogGain = 0.262;  // ln 1.3
 constexpr double kLeastExplained = 20.0;
 constexpr double kDead = 0.05;
 
-/// The lines up to where flexible modes begin.
+/// The lines up to where flexible modes begin; empty if omega^2 |G| falls from the first lines on, as above a mode.
 std::vector<PlantLine> lines_of_body(const std::vector<PlantLine>& lines) {
   const auto count = static_cast<Index>(lines.size());
   Eigen::VectorXd omega_rad_s(count), gain(count);
@@ -30,7 +31,12 @@ std::vector<PlantLine> lines_of_body(const std::vector<PlantLine>& lines) {
     omega_rad_s[k] = lines[static_cast<std::size_t>(k)].omega_rad_s;
     gain[k] = lines[static_cast<std::size_t>(k)].G.norm();
   }
-  return {lines.begin(), lines.begin() + rigid_lines(omega_rad_s, gain)};
+  const Index rigid = rigid_lines(omega_rad_s, gain);
+  std::vector<double> sizes;
+  for (Index k = 0; k < rigid; ++k) sizes.push_back(omega_rad_s[k] * omega_rad_s[k] * gain[k]);
+  const double largest = sizes.empty() ? 0.0 : std::ranges::max(sizes);
+  if (rigid < kFewestRigidLines || largest > kRigidGrowth * order_statistic(sizes, 0.5)) return {};
+  return {lines.begin(), lines.begin() + rigid};
 }
 
 /// A and A0 with their weights.

@@ -180,6 +180,7 @@ NominalStage read_controller_file(const YamlDocument& document) {
   if (!f.measured.empty()) {
     nominal = of_measured(folder / f.measured);
   } else {
+    if (f.time == Time::discrete) nominal.sample_rate_hz = f.sample_rate_hz;
     nominal.sensors = f.linear.sensors;
     nominal.actuators = f.linear.actuators;
     nominal.controller =

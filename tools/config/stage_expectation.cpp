@@ -18,10 +18,11 @@ namespace {
 
 constexpr double kFreeOverSuspension = 10.0;  // the spring is 1 % of the inertia there
 
-std::vector<std::string> names_of(const std::vector<Channel>& channels) {
-  std::vector<std::string> names;
-  for (const Channel& channel : channels) names.push_back(channel.name);
-  return names;
+std::vector<std::string> texts_of(const std::vector<Channel>& channels,
+                                  std::string Channel::*text) {
+  std::vector<std::string> texts;
+  for (const Channel& channel : channels) texts.push_back(channel.*text);
+  return texts;
 }
 
 using Response = std::function<Eigen::MatrixXcd(double frequency_hz)>;
@@ -55,8 +56,11 @@ NominalStage with_channels_of(const LogInfo& info, NominalStage all) {
 
 NominalStage nominal_stage(const StageSpec& stage, const std::optional<PlantSpec>& plant) {
   NominalStage nominal;
-  nominal.actuators = names_of(stage.info.actuators);
-  nominal.sensors = names_of(stage.info.sensors);
+  nominal.sample_rate_hz = stage.info.sample_rate_hz;
+  nominal.actuators = texts_of(stage.info.actuators, &Channel::name);
+  nominal.actuator_units = texts_of(stage.info.actuators, &Channel::unit);
+  nominal.sensors = texts_of(stage.info.sensors, &Channel::name);
+  nominal.sensor_units = texts_of(stage.info.sensors, &Channel::unit);
   if (!stage.controller.by_peer) {
     const auto controller = std::make_shared<const MotionController>(stage.controller);
     nominal.controller = [controller](double frequency_hz) {

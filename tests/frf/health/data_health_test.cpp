@@ -219,6 +219,25 @@ TEST(AnotherController, IsNoWrongScale) {
   expect_finding(found, Cause::controller, Severity::doubt, "", "setpoint");
 }
 
+// Otherwise a wrong sample rate or unit would be found as a wrong scale of all sensors.
+TEST(AnotherStageFile, IsToldByItsSampleRateAndItsUnits) {
+  const MemoryLog log = closed_loop_log();
+  NominalStage nominal = small_nominal();
+  nominal.sample_rate_hz = log.log_info.sample_rate_hz;
+  nominal.sensor_units = log.log_info.sensors.units;
+  nominal.actuator_units = log.log_info.actuators.units;
+  EXPECT_EQ(first_with(health_of(log, nominal), Cause::controller), nullptr);
+  NominalStage faster = nominal;
+  faster.sample_rate_hz *= 2.0;
+  expect_finding(health_of(log, faster), Cause::controller, Severity::fault, "",
+                 "does not belong to the stage file");
+  NominalStage other_unit = nominal;
+  other_unit.sensor_units[1] = "m/s^2";
+  const std::vector<Finding> found = health_of(log, other_unit);
+  expect_finding(found, Cause::controller, Severity::fault, "", "does not belong");
+  EXPECT_THAT(first_with(found, Cause::controller)->figure, HasSubstr("z2"));
+}
+
 /// The sensors show only noise, and u = r - C y.
 MemoryLog log_without_response() {
   MemoryLog log = closed_loop_log(1, 0.3);
