@@ -96,10 +96,21 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
                   flags.stage.string()));
 }
 
-void export_from_model(const ExportFlags& flags) {
+/// A simulation or an observer with such a mode runs away.
+void warn_if_unstable(const AdditiveModel& model, const std::filesystem::path& file,
+                      Console& console) {
+  for (const Submodel& s : model.submodels)
+    if (s.is_mode() && s.damping_ratio() < 0.0)
+      return console.warning(fmt::format(
+          "{}: the mode at {:.6g} Hz is unstable (damping ratio {:.3g}); do not simulate the model",
+          file.string(), s.natural_frequency_hz(), s.damping_ratio()));
+}
+
+void export_from_model(const ExportFlags& flags, Console& console) {
   require_export_format(flags.output);
   require_no_input(flags.output, {flags.input, flags.frf});
   const AdditiveModel model = read_model(flags.input);
+  warn_if_unstable(model, flags.input, console);
   ExportedResponse exported;
   exported.frequency_hz = lines_of(flags, model);
   std::optional<DrivingPoint> driving_point;
@@ -130,7 +141,7 @@ void export_file(const ExportFlags& flags, Console& console) {
   else if (!flags.stage.empty())
     return export_controller_view(flags, console);
   else
-    export_from_model(flags);
+    export_from_model(flags, console);
   console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
                              std::filesystem::file_size(flags.output)));
   console.result(

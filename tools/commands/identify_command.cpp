@@ -353,6 +353,11 @@ class Identification {
 
 void identify(const IdentifyFlags& flags, Console& console) {
   const ExperimentConfig config = load_experiment_config(flags.config);
+  if (config.experiment.scheme == ExcitationScheme::simultaneous)
+    throw std::invalid_argument(
+        fmt::format("{}: scheme: 'simultaneous' does not determine a response, only the changes of "
+                    "a model (run --watch); write single_axis or orthogonal_dft",
+                    flags.config.string()));
   if (!flags.resume && std::filesystem::exists(flags.output / "run.slog"))
     throw std::invalid_argument(
         fmt::format("{}: already contains a run; continue it with --resume, or choose another "
