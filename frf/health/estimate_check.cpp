@@ -75,10 +75,15 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
   const auto bands = static_cast<double>(test.settled_p_value.size());
   if (bands * test.settled_p_value.minCoeff() >= kUnsettledBelow) return {};
   std::string figure;
-  for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) {
-    if (test.settled(b)) continue;
+  for (Eigen::Index b = 0, end = 0; b < test.band_hz.rows(); b = end) {
+    for (end = b; end < test.band_hz.rows() && !test.settled(end);) ++end;
+    if (end == b) {
+      ++end;
+      continue;
+    }
     figure += fmt::format("{}{:.4g} ... {:.4g} Hz: p = {:.0e}", figure.empty() ? "" : ", ",
-                          test.band_hz(b, 0), test.band_hz(b, 1), test.settled_p_value[b]);
+                          test.band_hz(b, 0), test.band_hz(end - 1, 1),
+                          test.settled_p_value.segment(b, end - b).minCoeff());
   }
   return {{Severity::doubt, Cause::unsettled, "",
            "the records are not settled: they contain a transient, a drift or slow noise", figure,

@@ -272,7 +272,8 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
           : fmt::format(
                 "use --method lpm and fit again, or measure again with transient_periods: {}",
                 needed)};
-  if (!linear) {
+  // Without skipped periods, all poles of the loop ring at full size, and a window has no common ratio.
+  if (!linear && evidence.transient_periods > 0) {
     finding.cause = Cause::limit_cycle;
     finding.what = fmt::format(
         "the loop oscillates at the start of the runs at {} and comes to rest, in each run in "

@@ -63,8 +63,10 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
   const std::vector<NoisyRun> noisy = record.noisy_runs;
   const bool steps_known = record.steps.size() >= frf.inputs.size();
   std::vector<Finding> findings = check_health(std::move(record), nominal);
-  // A drift looks like noise. So does everything if the response to an axis is not determined for want of excitation.
-  if (!has(findings, Cause::drift) && !has(findings, Cause::excitation))
+  // A drift and a transient look like noise. So does everything if the response to an axis is not determined for want
+  // of excitation.
+  if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled) &&
+      !has(findings, Cause::excitation))
     for (Finding& finding : check_experiment_noise(frf, noisy))
       findings.push_back(std::move(finding));
   // It comes from the steps, and the response is that to them.
