@@ -403,6 +403,11 @@ void Examination::check_others(std::vector<Finding> own) {
                  std::ranges::find(f.realizations, change.realization) != f.realizations.end();
         }))
       findings_.push_back(to_finding(change));
+  if (record_.differences.plant && std::ranges::all_of(own, [&](const Finding& f) {
+        return f.severity != Severity::fault || in_all(f);
+      }))
+    findings_.push_back(to_finding(*record_.differences.plant, record_.differences.outlying,
+                                   record_.others.size() + 1));
   for (Finding& f : own) {
     if (in_all(f))
       f.realizations.clear();
@@ -416,6 +421,7 @@ std::vector<Finding> Examination::examine() {
   findings_ = check_timing(record_, nominal_);
   for (Finding& finding : to_findings(record_.steps, record_.info.actuators))
     findings_.push_back(std::move(finding));
+  check_declared();
   check_cycles();
   check_samples();
   spoilt_of_log_ = spoilt_;

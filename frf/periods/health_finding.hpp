@@ -62,6 +62,9 @@ inline constexpr std::array kWords<Cause> = {
 /// Significance of a check over all channels.
 inline constexpr double kSignificance = 1e-4;
 
+/// Standard deviations of a systematic error: no interval holds.
+inline constexpr double kMisleading = 3.0;
+
 /// Runs, frequencies or channels that a finding lists by name; it counts the rest.
 inline constexpr std::size_t kMostNamed = 4;
 

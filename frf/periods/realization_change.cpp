@@ -56,4 +56,22 @@ Finding to_finding(const RealizationChange& change) {
   return finding;
 }
 
+Finding to_finding(const PlantChange& change, const std::vector<int>& outlying,
+                   std::size_t realizations) {
+  const bool named = realizations > 2 && !outlying.empty();
+  return {change.ratio > kMisleading ? Severity::fault : Severity::doubt,
+          Cause::drift,
+          "",
+          fmt::format(
+              "the stage changed during the measurement: {} from the others",
+              named ? named_realizations(outlying) + (outlying.size() == 1 ? " differs" : " differ")
+                    : "some realizations differ"),
+          fmt::format("{:.2g} times the noise at {:.4g} ... {:.4g} Hz, alike on neighbouring lines "
+                      "(p = {:.0e})",
+                      change.ratio, change.low_hz, change.high_hz, change.p_value),
+          "find out what changed: load, clamping, gain, temperature; leave the realizations before "
+          "or after the change out (--realizations), or measure again",
+          named ? outlying : std::vector<int>{}};
+}
+
 }  // namespace stageid

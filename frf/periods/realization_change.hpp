@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,11 +33,25 @@ Finding to_finding(const RealizationChange& change);
 /// "1.05 +- 0.002"; without a deviation the value with this number of digits.
 std::string with_deviation(double value, double deviation, int digits);
 
+/// The plant differs between realizations, in a way that no channel explains.
+struct PlantChange {
+  double low_hz = 0.0;  ///< of the band with the clearest difference
+  double high_hz = 0.0;
+  double p_value =
+      1.0;  ///< probability of differences so alike on neighbouring lines, over all tests
+  double ratio = 0.0;  ///< scatter of the realizations in this band over that of noise
+};
+
 /// Differences between the realizations of a log.
 struct RealizationDifferences {
   std::vector<RealizationChange> changes;  ///< by realization, then by what they explain
-  std::vector<int>
-      outlying;  ///< counted from 0: much farther from the others than these from each other
+  std::optional<PlantChange> plant;
+  /// Counted from 0: much farther from the others than these from each other; of two, the second one.
+  std::vector<int> outlying;
 };
+
+/// A fault if the difference misleads, a doubt otherwise. Of two realizations, it names none.
+Finding to_finding(const PlantChange& change, const std::vector<int>& outlying,
+                   std::size_t realizations);
 
 }  // namespace stageid

@@ -8,6 +8,7 @@
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/plant/detection_average.hpp"
 #include "frf/statistics/distributions.hpp"
+#include "frf/statistics/frequency_bands.hpp"
 
 namespace stageid {
 
@@ -21,8 +22,8 @@ AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<i
   std::ranges::sort(column_, {}, line_of);
   std::ranges::transform(column_, std::back_inserter(lines_), line_of);
   const auto L = std::ssize(lines_);
-  sum_.cosine.setZero(outputs, L);
-  sum_.pairs.setZero(outputs, L);
+  residuals_.cosine.setZero(outputs, L);
+  residuals_.pairs.setZero(outputs, L);
 }
 
 void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::MatrixXcd& G_before,
@@ -44,33 +45,69 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
   });
   for (Eigen::Index e = 0; e < E; ++e) {
     const Eigen::MatrixXcd& mean = spectra.runs()[static_cast<std::size_t>(e)].mean;
-    add_run(residual.middleRows(outputs_ * e, outputs_),
-            kPowerRounding * mean.topLeftCorner(outputs_, N).cwiseAbs2().rowwise().maxCoeff());
+    residuals_.add(
+        residual.middleRows(outputs_ * e, outputs_),
+        kPowerRounding * mean.topLeftCorner(outputs_, N).cwiseAbs2().rowwise().maxCoeff());
   }
-  first_ = false;
+  if (std::exchange(first_, false)) return;
+  if (responses_.cosine.size() == 0) {
+    responses_.cosine.setZero(G.rows(), N);
+    responses_.pairs = responses_.cosine;
+  }
+  // In proportion to the difference of this realization.
+  responses_.add(G - G_before, kPowerRounding * G.cwiseAbs2().rowwise().maxCoeff());
 }
 
-void AlignmentAverage::add_run(const Eigen::MatrixXcd& residual, const Eigen::VectorXd& smallest) {
-  for (Eigen::Index i = 0; i < outputs_; ++i) {
-    Eigen::Index before = -1;
-    for (Eigen::Index l = 0; l < residual.cols(); ++l) {
-      if (!(std::norm(residual(i, l)) > smallest[i])) continue;
-      if (before >= 0) {
-        const std::complex<double> turn = residual(i, l) * std::conj(residual(i, before));
-        sum_.cosine(i, l) += turn.real() / std::abs(turn);
-        sum_.pairs(i, l) += 1.0;
-      }
-      before = l;
-    }
-  }
-}
+namespace {
 
-LineAlignment AlignmentAverage::finish(double resolution_hz) const {
-  LineAlignment found = sum_;
-  found.frequency_hz =
+LineAlignment on_lines(LineAlignment alignment, const std::vector<int>& lines,
+                       double resolution_hz) {
+  alignment.frequency_hz =
       resolution_hz *
-      Eigen::Map<const Eigen::VectorXi>(lines_.data(), std::ssize(lines_)).cast<double>();
-  return found;
+      Eigen::Map<const Eigen::VectorXi>(lines.data(), std::ssize(lines)).cast<double>();
+  return alignment;
+}
+
+}  // namespace
+
+LineAlignment AlignmentAverage::of_residuals(double resolution_hz) const {
+  return on_lines(residuals_, lines_, resolution_hz);
+}
+
+LineAlignment AlignmentAverage::of_responses(double resolution_hz) const {
+  if (responses_.cosine.size() == 0) return {};
+  return on_lines(responses_, excited_, resolution_hz);
+}
+
+std::optional<PlantChange> find_plant_change(const FrfEstimate& frf,
+                                             const LineAlignment& responses) {
+  if (responses.cosine.size() == 0 || frf.noise_variance.size() == 0) return std::nullopt;
+  std::vector<IndexRange> bands = octave_bands(frf.frequency_hz);
+  bands.push_back({0, frf.lines()});
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index n_c = frf.response.rows();
+  // Entries of G, then the rows of G.
+  Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(n_c + n_y, frf.lines());
+  steps.topRows(n_c) = responses.cosine;
+  for (Eigen::Index c = 0; c < n_c; ++c) steps.row(n_c + c % n_y) += responses.cosine.row(c);
+  const auto scatter = [&](const IndexRange& band) {
+    const auto mean = [&](const Eigen::MatrixXd& variance) {
+      return variance.middleCols(band.first, band.count()).rowwise().mean().array();
+    };
+    return std::sqrt((mean(frf.total_variance) / mean(frf.noise_variance)).maxCoeff());
+  };
+  PlantChange clearest;
+  for (const IndexRange& band : bands)
+    for (Eigen::Index row = 0; row < steps.rows(); ++row) {
+      const auto of_band = steps.row(row).segment(band.first, band.count());
+      const double t = of_band.sum() / of_band.norm();
+      const double p = static_cast<double>(steps.rows() * std::ssize(bands)) *
+                       std::exp(-0.5 * std::max(0.0, t) * t);
+      if (p < clearest.p_value)
+        clearest = {frf.frequency_hz[band.first], frf.frequency_hz[band.end - 1], p, scatter(band)};
+    }
+  if (!(clearest.p_value < kSignificance)) return std::nullopt;
+  return clearest;
 }
 
 }  // namespace stageid

@@ -109,7 +109,7 @@ class PlantEstimation {
     }
     if (alignment_ && why_linearity_cannot_be_tested(frf).empty())
       frf.nonlinearity = nonlinearity_test(
-          frf, {scatter, alignment_->finish(info_.sample_rate_hz / info_.period_samples)});
+          frf, {scatter, alignment_->of_residuals(info_.sample_rate_hz / info_.period_samples)});
     frf.provenance_json = provenance_->json();
     if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
     if (channels_.inputs == frf.inputs.names) return frf;
@@ -324,9 +324,16 @@ class PlantEstimation {
     }
     const UsedRun& run = realizations_.front().runs.front();
     results.differences = average_->differences(frf);
-    // A channel that one realization records differently has a slope over the realizations, too.
-    if (results.differences.changes.empty())
+    // A channel that one realization records differently has a slope over the realizations, and is smooth, too.
+    if (results.differences.changes.empty()) {
       results.drift = average_->drift(frf, run.transient_periods + run.periods);
+      // One realization that differs from several others is no drift.
+      const bool one_differs = frf.realizations > 2 && !results.differences.outlying.empty();
+      if (alignment_ && (!results.drift || one_differs))
+        results.differences.plant = find_plant_change(
+            frf, alignment_->of_responses(info_.sample_rate_hz / info_.period_samples));
+      if (results.differences.plant) results.drift.reset();
+    }
     health.note(std::move(results));
   }
 

@@ -26,7 +26,6 @@ constexpr double kLeastShare = 0.5;
 // have this share along one direction by chance once in several thousand cases.
 constexpr double kLeastShareOfRealizations = 0.8;
 constexpr double kLeastBias = 1.0;
-constexpr double kMisleading = 3.0;       // standard deviations of bias: no interval holds
 constexpr double kDriftRounding = 1e-16;  // of the largest |G|^2 of a line
 
 /// A slope of G in time, and its variance per unit of noise_variance.
@@ -36,6 +35,8 @@ struct Slope {
   double least_share = kLeastShare;
   bool poles = false;  // whether X may follow from a pole
   double span = 0.0;   // duration of the measurement in its unit of time
+  double told = 0.0;   // that of the change that is reported
+  bool within_runs = false;
 };
 
 /// X = -f dG/df from the neighbours of each line of the window.
@@ -145,9 +146,11 @@ class DriftFit {
     const double larger = std::sqrt(std::max(1.0, rest / expected));
     ModeDrift drift;
     drift.frequency_hz = frf_.frequency_hz[most];
-    drift.change = window.along / window.length * slope_.span;
-    drift.deviation = larger * std::sqrt(window.variance) / window.length * slope_.span;
-    drift.bias = 0.5 * std::abs(drift.change) * window.bias;
+    const double rate = window.along / window.length;
+    drift.change = rate * slope_.told;
+    drift.deviation = larger * std::sqrt(window.variance) / window.length * slope_.told;
+    drift.bias = 0.5 * std::abs(rate * slope_.span) * window.bias;
+    drift.within_runs = slope_.within_runs;
     drift.in_total = frf_.realizations > 1;
     if (!(drift.bias > kLeastBias)) return std::nullopt;
     return drift;
@@ -248,12 +251,21 @@ std::optional<ModeDrift> ResponseDrift::find(const FrfEstimate& frf, const Matri
   // The slope over the realizations is more accurate.
   if (frf.realizations > 1) {
     const Slope slope{(counted_sum_ - M * (M - 1.0) / 2.0 * G_mean) * (12.0 / (M * (M * M - 1.0))),
-                      12.0 / (M * M - 1.0), kLeastShareOfRealizations, true, M};
+                      12.0 / (M * M - 1.0),
+                      kLeastShareOfRealizations,
+                      true,
+                      M,
+                      M - 1.0};
     if (auto drift = DriftFit(frf, slope).find()) return drift;
   }
   if (!std::isfinite(variance_sum_.sum())) return std::nullopt;
-  const Slope slope{slope_sum_ / M, variance_sum_[0] / M, kLeastShare, false,
-                    M * frf.experiments * run_periods};
+  const Slope slope{slope_sum_ / M,
+                    variance_sum_[0] / M,
+                    kLeastShare,
+                    false,
+                    M * frf.experiments * run_periods,
+                    static_cast<double>(run_periods),
+                    true};
   return DriftFit(frf, slope).find();
 }
 
@@ -262,11 +274,11 @@ Finding to_finding(const ModeDrift& drift) {
       drift.bias > kMisleading ? Severity::fault : Severity::doubt,
       Cause::drift,
       "",
-      fmt::format(
-          "the response changes during the measurement: near {:.4g} Hz a mode moves by {:+.2g} % "
-          "from the first run to the last{}",
-          drift.frequency_hz, 100.0 * drift.change,
-          drift.in_total ? "" : "; the standard deviations do not include it"),
+      fmt::format("the response changes during the measurement: near {:.4g} Hz a mode moves by "
+                  "{:+.2g} % {}{}",
+                  drift.frequency_hz, 100.0 * drift.change,
+                  drift.within_runs ? "within each run" : "from the first realization to the last",
+                  drift.in_total ? "" : "; the standard deviations do not include it"),
       fmt::format(
           "{:+.2g} +- {:.1g} %; the error of the response is up to {:.2g} standard deviations",
           100.0 * drift.change, 100.0 * drift.deviation, drift.bias),

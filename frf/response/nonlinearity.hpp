@@ -33,14 +33,21 @@ struct RealizationScatter {
   double noise_dof = 0.0;  ///< of `noise`
 };
 
-/// Phase steps of the residual E = Y - G U from one line to the next. For noise and stochastic nonlinear contributions
-/// the angle is random. A transient or a drift, which a record has at one end only, is smooth over the lines. E is
-/// computed on detection lines and, from the second realization on, on excited lines with the G of the previous
-/// realizations.
+/// Phase steps of some spectra from one line to the next. For noise and stochastic nonlinear contributions the angle is
+/// random.
+/// Of the residual E = Y - G U, on detection lines and, from the second realization on, on excited lines with the G of
+/// the previous realizations: a transient or a drift, which a record has at one end only, is smooth over the lines.
+/// Of the difference of a realization's G from the previous ones, on excited lines: that of a changed plant is smooth.
 struct LineAlignment {
-  Eigen::VectorXd frequency_hz;  ///< L: excited and detection lines; empty if unknown
-  Eigen::MatrixXd cosine;  ///< n_y x L: of the angle from the previous line, summed over the runs
-  Eigen::MatrixXd pairs;   ///< n_y x L: number of summed angles
+  Eigen::VectorXd frequency_hz;  ///< L; empty if unknown
+  Eigen::MatrixXd
+      cosine;  ///< rows x L: of the angle from the previous line, summed over the spectra
+  Eigen::MatrixXd pairs;  ///< rows x L: number of summed angles
+
+  /// Adds rows x L; values whose power is not above `smallest` of their row are rounding errors.
+  void add(const Eigen::MatrixXcd& values, const Eigen::VectorXd& smallest);
+  /// Probability of lines so alike in this row, from low_hz to high_hz; 1 if there are too few.
+  double tail(Eigen::Index row, double low_hz, double high_hz) const;
 };
 
 /// Evidence about linearity in addition to the estimate and its variances.

@@ -178,7 +178,14 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const Judgement
   result["excess"] = excess_of(model, frf, exact_response(stage, plan, frf));
 }
 
-/// The first cause in the output for exit code 3: the finding of an untrustworthy log, then the message of the fit,
+/// The first reason of a verdict; without one, the last line of the messages.
+std::string first_reason(const Command& command) {
+  if (command.json.contains("reasons") && !command.json["reasons"].empty())
+    return command.json["reasons"][0];
+  return last_line(command.ran.err);
+}
+
+/// The first cause in the output for exit code 3: the finding of an untrustworthy log, then the first reason of the fit,
 /// then that of the validation.
 std::string first_cause(const Command& frf, const Command& fit, const Command& validation) {
   if (frf.ran.exit_code != 0) {
@@ -187,11 +194,8 @@ std::string first_cause(const Command& frf, const Command& fit, const Command& v
         if (finding["severity"] == "fault") return finding["cause"];
     return last_line(frf.ran.err);
   }
-  if (fit.ran.exit_code != 0) return fit.json.value("message", last_line(fit.ran.err));
-  if (validation.ran.exit_code == 0) return "";
-  if (validation.json.contains("reasons") && !validation.json["reasons"].empty())
-    return validation.json["reasons"][0];
-  return last_line(validation.ran.err);
+  if (fit.ran.exit_code != 0) return first_reason(fit);
+  return validation.ran.exit_code == 0 ? "" : first_reason(validation);
 }
 
 bool names_any(std::string said, const std::vector<std::string>& causes) {

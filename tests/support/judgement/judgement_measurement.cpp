@@ -63,8 +63,9 @@ class Loop {
 
   /// @param done share of the experiment before and behind this run
   LogSamples run(const Eigen::MatrixXd& r, Eigen::Index samples, std::uint64_t seed,
-                 std::pair<double, double> done) {
+                 std::pair<double, double> done, int number = -1) {
     plant_.reset();
+    change(number >= plan_.changed_from && number < plan_.changed_to);
     controller_.reset();
     noise_.restart(stage_.spec.simulation.seed + stage_.seed, seed);
     coloured_.restart(~stage_.seed, seed);
@@ -87,6 +88,18 @@ class Loop {
   }
 
  private:
+  /// Of the stage in some runs.
+  void change(bool changed) {
+    gain_ = Eigen::VectorXd::Ones(plant_.actuators());
+    if (changed && plan_.changed_actuator >= 0) gain_[plan_.changed_actuator] = plan_.changed_gain;
+    if (plan_.changed_modes == 0.0) return;
+    const std::vector<PlantMode> modes = plant_modes(stage_.spec.info, stage_.spec.plant);
+    for (std::size_t i = kRigidAxes; i < modes.size(); ++i)
+      plant_.retune(static_cast<Eigen::Index>(i),
+                    modes[i].natural_frequency_hz * (changed ? 1.0 + plan_.changed_modes : 1.0),
+                    modes[i].damping_ratio);
+  }
+
   void drift(double done) {
     const PlantMode& mode =
         stage_.spec.plant.in_plane_modes[static_cast<std::size_t>(plan_.drifting_mode)];
@@ -110,6 +123,7 @@ class Loop {
 
   void push() {
     force_ = u_;
+    force_.array() *= gain_.array();
     quantize(force_, plan_.actuator_quantum_n);
     force_ += Eigen::Map<const Eigen::VectorXd>(noise_.force_n(), force_.size());
     const double shape = 1.0 / std::sqrt(stage_.spec.plant.mass_kg);
@@ -132,6 +146,7 @@ class Loop {
   Eigen::VectorXd seen_;  // input of the controller: the error from the setpoint
   Eigen::VectorXd u_;
   Eigen::VectorXd force_;
+  Eigen::VectorXd gain_;  // of the actuators in this run
 };
 
 void lose_sample(LogSamples& record, Eigen::Index at) {
@@ -198,8 +213,8 @@ MemoryLog measure_with_trouble(const JudgementStage& stage, const TroublePlan& p
     const auto done = [&](std::size_t n) {
       return static_cast<double>(n) / static_cast<double>(runs.size());
     };
-    LogSamples record =
-        loop.run(r, samples + kSpareSamples, run_seed(stage.seed, runs[i]), {done(i), done(i + 1)});
+    LogSamples record = loop.run(r, samples + kSpareSamples, run_seed(stage.seed, runs[i]),
+                                 {done(i), done(i + 1)}, static_cast<int>(i));
     log.append(runs[i].realization, runs[i].experiment,
                plan.silent_in_record ? std::move(r) : std::move(planned), std::move(record));
     spoil(plan, static_cast<int>(i), transient, log);

@@ -12,7 +12,7 @@ namespace {
 constexpr std::array<const char*, kTroubles> kNames = {
     "clean",      "dac_step",       "adc_step",        "cubic",        "friction",
     "slow_noise", "mode_drift",     "lost_sample",     "late_channel", "unexcited_axis",
-    "unsettled",  "late_reference", "setpoint_motion", "wrong_map"};
+    "unsettled",  "late_reference", "setpoint_motion", "wrong_map",    "changed_run"};
 
 /// The force on the heave that goes with its motion at the crossover: what keeps the loop stable.
 double loop_force(const JudgementStage& stage) {
@@ -29,6 +29,25 @@ void draw_late_channel(RandomNumbers& random, const JudgementStage& stage, Troub
   plan.variant =
       std::string(plan.late_sensor ? "sensor" : "actuator") + (whole ? ", whole" : ", part");
   plan.right_causes = {"skew", "late", "delay"};
+}
+
+void draw_changed_run(RandomNumbers& random, const JudgementStage& stage, TroublePlan& plan) {
+  const int runs = static_cast<int>(stage.plan().runs().size());
+  const int fitted = runs * (stage.realizations - 1) / stage.realizations;
+  plan.changed_from = random.integer(0, fitted - 1);
+  const bool one = random.uniform() < 0.5;
+  plan.changed_to = one ? plan.changed_from + 1 : fitted;
+  const bool gain = random.uniform() < 0.5;
+  if (gain) {
+    const int actuators = static_cast<int>(stage.spec.info.actuators.size());
+    plan.changed_actuator = random.integer(0, actuators - 1);
+    plan.changed_gain = 1.0 + random.uniform(0.05, 0.3);
+  } else {
+    plan.changed_modes = random.uniform(0.003, 0.03);
+  }
+  plan.variant = std::string(gain ? "gain" : "modes") + (one ? ", one run" : ", from one run on");
+  plan.right_causes = {"drift",  "changed",    "changes", "realizations", "scale",
+                       "differ", "controller", "dead",    "rigid_body"};
 }
 
 void draw_wrong_map(RandomNumbers& random, JudgementStage& stage, TroublePlan& plan) {
@@ -136,6 +155,9 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       break;
     case Trouble::wrong_map:
       draw_wrong_map(random, stage, plan);
+      break;
+    case Trouble::changed_run:
+      draw_changed_run(random, stage, plan);
       break;
   }
   return plan;

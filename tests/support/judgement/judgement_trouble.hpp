@@ -26,9 +26,10 @@ enum class Trouble : std::uint8_t {
   unsettled,
   late_reference,  ///< the excitation is recorded late
   setpoint_motion,
-  wrong_map
+  wrong_map,
+  changed_run  ///< the stage differs in one run, or from one run on
 };
-inline constexpr int kTroubles = 14;
+inline constexpr int kTroubles = 15;
 const char* to_string(Trouble trouble) noexcept;
 std::optional<Trouble> trouble_of(const std::string& name) noexcept;
 
@@ -49,6 +50,11 @@ struct TroublePlan {
   double setpoint_m = 0.0;      ///< rms size of slow motion in heave
   int silent_axis = -1;         ///< its excitation does not arrive
   // in the recording
+  int changed_from = -1;      ///< first run of the changed stage
+  int changed_to = -1;        ///< the run after the last of it
+  double changed_gain = 1.0;  ///< of one actuator
+  int changed_actuator = -1;
+  double changed_modes = 0.0;  ///< relative change of all frequencies of the flexible modes
   int lost_run = -1;
   double lost_at = 0.0;  ///< share of the measured periods
   bool late_sensor = false;
