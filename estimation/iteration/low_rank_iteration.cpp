@@ -35,11 +35,14 @@ class LowRankIteration {
   }
 
  private:
+  ArrowSystem equations(const FitParameters& beta) const {
+    return {problem_, beta, evaluate_groups(problem_, beta, true), FitMethod::gn,
+            ChannelEquationsUse::only_kept};
+  }
+
   /// Projects the unconstrained numerators, weighted by their inverse variances.
   void project() {
-    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
-                             ChannelEquationsUse::only_kept);
+    const ArrowSystem system = equations(beta_);
     Eigen::MatrixXd weight(problem_.channels(), problem_.functions());
     const Eigen::MatrixXd unit =
         Eigen::MatrixXd::Identity(problem_.functions(), problem_.functions());
@@ -51,16 +54,17 @@ class LowRankIteration {
     weight /= weight.maxCoeff();
     factors_.project(beta_, weight);
     factors_.write_numerators(beta_);
-    result_.end_cost = residual_cost(problem_, groups, beta_.B);
+    result_.end_cost = cost_of(beta_);
   }
 
-  Eigen::VectorXd solve(double damping) const {
-    const Eigen::VectorXd scale = N_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd scaled = scale.asDiagonal() * N_ * scale.asDiagonal();
+  static Eigen::VectorXd solve(const Eigen::MatrixXd& N, const Eigen::VectorXd& g, double damping,
+                               const std::vector<Eigen::Index>& held) {
+    const Eigen::VectorXd scale = N.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = scale.asDiagonal() * N * scale.asDiagonal();
     scaled.diagonal().array() += damping + 1e-13;
-    Eigen::VectorXd rhs = scale.cwiseProduct(g_);
-    hold_unknowns(result_.frozen, scaled);
-    for (const Eigen::Index i : result_.frozen) rhs[i] = 0.0;
+    Eigen::VectorXd rhs = scale.cwiseProduct(g);
+    hold_unknowns(held, scaled);
+    for (const Eigen::Index i : held) rhs[i] = 0.0;
     return scale.cwiseProduct(scaled.ldlt().solve(rhs));
   }
 
@@ -68,9 +72,7 @@ class LowRankIteration {
   bool iterate_once() {
     if (options_.limit && options_.limit->reached())
       return result_.end(options_.limit->status(), options_.limit->message());
-    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, FitMethod::gn,
-                             ChannelEquationsUse::only_kept);
+    const ArrowSystem system = equations(beta_);
     N_ = factors_.reduced_matrix(beta_, system);
     g_ = factors_.reduced_gradient(beta_, system);
     if (!N_.allFinite())
@@ -79,12 +81,29 @@ class LowRankIteration {
     const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
     result_.gradient = scaled_gradient(N_, g_, result_.frozen, squares);
     const double data = static_cast<double>(problem_.size() * problem_.channels());
-    result_.deviations = std::sqrt(std::abs(solve(0.0).dot(g_)) * data / squares);
+    result_.deviations =
+        std::sqrt(std::abs(solve(N_, g_, 0.0, result_.frozen).dot(g_)) * data / squares);
     if (result_.gradient < options_.gradient_tolerance ||
         result_.deviations < options_.deviation_tolerance)
       return result_.end_here(FitStatus::gradient_small, "converged");
-    if (damping_.descend([&](double damping) { return take(solve(damping)); })) return true;
+    if (damping_.descend(
+            [&](double damping) { return take(solve(N_, g_, damping, result_.frozen)); }))
+      return true;
     return result_.end_without_step();
+  }
+
+  double cost_of(const FitParameters& beta) const {
+    return residual_cost(problem_, evaluate_groups(problem_, beta, false), beta.B);
+  }
+
+  /// Fits the factors to poles that have moved too far for the linear step of both.
+  void follow(FitParameters& beta, ResidueFactors& factors) const {
+    const ArrowSystem system = equations(beta);
+    const Eigen::MatrixXd N = factors.reduced_matrix(beta, system);
+    if (!N.allFinite()) return;
+    factors.step(
+        solve(N, factors.reduced_gradient(beta, system), 0.0, indices(0, problem_.globals())));
+    factors.write_numerators(beta);
   }
 
   /// @returns false if the step does not lower the cost
@@ -95,7 +114,11 @@ class LowRankIteration {
     ResidueFactors factors = factors_;
     factors.step(step);
     factors.write_numerators(trial);
-    const double cost = residual_cost(problem_, evaluate_groups(problem_, trial, false), trial.B);
+    double cost = cost_of(trial);
+    if (!(cost < result_.end_cost)) {
+      follow(trial, factors);
+      cost = cost_of(trial);
+    }
     if (!(cost < result_.end_cost)) return false;
     beta_ = std::move(trial);
     factors_ = std::move(factors);

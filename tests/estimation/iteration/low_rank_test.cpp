@@ -11,6 +11,7 @@
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
+#include "tests/estimation/submodel_cases.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
@@ -239,6 +240,42 @@ TEST(LowRankViscousFit, RecoversComplexShapes) {
     EXPECT_LT(
         (fit.model.submodels[i].numerator[1] - problem.model.submodels[i].numerator[1]).norm(),
         1e-7 * problem.model.submodels[i].numerator[1].norm());
+}
+
+/// A body on springs and a broad mode below the lines, and two modes with residues of rank one.
+test::DenseProblem suspended_body() {
+  test::RandomNumbers random(5);
+  test::DenseProblem problem;
+  problem.model = test::named_model(2, 3);
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(197, 16.0, 800.0);
+  const auto add = [&](double frequency_hz, double damping, const Eigen::MatrixXd& stiffness) {
+    problem.model.submodels.push_back(
+        test::empty_submodel(problem.model, 0, test::mode_coefficients(frequency_hz, damping), 1));
+    problem.model.submodels.back().numerator[0] = stiffness;
+  };
+  add(0.4, 0.2, 1000.0 * random_matrix(random, 2, 3));
+  add(0.5, 0.1, 1000.0 * random_matrix(random, 2, 3));
+  add(9.0, 0.5, random_matrix(random, 2, 3));
+  for (const double frequency_hz : {181.0, 422.0})
+    add(frequency_hz, 0.015, random_matrix(random, 2, 1) * random_matrix(random, 1, 3));
+  for (const std::size_t i : {0, 1}) {
+    problem.model.submodels[i].role = SubmodelRole::suspension;
+    problem.model.submodels[i].frequency_held = true;
+  }
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+  return problem;
+}
+
+TEST(LowRankSuspensionFit, ConvergesAlongPolesThatTheLinesHardlyDetermine) {
+  const test::DenseProblem problem = suspended_body();
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.residue_rank = 1;
+  for (const std::uint64_t seed : {1, 8, 19}) {  // linear steps of the factors stall on these
+    const FitResult fit =
+        fit_additive_model(test::noisy(problem, 5e-3, seed), problem.model, options);
+    EXPECT_TRUE(fit.trustworthy()) << seed << ": " << fit.message();
+  }
 }
 
 }  // namespace test_low_rank
