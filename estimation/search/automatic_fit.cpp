@@ -297,8 +297,13 @@ class AutomaticFit {
       model.output_delay_s.setZero(frf_.n_outputs());
     }
     model.submodels = fixed_submodels(frf_, structure_);
-    for (const ModeCandidate& mode : modes)
-      model.submodels.push_back(mode_submodel(frf_, structure_, mode));
+    for (const ModeCandidate& mode : modes) {
+      Submodel& s = model.submodels.emplace_back(mode_submodel(frf_, structure_, mode));
+      // The lines show only the asymptote of a pole an octave beside them; free, it would go to a noise peak.
+      s.frequency_held = s.damping_held =
+          selection_.keep_modes && (2.0 * mode.frequency_hz < frf_.frequency_hz[0] ||
+                                    mode.frequency_hz > 2.0 * frf_.frequency_hz[frf_.lines() - 1]);
+    }
     return model;
   }
 

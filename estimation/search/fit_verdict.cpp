@@ -84,8 +84,8 @@ void judge_modes(const FrfEstimate& frf, const FitEvidence& evidence, FitResult&
     places.push_back(fmt::format("{:.6g} Hz (damping ratio {:.3g}, {})", s.natural_frequency_hz(),
                                  s.damping_ratio(), reason_of(fit, i, *s.verdict)));
   }
-  // Modes that were requested as a list have been judged by the fit itself.
-  if (!places.empty() && evidence.number != ModeNumber::given)
+  // The fit itself has already judged modes that were requested as a list.
+  if (!places.empty() && (evidence.number != ModeNumber::given || fit.trustworthy()))
     doubts.push_back(
         {fmt::format("the data do not support the modes at {} Hz: a mode placed anywhere would "
                      "improve the fit as much",
@@ -152,7 +152,8 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   if (!beside && fit.is_held(submodel) && !is_held_by_request(s)) return ModeVerdict::at_bound;
   if (asked && s.frequency_held) return ModeVerdict::weak;  // hold_hidden_modes()
   const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
-  if (!is_held_by_request(s) && (open || (asked && is_worth_nothing(frf, fit, submodel))))
+  const bool unselected = number != ModeNumber::chosen;
+  if (!is_held_by_request(s) && (open || (unselected && is_worth_nothing(frf, fit, submodel))))
     return ModeVerdict::weak;
   return beside ? ModeVerdict::beside_band : ModeVerdict::determined;
 }

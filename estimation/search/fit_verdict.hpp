@@ -47,9 +47,9 @@ double pole_doubt(const FitResult& fit, std::size_t submodel);
 std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const AdditiveModel& model);
 
 /// The verdict on a searched mode; `determined` for other submodels.
-/// @param number if asked, the modes were not selected by their worth: one that is not worth its parameters
-/// (price_of_mode()) or is held because noise hides it (hold_hidden_modes()) is weak, and one outside the lines by less
-/// than half its half-power width is judged like others
+/// @param number if asked or given, the modes were not selected by their worth: one that is not worth its parameters
+/// (price_of_mode()) is weak. If asked, one that is held because noise hides it (hold_hidden_modes()) is weak, too, and
+/// one outside the lines by less than half its half-power width is judged like others
 ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitResult& fit,
                          std::size_t submodel);
 

@@ -156,6 +156,31 @@ TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
   EXPECT_EQ(frequencies(fit.model).size(), 2U);
 }
 
+// The noise decides where it ends, so its standard deviation is small.
+TEST_F(SmallStage, AGivenModeThatIsNoneIsNotDetermined) {
+  const auto fit_of = [&](double more_hz) {
+    std::vector<ModeCandidate> modes = {{121.0, 0.01, 1}, {391.0, 0.01, 1}, {638.0, 0.01, 1}};
+    if (more_hz > 0.0) modes.push_back({more_hz, 0.01, 1});
+    return automatic_fit(frf_, {}, {.modes = modes, .keep_modes = true}, {});
+  };
+  EXPECT_TRUE(fit_of(0.0).trustworthy());
+  for (const double surplus_hz : {250.0, 500.0, 750.0}) {
+    const FitResult fit = fit_of(surplus_hz);
+    EXPECT_EQ(fit.status(), FitStatus::undetermined) << surplus_hz;
+  }
+}
+
+// Free, it would go to a noise peak on the lines.
+TEST_F(SmallStage, AGivenModeFarFromTheLinesIsHeld) {
+  const double far_hz = 0.1 * frf_.frequency_hz[0];
+  const FitResult fit = automatic_fit(
+      frf_, {},
+      {.modes = {{far_hz, 0.1, 1}, {121.0, 0.01, 1}, {391.0, 0.01, 1}, {638.0, 0.01, 1}},
+       .keep_modes = true},
+      {});
+  EXPECT_NEAR(frequencies(fit.model).front(), far_hz, 1e-9);
+}
+
 /// The exact response of one channel with these modes, without variances.
 FrfEstimate response_of(const std::vector<double>& frequency_hz, double damping_ratio,
                         const Eigen::VectorXd& lines_hz) {
