@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <thread>
@@ -101,10 +102,9 @@ class MpiTeam : public stageid::Team {
   mutable Failure failure_;
 };
 
-/// Results and messages are those of the first process; the others send it their errors.
-void be_silent() {
+void be_silent(std::initializer_list<int> streams) {
   const int nowhere = ::open("/dev/null", O_RDWR);
-  for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+  for (const int stream : streams) ::dup2(nowhere, stream);
 }
 
 }  // namespace
@@ -115,11 +115,14 @@ int main(int argc, char** argv) {
   int exit_code = EXIT_FAILURE;
   {
     const MpiTeam team;
-    if (team.rank() > 0) be_silent();
+    // Results and messages are those of the first process; the others send it their errors.
+    if (team.rank() > 0) be_silent({STDOUT_FILENO, STDERR_FILENO});
     exit_code = stageid::program_main(argc, argv, team);
   }
-  // Once one process has ended with an error, mpirun sends SIGTERM to the others, which have reported already.
+  // Once one process has ended with an error, mpirun sends SIGTERM to the others, more than once to a slow one. They
+  // have reported already.
   const stageid::ControlledStop ends_by_itself;
+  be_silent({STDERR_FILENO});
   MPI_Finalize();
   return exit_code;
 }
