@@ -214,6 +214,7 @@ case("Dashboard on a port that does not exist", f"{RUN} --dashboard 80800")
 case("Node without a link", f"node {STAGE}")
 case("Watchdog shorter than a repetition", f"node {STAGE} --modbus-tcp 0 --watchdog 0.06")
 case("Directory of an earlier identification", f"identify {EXPERIMENT} -o .", needs=("run.slog",), keeps=True)
+case("Identification with all axes at once", f"identify {EXPERIMENT} -o new", experiment("axes:", "scheme: simultaneous\n  axes:"))
 
 case = chapter("Logs")
 case("Truncated log", "log verify cut.slog")

@@ -65,6 +65,16 @@ TEST(StageWiring, AFactorIsFoundInSpiteOfDistortion) {
   }
 }
 
+// Above a mode, the plant is larger than its rigid body and its omega^2 |G| falls. No channel has a factor.
+TEST(StageWiring, LinesAboveAModeAreNoRigidBody) {
+  std::vector<PlantLine> lines = body(1, 0.0, 1.0);
+  const double first = lines.front().omega_rad_s;
+  for (PlantLine& line : lines) line.G *= 1.0 + 30.0 * std::pow(first / line.omega_rad_s, 2);
+  const StageWiringCheck check = check_stage_wiring(lines, kAll, kAll);
+  EXPECT_TRUE(check.errors.empty());
+  EXPECT_FALSE(check.unchecked.empty());
+}
+
 // A spring below the heave, as stiff as a cubic one becomes: it resonates just below the lines, at 4 to 5.5 Hz, and
 // moves all sensors alike.
 TEST(StageWiring, ASuspensionThatTheMotionStiffensIsNotAFactor) {

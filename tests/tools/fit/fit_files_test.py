@@ -163,6 +163,17 @@ class Covariance(unittest.TestCase):
         self.assertNotIn("\ndelay ", shown)
         self.assertNotIn("input_delay_std_s", model())
 
+    def test_an_unstable_mode_is_told_at_the_export(self):
+        write_frf(WORK / "frf.h5", F, plant(F))
+        fit("frf.h5", "-o", "model.json", "--modes", "120,250")
+        self.assertEqual(program("export", "model.json", "-o", "plant.csv").stderr, "")
+        m = model()
+        modes_of(m)[0]["denominator"][1] *= -1.0
+        (WORK / "unstable.json").write_text(json.dumps(m))
+        done = program("export", "unstable.json", "-o", "plant.csv")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("unstable.json: the mode at 120 Hz is unstable", done.stderr)
+
     def test_another_ending_is_refused(self):
         self.measure(1)
         done = fit("frf.h5", "-o", "model.json", "--covariance", "c.csv", code=2)
