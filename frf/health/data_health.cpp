@@ -406,8 +406,7 @@ void Examination::check_others(std::vector<Finding> own) {
   if (record_.differences.plant && std::ranges::all_of(own, [&](const Finding& f) {
         return f.severity != Severity::fault || in_all(f);
       }))
-    findings_.push_back(to_finding(*record_.differences.plant, record_.differences.outlying,
-                                   record_.others.size() + 1));
+    findings_.push_back(to_finding(*record_.differences.plant));
   for (Finding& f : own) {
     if (in_all(f))
       f.realizations.clear();

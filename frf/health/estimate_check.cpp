@@ -76,11 +76,9 @@ std::vector<Finding> check_settling(const FrfEstimate& frf) {
   if (bands * test.settled_p_value.minCoeff() >= kUnsettledBelow) return {};
   std::string figure;
   for (Eigen::Index b = 0, end = 0; b < test.band_hz.rows(); b = end) {
-    for (end = b; end < test.band_hz.rows() && !test.settled(end);) ++end;
-    if (end == b) {
-      ++end;
-      continue;
-    }
+    end = b + 1;
+    if (test.settled(b)) continue;
+    while (end < test.band_hz.rows() && !test.settled(end)) ++end;
     figure += fmt::format("{}{:.4g} ... {:.4g} Hz: p = {:.0e}", figure.empty() ? "" : ", ",
                           test.band_hz(b, 0), test.band_hz(end - 1, 1),
                           test.settled_p_value.segment(b, end - b).minCoeff());

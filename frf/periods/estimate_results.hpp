@@ -12,8 +12,7 @@ namespace stageid {
 /// A mode whose frequency changes during the measurement.
 struct ModeDrift {
   double frequency_hz = 0.0;
-  double change =
-      0.0;  ///< of its frequency, relative: from the first realization to the last, or within a run
+  double change = 0.0;     ///< of its frequency, relative: over the realizations, or within a run
   double deviation = 0.0;  ///< standard deviation of `change`
   double bias = 0.0;  ///< half the change of the response over its stated deviation, at the maximum
   bool within_runs = false;  ///< seen within the runs, not between the realizations

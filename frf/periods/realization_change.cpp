@@ -56,22 +56,20 @@ Finding to_finding(const RealizationChange& change) {
   return finding;
 }
 
-Finding to_finding(const PlantChange& change, const std::vector<int>& outlying,
-                   std::size_t realizations) {
-  const bool named = realizations > 2 && !outlying.empty();
+Finding to_finding(const PlantChange& change) {
+  const std::string which =
+      change.realizations.empty() ? "some realizations" : named_realizations(change.realizations);
   return {change.ratio > kMisleading ? Severity::fault : Severity::doubt,
           Cause::drift,
           "",
-          fmt::format(
-              "the stage changed during the measurement: {} from the others",
-              named ? named_realizations(outlying) + (outlying.size() == 1 ? " differs" : " differ")
-                    : "some realizations differ"),
+          fmt::format("the stage changed during the measurement: {} {} from the others", which,
+                      change.realizations.size() == 1 ? "differs" : "differ"),
           fmt::format("{:.2g} times the noise at {:.4g} ... {:.4g} Hz, alike on neighbouring lines "
                       "(p = {:.0e})",
                       change.ratio, change.low_hz, change.high_hz, change.p_value),
           "find out what changed: load, clamping, gain, temperature; leave the realizations before "
           "or after the change out (--realizations), or measure again",
-          named ? outlying : std::vector<int>{}};
+          change.realizations};
 }
 
 }  // namespace stageid

@@ -37,9 +37,9 @@ std::string with_deviation(double value, double deviation, int digits);
 struct PlantChange {
   double low_hz = 0.0;  ///< of the band with the clearest difference
   double high_hz = 0.0;
-  double p_value =
-      1.0;  ///< probability of differences so alike on neighbouring lines, over all tests
-  double ratio = 0.0;  ///< scatter of the realizations in this band over that of noise
+  double p_value = 1.0;  ///< of differences so alike on neighbouring lines, over all tests
+  double ratio = 0.0;    ///< scatter of the realizations in this band over that of noise
+  std::vector<int> realizations{};  ///< counted from 0: those that differ from the others, if known
 };
 
 /// Differences between the realizations of a log.
@@ -50,8 +50,7 @@ struct RealizationDifferences {
   std::vector<int> outlying;
 };
 
-/// A fault if the difference misleads, a doubt otherwise. Of two realizations, it names none.
-Finding to_finding(const PlantChange& change, const std::vector<int>& outlying,
-                   std::size_t realizations);
+/// A fault if the difference misleads, a doubt otherwise.
+Finding to_finding(const PlantChange& change);
 
 }  // namespace stageid

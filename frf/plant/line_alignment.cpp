@@ -58,56 +58,44 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
   responses_.add(G - G_before, kPowerRounding * G.cwiseAbs2().rowwise().maxCoeff());
 }
 
-namespace {
-
-LineAlignment on_lines(LineAlignment alignment, const std::vector<int>& lines,
-                       double resolution_hz) {
-  alignment.frequency_hz =
-      resolution_hz *
-      Eigen::Map<const Eigen::VectorXi>(lines.data(), std::ssize(lines)).cast<double>();
-  return alignment;
-}
-
-}  // namespace
-
 LineAlignment AlignmentAverage::of_residuals(double resolution_hz) const {
-  return on_lines(residuals_, lines_, resolution_hz);
-}
-
-LineAlignment AlignmentAverage::of_responses(double resolution_hz) const {
-  if (responses_.cosine.size() == 0) return {};
-  return on_lines(responses_, excited_, resolution_hz);
+  LineAlignment found = residuals_;
+  found.frequency_hz =
+      resolution_hz *
+      Eigen::Map<const Eigen::VectorXi>(lines_.data(), std::ssize(lines_)).cast<double>();
+  return found;
 }
 
 std::optional<PlantChange> find_plant_change(const FrfEstimate& frf,
-                                             const LineAlignment& responses) {
-  if (responses.cosine.size() == 0 || frf.noise_variance.size() == 0) return std::nullopt;
+                                             const Eigen::MatrixXd& cosine) {
+  if (cosine.size() == 0 || frf.noise_variance.size() == 0) return std::nullopt;
   std::vector<IndexRange> bands = octave_bands(frf.frequency_hz);
   bands.push_back({0, frf.lines()});
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index n_c = frf.response.rows();
   // Entries of G, then the rows of G.
   Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(n_c + n_y, frf.lines());
-  steps.topRows(n_c) = responses.cosine;
-  for (Eigen::Index c = 0; c < n_c; ++c) steps.row(n_c + c % n_y) += responses.cosine.row(c);
-  const auto scatter = [&](const IndexRange& band) {
-    const auto mean = [&](const Eigen::MatrixXd& variance) {
-      return variance.middleCols(band.first, band.count()).rowwise().mean().array();
-    };
-    return std::sqrt((mean(frf.total_variance) / mean(frf.noise_variance)).maxCoeff());
-  };
-  PlantChange clearest;
+  steps.topRows(n_c) = cosine;
+  for (Eigen::Index c = 0; c < n_c; ++c) steps.row(n_c + c % n_y) += cosine.row(c);
+  const auto tests = static_cast<double>(steps.rows() * std::ssize(bands));
+  double least_p = 1.0;
+  IndexRange clearest;
   for (const IndexRange& band : bands)
     for (Eigen::Index row = 0; row < steps.rows(); ++row) {
       const auto of_band = steps.row(row).segment(band.first, band.count());
       const double t = of_band.sum() / of_band.norm();
-      const double p = static_cast<double>(steps.rows() * std::ssize(bands)) *
-                       std::exp(-0.5 * std::max(0.0, t) * t);
-      if (p < clearest.p_value)
-        clearest = {frf.frequency_hz[band.first], frf.frequency_hz[band.end - 1], p, scatter(band)};
+      const double p = tests * std::exp(-0.5 * std::max(0.0, t) * t);
+      if (!(p < least_p)) continue;
+      least_p = p;
+      clearest = band;
     }
-  if (!(clearest.p_value < kSignificance)) return std::nullopt;
-  return clearest;
+  if (!(least_p < kSignificance)) return std::nullopt;
+  const auto mean = [&](const Eigen::MatrixXd& variance) {
+    return variance.middleCols(clearest.first, clearest.count()).rowwise().mean().array();
+  };
+  const double ratio = std::sqrt((mean(frf.total_variance) / mean(frf.noise_variance)).maxCoeff());
+  return PlantChange{frf.frequency_hz[clearest.first], frf.frequency_hz[clearest.end - 1], least_p,
+                     ratio};
 }
 
 }  // namespace stageid

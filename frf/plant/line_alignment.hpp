@@ -26,7 +26,8 @@ class AlignmentAverage {
 
   /// `resolution_hz`: distance of neighbouring lines.
   LineAlignment of_residuals(double resolution_hz) const;
-  LineAlignment of_responses(double resolution_hz) const;
+  /// LineAlignment::cosine of the responses; empty until the second realization.
+  const Eigen::MatrixXd& cosine_of_responses() const noexcept { return responses_.cosine; }
 
  private:
   std::vector<int> excited_;
@@ -35,19 +36,18 @@ class AlignmentAverage {
   Eigen::Index outputs_;
   bool first_ = true;
   LineAlignment residuals_;
-  LineAlignment responses_;  // empty until the second realization
+  LineAlignment responses_;
 };
 
-/// A change of the plant between the realizations, whose differences from the previous ones are `responses`: in an
+/// A change of the plant between the realizations, whose differences from the previous ones turn by `cosine`: in an
 /// octave or in the whole band, they turn less from line to line than chance explains, in one entry of G or in all of
 /// one output together. A mode, a mass or a gain that changes does so on all lines near it; a distortion has another
 /// phase on every line. If one experiment of n with all axes changed, a share 1 / n of the difference is smooth.
 /// With s_k the sum of cosines on line k, whose sign is random if the plant did not change,
 ///   P(sum s_k / sqrt(sum s_k^2) > t) <= exp(-t^2 / 2),
 /// however the entries depend on each other. A change needs kSignificance over all these tests.
-/// @param frf finished, on the same lines
+/// @param frf finished, on the same lines; `cosine`: AlignmentAverage::cosine_of_responses()
 /// Source: self-normalized sums of symmetric variables (de la Pena, Lai and Shao, Self-Normalized Processes, 2009).
-std::optional<PlantChange> find_plant_change(const FrfEstimate& frf,
-                                             const LineAlignment& responses);
+std::optional<PlantChange> find_plant_change(const FrfEstimate& frf, const Eigen::MatrixXd& cosine);
 
 }  // namespace stageid

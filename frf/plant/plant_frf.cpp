@@ -327,12 +327,16 @@ class PlantEstimation {
     // A channel that one realization records differently has a slope over the realizations, and is smooth, too.
     if (results.differences.changes.empty()) {
       results.drift = average_->drift(frf, run.transient_periods + run.periods);
-      // One realization that differs from several others is no drift.
-      const bool one_differs = frf.realizations > 2 && !results.differences.outlying.empty();
-      if (alignment_ && (!results.drift || one_differs))
-        results.differences.plant = find_plant_change(
-            frf, alignment_->of_responses(info_.sample_rate_hz / info_.period_samples));
-      if (results.differences.plant) results.drift.reset();
+      // One realization that differs from several others is no drift. Of two, neither is the odd one.
+      const std::vector<int> odd =
+          frf.realizations > 2 ? results.differences.outlying : std::vector<int>{};
+      std::optional<PlantChange>& change = results.differences.plant;
+      if (alignment_ && (!results.drift || !odd.empty()))
+        change = find_plant_change(frf, alignment_->cosine_of_responses());
+      if (change) {
+        change->realizations = odd;
+        results.drift.reset();
+      }
     }
     health.note(std::move(results));
   }

@@ -33,9 +33,9 @@ struct Slope {
   MatrixXcd values;  // vec(G) x lines
   double variance = 0.0;
   double least_share = kLeastShare;
-  bool poles = false;  // whether X may follow from a pole
-  double span = 0.0;   // duration of the measurement in its unit of time
-  double told = 0.0;   // that of the change that is reported
+  bool poles = false;     // whether X may follow from a pole
+  double span = 0.0;      // duration of the measurement in its unit of time
+  double reported = 0.0;  // duration of the change that is reported
   bool within_runs = false;
 };
 
@@ -147,8 +147,8 @@ class DriftFit {
     ModeDrift drift;
     drift.frequency_hz = frf_.frequency_hz[most];
     const double rate = window.along / window.length;
-    drift.change = rate * slope_.told;
-    drift.deviation = larger * std::sqrt(window.variance) / window.length * slope_.told;
+    drift.change = rate * slope_.reported;
+    drift.deviation = larger * std::sqrt(window.variance) / window.length * slope_.reported;
     drift.bias = 0.5 * std::abs(rate * slope_.span) * window.bias;
     drift.within_runs = slope_.within_runs;
     drift.in_total = frf_.realizations > 1;

@@ -75,8 +75,17 @@ void test_detection(const DetectionLines& detection, const std::vector<Eigen::In
 /// The smallest upper tail of any output on the lines [low_hz, high_hz].
 double least_tail(const LineAlignment& alignment, double low_hz, double high_hz) {
   double least = 1.0;
-  for (Eigen::Index i = 0; i < alignment.cosine.rows(); ++i)
-    least = std::min(least, alignment.tail(i, low_hz, high_hz));
+  for (Eigen::Index i = 0; i < alignment.cosine.rows(); ++i) {
+    double cosine = 0.0;
+    double pairs = 0.0;
+    for (Eigen::Index l = 0; l < alignment.frequency_hz.size(); ++l) {
+      if (alignment.frequency_hz[l] < low_hz || alignment.frequency_hz[l] > high_hz) continue;
+      cosine += alignment.cosine(i, l);
+      pairs += alignment.pairs(i, l);
+    }
+    if (pairs >= kFewestLinesOfBand)
+      least = std::min(least, tail_of_normal(cosine / std::sqrt(0.5 * pairs)));
+  }
   return least;
 }
 
@@ -112,17 +121,6 @@ void LineAlignment::add(const Eigen::MatrixXcd& values, const Eigen::VectorXd& s
       before = l;
     }
   }
-}
-
-double LineAlignment::tail(Eigen::Index row, double low_hz, double high_hz) const {
-  double cosines = 0.0;
-  double angles = 0.0;
-  for (Eigen::Index l = 0; l < frequency_hz.size(); ++l) {
-    if (frequency_hz[l] < low_hz || frequency_hz[l] > high_hz) continue;
-    cosines += cosine(row, l);
-    angles += pairs(row, l);
-  }
-  return angles >= kFewestLinesOfBand ? tail_of_normal(cosines / std::sqrt(0.5 * angles)) : 1.0;
 }
 
 bool NonlinearityTest::settled(Eigen::Index b) const {

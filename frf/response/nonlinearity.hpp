@@ -40,14 +40,12 @@ struct RealizationScatter {
 /// Of the difference of a realization's G from the previous ones, on excited lines: that of a changed plant is smooth.
 struct LineAlignment {
   Eigen::VectorXd frequency_hz;  ///< L; empty if unknown
-  Eigen::MatrixXd
-      cosine;  ///< rows x L: of the angle from the previous line, summed over the spectra
+  /// rows x L: of the angle from the previous line, summed over the spectra
+  Eigen::MatrixXd cosine;
   Eigen::MatrixXd pairs;  ///< rows x L: number of summed angles
 
   /// Adds rows x L; values whose power is not above `smallest` of their row are rounding errors.
   void add(const Eigen::MatrixXcd& values, const Eigen::VectorXd& smallest);
-  /// Probability of lines so alike in this row, from low_hz to high_hz; 1 if there are too few.
-  double tail(Eigen::Index row, double low_hz, double high_hz) const;
 };
 
 /// Evidence about linearity in addition to the estimate and its variances.

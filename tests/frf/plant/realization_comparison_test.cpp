@@ -19,29 +19,9 @@ namespace stageid {
 namespace test_realization_comparison {
 
 using test::MemoryLog;
+using test::record_realizations;
 using test::text;
 using testing::HasSubstr;
-
-struct Spec {
-  int realizations = 3;
-  std::uint64_t seed = 1;
-  double noise = 1e-4;
-  double cubic = 0.0;
-};
-
-MemoryLog recorded(const Spec& spec) {
-  test::LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 1000, .axes = 2};
-  x.lines = test::line_range(3, 301, 2);
-  x.realizations = spec.realizations;
-  x.periods = 4;
-  x.transient_periods = 3;
-  x.seed = spec.seed;
-  test::ComplexNoise random(spec.seed + 100);
-  const double first_hz = 60.0 + 60.0 * random.uniform();
-  return test::simulate_sampled_log(
-      test::sampled_plant(3, 2, {{first_hz, 0.05}, {2.1 * first_hz, 0.04}}, x.sample_rate_hz, 0.02),
-      x, spec.noise, spec.cubic);
-}
 
 /// Changes the records of one realization, counted from 0.
 void change(MemoryLog& log, int realization, const std::function<void(LogSamples&)>& by) {
@@ -63,7 +43,7 @@ TEST(RealizationComparison, FindsNothingInCleanAndDistortedLogs) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed)
     for (const int realizations : {2, 3, 5})
       for (const double cubic : {0.0, 1e-2}) {
-        const MemoryLog log = recorded({realizations, seed, 1e-5, cubic});
+        const MemoryLog log = record_realizations({realizations, seed, 1e-5, cubic});
         const std::vector<Finding> findings = told(log);
         EXPECT_TRUE(findings.empty()) << seed << " " << realizations << "\n" << text(findings);
       }
@@ -113,7 +93,7 @@ TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
     for (const int realizations : {3, 4})
       for (const int wrong : {0, 2})
         for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-          MemoryLog log = recorded({realizations, seed});
+          MemoryLog log = record_realizations({realizations, seed});
           change(log, wrong, faults[f].by);
           const std::vector<Finding> findings = told(log);
           ASSERT_EQ(findings.size(), 1U) << f << " " << seed << "\n" << text(findings);
@@ -133,7 +113,7 @@ TEST(RealizationComparison, NamesTheChannelTheChangeAndTheRealization) {
 // The first change of a channel is found while those of the others still bias it.
 TEST(RealizationComparison, AChannelIsToldOnceIfSeveralAreChanged) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    MemoryLog log = recorded({4, seed});
+    MemoryLog log = record_realizations({4, seed});
     change(log, 1, [](LogSamples& s) {
       late(s.sensors, 0, 2);
       late(s.sensors, 1, 1);
@@ -153,7 +133,7 @@ TEST(RealizationComparison, AChannelIsToldOnceIfSeveralAreChanged) {
 }
 
 TEST(RealizationComparison, OfTwoRealizationsEitherMayBeWrong) {
-  MemoryLog log = recorded({2, 5});
+  MemoryLog log = record_realizations({2, 5});
   change(log, 1, [](LogSamples& s) { s.sensors.col(1) *= 2.0; });
   const std::vector<Finding> findings = told(log);
   ASSERT_EQ(findings.size(), 1U) << text(findings);

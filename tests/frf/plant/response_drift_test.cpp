@@ -71,9 +71,9 @@ MemoryLog drifting_log(const Spec& spec) {
   return log;
 }
 
-/// That part of the drift over the whole measurement which is told: within a run, or between the middles of the first
-/// and the last realization.
-double told(const Spec& spec, const ModeDrift& drift) {
+/// The change that a finding reports, from the drift over the whole measurement: that within one run, or that from the
+/// middle of the first realization to the middle of the last.
+double reported_change(const Spec& spec, const ModeDrift& drift) {
   if (drift.within_runs) return spec.drift / (2.0 * spec.realizations);
   return spec.drift * (spec.realizations - 1.0) / spec.realizations;
 }
@@ -90,7 +90,7 @@ TEST(ResponseDrift, AModeThatMovesIsNamedWithItsFrequencyAndByHowMuch) {
         ++logs;
         if (!record.drift) continue;
         EXPECT_NEAR(record.drift->frequency_hz, first_hz(spec), 6.0) << seed;
-        const double expected = told(spec, *record.drift);
+        const double expected = reported_change(spec, *record.drift);
         EXPECT_NEAR(record.drift->change, expected,
                     std::max(0.35 * std::abs(expected), 4.0 * record.drift->deviation))
             << seed << " " << realizations;
@@ -111,10 +111,10 @@ TEST(ResponseDrift, ANarrowModeIsNamedAsWell) {
     if (!record.drift) continue;
     ++named;
     EXPECT_NEAR(record.drift->frequency_hz, first_hz(spec), 6.0) << seed;
-    within +=
-        std::abs(record.drift->change - told(spec, *record.drift)) < 4.0 * record.drift->deviation
-            ? 1
-            : 0;
+    within += std::abs(record.drift->change - reported_change(spec, *record.drift)) <
+                      4.0 * record.drift->deviation
+                  ? 1
+                  : 0;
   }
   EXPECT_GE(named, 11);
   EXPECT_GE(within, 10);

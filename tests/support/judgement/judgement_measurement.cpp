@@ -122,8 +122,7 @@ class Loop {
   }
 
   void push() {
-    force_ = u_;
-    force_.array() *= gain_.array();
+    force_ = u_.cwiseProduct(gain_);
     quantize(force_, plan_.actuator_quantum_n);
     force_ += Eigen::Map<const Eigen::VectorXd>(noise_.force_n(), force_.size());
     const double shape = 1.0 / std::sqrt(stage_.spec.plant.mass_kg);

@@ -49,12 +49,12 @@ struct TroublePlan {
   double drift_relative = 0.0;  ///< of its frequency, from the first to the last sample of all runs
   double setpoint_m = 0.0;      ///< rms size of slow motion in heave
   int silent_axis = -1;         ///< its excitation does not arrive
-  // in the recording
-  int changed_from = -1;      ///< first run of the changed stage
-  int changed_to = -1;        ///< the run after the last of it
-  double changed_gain = 1.0;  ///< of one actuator
+  int changed_from = -1;        ///< first run of the changed stage
+  int changed_to = -1;          ///< the run after the last of it
+  double changed_gain = 1.0;    ///< of one actuator
   int changed_actuator = -1;
   double changed_modes = 0.0;  ///< relative change of all frequencies of the flexible modes
+  // in the recording
   int lost_run = -1;
   double lost_at = 0.0;  ///< share of the measured periods
   bool late_sensor = false;

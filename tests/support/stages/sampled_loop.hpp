@@ -104,4 +104,27 @@ inline MemoryLog simulate_sampled_log(const SampledPlant& plant, const LoopExper
           RealDft&) { return simulate_sampled_run(plant, x, period, noise_std, random, cubic); });
 }
 
+/// A log of several realizations that a comparison can use: two axes, three sensors, two modes.
+struct RealizationsSpec {
+  int realizations = 3;
+  std::uint64_t seed = 1;
+  double noise = 1e-4;
+  double cubic = 0.0;
+  double change = 0.0;  ///< relative, of the first mode's frequency
+};
+inline MemoryLog record_realizations(const RealizationsSpec& spec) {
+  LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 1000, .axes = 2};
+  x.lines = line_range(3, 301, 2);
+  x.realizations = spec.realizations;
+  x.periods = 4;
+  x.transient_periods = 3;
+  x.seed = spec.seed;
+  ComplexNoise random(spec.seed + 100);
+  const double first_hz = 60.0 + 60.0 * random.uniform();
+  return simulate_sampled_log(
+      sampled_plant(3, 2, {{first_hz * (1.0 + spec.change), 0.05}, {2.1 * first_hz, 0.04}},
+                    x.sample_rate_hz, 0.02),
+      x, spec.noise, spec.cubic);
+}
+
 }  // namespace stageid::test
