@@ -340,12 +340,7 @@ class AutomaticFit {
       return count_modes(move.model) < std::min(selection_.exactly, count_modes(best_.model));
     });
     for (StructureMove& move : moves) move.flag.insert(0, "structure: ");
-    // A trial of delays per channel takes longer than all others.
-    const auto costly = std::stable_partition(
-        moves.begin(), moves.end(),
-        [](const StructureMove& move) { return move.options.delay != DelayModel::per_channel; });
-    if (!take_best(sample, {moves.begin(), costly}) && !take_best(sample, {costly, moves.end()}))
-      return false;
+    if (!take_best(sample, std::move(moves))) return false;
     const bool was_proportional = !structure_.general_damping;
     take_structure_of(best_.model);
     if (was_proportional && structure_.general_damping) proportional_ = std::move(before_);
