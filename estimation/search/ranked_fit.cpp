@@ -77,11 +77,9 @@ class RankedFit {
 
   double criterion(const FitResult& fit) const { return information_criterion(frf_, fit); }
 
-  /// Adopts a fit that is better. If the current one has not converged, a converged one may be slightly worse (BIC).
+  /// Adopts a fit that is better.
   bool adopt(const TiedModel& tied, FitResult&& trial) {
-    const bool settles = trial.trustworthy() && !best_.trustworthy();
-    if (trial.status() == FitStatus::singular ||
-        !(criterion(trial) < criterion(best_) + (settles ? kNothing : 0.0)))
+    if (trial.status() == FitStatus::singular || !(criterion(trial) < criterion(best_)))
       return false;
     if (!trial.trustworthy() && best_.trustworthy() &&
         kDearest * trial.model.fit.cost > best_.model.fit.cost)

@@ -12,8 +12,6 @@ namespace stageid {
 
 /// Iterations of a trial: enough to show the gain of a mode or a structure. A mode that still moves is finished later.
 inline constexpr int kGrowthIterations = 12;
-/// Times as many for springs, whose start is farther away.
-inline constexpr int kFartherAway = 3;
 /// Alternatives tried before the search concludes that none is better: missing modes, merges, pairs.
 inline constexpr std::size_t kTried = 4;
 /// Models of many modes grow by a fifth at a time.
@@ -29,15 +27,12 @@ inline constexpr Eigen::Index kPartChannels = 256;     ///< at most, if an input
 
 // When the search or its last fit ends.
 
+/// Times the iterations of a last fit that ended by their number, although the data determine all its modes.
+inline constexpr int kLonger = 3;
 /// Rounds in a row that add no resonance. A measured aircraft, which is nonlinear, has five before convergence.
 inline constexpr int kMostSpurious = 6;
 /// A model with this many times the cost does not follow the data: a fit that has not converged is better.
 inline constexpr double kDearest = 1.5;
-/// Times the tolerance: a fit that ends by its number of iterations so near to the stationary point has converged if
-/// all its modes are determined. With the default tolerance, its error is a hundredth of a standard deviation.
-inline constexpr double kNearly = 100.0;
-/// Of 2 ln(likelihood), which has a standard deviation above 1: acceptable cost of convergence.
-inline constexpr double kNothing = 0.1;
 /// Standard deviations: more is not chance, even in the largest of a thousand channels (p = 6e-7 each).
 inline constexpr double kClearly = 5.0;
 

@@ -133,12 +133,9 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
   }
   if (fit.status() == FitStatus::iteration_limit && simpler(fit).empty()) {
     FitOptions longer = options;
-    longer.max_iterations *= kFartherAway;
+    longer.max_iterations *= kLonger;
     fit = fit_additive_model(frf, fit.model, longer);
   }
-  if (!fit.trustworthy() && simpler(fit).empty() &&
-      fit.deviations < kNearly * options.deviation_tolerance)
-    fit.model.fit.status = FitStatus::gradient_small;
   if (!fit.trustworthy()) return first;
   said = std::move(steps);
   return fit;

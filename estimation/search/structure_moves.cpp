@@ -81,7 +81,6 @@ std::vector<StructureMove> richer_structures(const FrfEstimate& frf, const FitOp
     const auto add_springs = [&](double start, bool instead_of_modes) {
       out.push_back({"--rigid-body suspension", model, options});
       StructureMove& springs = out.back();
-      springs.options.max_iterations *= kFartherAway;
       std::erase_if(springs.model.submodels, [&](const Submodel& s) {
         return is_rigid_body(s) || (instead_of_modes && below(s));
       });
