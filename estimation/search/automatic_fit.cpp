@@ -14,7 +14,6 @@
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/fit_start.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/growth_watch.hpp"
 #include "estimation/search/hidden_modes.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "estimation/search/overlapping_modes.hpp"
@@ -107,7 +106,7 @@ class AutomaticFit {
     other.take_structure_of(other.best_.model);
     if (!other.mode_may_be_worth_as_much(search->best_)) return;
     other.most_parameters_ = search->best_.parameters;
-    other.watch_ = {};
+    other.ungrown_.reset();
     other.search(0);
     if (other.score() < search->score()) search.emplace(std::move(other));
   }
@@ -135,8 +134,7 @@ class AutomaticFit {
     if (selection_.exactly > 0 && options_.residue_rank == 0 && result.trustworthy() &&
         supports_all_modes(frf_, evidence, result))
       evidence.alike = alike_modes(frf_, last, result);
-    evidence.growth_ended = watch_.finding();
-    evidence.delay_explains_more = watch_.by_delay();
+    evidence.delay_denied = delay_denied_;
     if (cut_short) evidence.limit = limit_reason(frf_, options_, result);
     decisions_.insert(decisions_.end(), result.decisions.begin(), result.decisions.end());
     result.decisions = std::move(decisions_);
@@ -241,7 +239,7 @@ class AutomaticFit {
     quick_.delay_s = options_.delay_s = search->options_.delay_s;
     structure_.open = search->structure_.open;
     take_structure_of(search->best_.model);
-    if (search->watch_.ended()) watch_ = std::move(search->watch_);
+    delay_denied_ = std::move(search->delay_denied_);
     adopt(fit_additive_model(frf_, with_all_inputs(frf_, search->best_.model), quick_));
     structured_at_ = history_.size();
     return true;
@@ -318,7 +316,7 @@ class AutomaticFit {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
     return modes < affordable_modes() && best_.parameters < most_parameters_ &&
-           !worth_.at_rounding(best_) && !watch_.ended() && !limit_reached();
+           !worth_.at_rounding(best_) && delay_denied_.empty() && !limit_reached();
   }
 
   /// Changes the structure as long as that lowers the criterion, each time by the change that lowers it most.
@@ -344,7 +342,7 @@ class AutomaticFit {
     const bool was_proportional = !structure_.general_damping;
     take_structure_of(best_.model);
     if (was_proportional && structure_.general_damping) proportional_ = std::move(before_);
-    watch_ = {};  // it compares models of one structure
+    ungrown_.reset();  // models of one structure are compared
     return true;
   }
 
@@ -437,21 +435,41 @@ class AutomaticFit {
   bool grow() {
     bool grown = false;
     if (history_.size() == exhausted_at_) return false;
-    watch_.cut();
     for (int round = 0; wanted_more(); ++round) {
-      const bool doubled = std::has_single_bit(static_cast<unsigned>(round));
-      if (selection_.exactly == 0 && doubled && restructure()) reduce();
+      if (selection_.exactly == 0 && std::has_single_bit(static_cast<unsigned>(round))) {
+        if (restructure()) reduce();
+        if (round > 1 && a_delay_explains_more()) break;
+      }
       const std::vector<ProposedMode> candidates = proposals(added_together());
+      if (!ungrown_) ungrown_ = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
-      if (selection_.exactly > 0) continue;
-      const std::size_t added = best_.model.submodels.size() - before_.model.submodels.size();
-      if (!watch_.ends(frf_, quick_, before_, best_, added)) continue;
-      best_ = watch_.model();
-      say("{}", watch_.finding());
     }
     exhausted_at_ = history_.size();
     return grown;
+  }
+
+  /// Returns to the model without the added modes if one delay, which is not to be estimated, is worth more than all of
+  /// them: any number of modes imitates it.
+  bool a_delay_explains_more() {
+    if (options_.delay != DelayModel::fixed || !ungrown_) return false;
+    FitOptions options = quick_;
+    options.delay = DelayModel::estimate;
+    options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
+    AdditiveModel model = ungrown_->model;
+    model.input_delay_s.resize(0);
+    model.output_delay_s.resize(0);
+    const FitResult trial = fit_additive_model(frf_, model, options);
+    if (!is_better(trial)) return false;
+    delay_denied_ = fmt::format(
+        "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than {} "
+        "more "
+        "modes ({:.6g}), which were discarded; use --delay estimate",
+        trial.model.mean_delay_s(), options_.delay_s, trial.model.fit.cost,
+        count_modes(best_.model) - count_modes(ungrown_->model), cost());
+    say("{}", delay_denied_);
+    best_ = *ungrown_;
+    return true;
   }
 
   /// Adds several at once if each is clearly worth it; pruning corrects surplus ones. If very many are requested,
@@ -466,7 +484,7 @@ class AutomaticFit {
     if (room < static_cast<int>(clear.size())) clear.resize(static_cast<std::size_t>(room));
     if (clear.size() < 2) return false;
     FitResult trial = fit_with(clear);
-    if (demanded ? trial.status() == FitStatus::singular : !is_better(trial)) return false;
+    if (demanded ? trial.status() == FitStatus::singular : !is_worth_adding(trial)) return false;
     for (const ProposedMode& candidate : clear)
       say("added {:.6g} Hz, one of {} added together: cost {:.6g} -> {:.6g}",
           candidate.mode.frequency_hz, clear.size(), cost(), trial.model.fit.cost);
@@ -481,9 +499,24 @@ class AutomaticFit {
     return fit_additive_model(frf_, model, quick_);
   }
 
+  /// Whether the modes that `trial` has beside those of best_ are worth their parameters and are confirmed by more than
+  /// the best line of each: an outlier, too, is fitted by a mode, which is sharper than the lines.
+  bool is_worth_adding(const FitResult& trial) const {
+    if (!is_better(trial)) return false;
+    const Team& team = *quick_.workers().team;
+    Eigen::VectorXd gain = squares_of_lines(frf_, best_.model, quick_.user_weights, team) -
+                           squares_of_lines(frf_, trial.model, quick_.user_weights, team);
+    const auto added =
+        static_cast<Eigen::Index>(trial.model.submodels.size() - best_.model.submodels.size());
+    std::ranges::sort(gain);
+    return gain.head(std::max<Eigen::Index>(0, gain.size() - added)).sum() >
+           static_cast<double>(added) * worth_.most_by_chance(trial);
+  }
+
   bool add_one(const std::vector<ProposedMode>& candidates) {
     FitResult best_trial;
     bool found = false;
+    bool worth_it = false;
     const double price = worth_.price(best_);
     double reach = kReach;
     for (const ProposedMode& candidate : candidates) {
@@ -492,11 +525,12 @@ class AutomaticFit {
       if (trial.status() == FitStatus::singular) continue;
       const double gain = static_cast<double>(frf_.lines()) * (cost() - trial.model.fit.cost);
       reach = 2.0 * std::max(1.0, gain / candidate.gain);  // as the last one, with a margin
-      const bool better = !found || trial.model.fit.cost < best_trial.model.fit.cost;
-      if (better) best_trial = std::move(trial);
+      worth_it = is_worth_adding(trial);
+      if (worth_it || !found || trial.model.fit.cost < best_trial.model.fit.cost)
+        best_trial = std::move(trial);
       found = true;
       // The first candidate is usually right; the others are tried only if it is not worth its parameters.
-      if (is_better(best_trial) || limit_reached()) break;
+      if (worth_it || limit_reached()) break;
     }
     if (!found) {
       say("no further mode: no candidate in the weighted residual justifies the parameters of a "
@@ -504,10 +538,12 @@ class AutomaticFit {
       return false;
     }
     const Submodel& added = best_trial.model.submodels.back();
-    if (selection_.exactly == 0 && !is_better(best_trial)) {
+    if (selection_.exactly == 0 && !worth_it) {
       say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, which "
-          "does not justify its parameters (BIC)",
-          added.natural_frequency_hz(), 100.0 * (1.0 - best_trial.model.fit.cost / cost()));
+          "{}",
+          added.natural_frequency_hz(), 100.0 * (1.0 - best_trial.model.fit.cost / cost()),
+          is_better(best_trial) ? "one line causes, as an outlier does"
+                                : "does not justify its parameters (BIC)");
       return false;
     }
     say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),
@@ -582,10 +618,11 @@ class AutomaticFit {
   int target_;      ///< number of modes to grow to, if it is requested
   int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
   Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
-  GrowthWatch watch_;
+  std::string delay_denied_;  ///< why the search ended early; empty if it did not
   FitResult best_;
-  FitResult before_;        ///< the last one before best_ was adopted
-  FitResult proportional_;  ///< the last one before general damping
+  FitResult before_;                  ///< the last one before best_ was adopted
+  std::optional<FitResult> ungrown_;  ///< the last one of this structure before modes were added
+  FitResult proportional_;            ///< the last one before general damping
   std::vector<std::string> decisions_;
   std::vector<double> history_;
   // Size of the history when no such move was left; with the same model, none is tried again.

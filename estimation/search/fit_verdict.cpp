@@ -204,7 +204,7 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
   std::vector<ModeDoubt> doubts;
   const bool asked = evidence.number == ModeNumber::asked;
   // Without the delay, modes describe it; what the data say about them is of no use.
-  if (fit.status() != FitStatus::singular && !evidence.delay_explains_more)
+  if (fit.status() != FitStatus::singular && evidence.delay_denied.empty())
     judge_modes(frf, evidence, fit, doubts);
   for (const ModeDoubt& doubt : doubts) {
     tell(doubt.details);
@@ -213,14 +213,11 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
          asked ? "Let the fit choose the number of modes" : "Do not interpret them as resonances",
          asked ? "--modes auto" : ""});
   }
-  if (!evidence.growth_ended.empty()) {
-    fit.findings.push_back(evidence.growth_ended);
-    if (evidence.delay_explains_more) {
-      // Without the delay, a fit need not converge; that is not the reason.
-      if (fit.status() != FitStatus::singular) fit.model.fit.status = FitStatus::gradient_small;
-      fit.model.fit.distrust(
-          {FitStatus::unexplained, evidence.growth_ended, "", "--delay estimate"});
-    }
+  if (!evidence.delay_denied.empty()) {
+    fit.findings.push_back(evidence.delay_denied);
+    // Without the delay, a fit need not converge; that is not the reason.
+    if (fit.status() != FitStatus::singular) fit.model.fit.status = FitStatus::gradient_small;
+    fit.model.fit.distrust({FitStatus::unexplained, evidence.delay_denied, "", "--delay estimate"});
   }
   if (evidence.limit) {
     fit.decisions.push_back(evidence.limit->text());

@@ -29,9 +29,9 @@ struct AlikeModes {
 struct FitEvidence {
   ModeNumber number = ModeNumber::chosen;
   std::vector<AlikeModes> alike = {};
-  std::string low_ranks = {};           ///< residues need a higher rank than requested
-  std::string growth_ended = {};        ///< why the search stopped adding modes early
-  bool delay_explains_more = false;     ///< that reason
+  std::string low_ranks = {};  ///< residues need a higher rank than requested
+  std::string delay_denied =
+      {};  ///< a delay, which is not to be estimated, explains more than modes
   std::optional<FitReason> limit = {};  ///< the search was interrupted or reached its budget
   std::string late_channels = {};
   std::optional<FitReason> unexplained = {};  ///< by noise and known distortion

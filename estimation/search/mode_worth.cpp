@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimation/problem/fit_problem.hpp"
+#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 
@@ -75,6 +76,11 @@ double ModeWorth::cost_at(double criterion, const AdditiveModel& model,
 
 double ModeWorth::price(const FitResult& fit) const {
   return in_squares(squares(fit), cost_of_one(), data_);
+}
+
+double ModeWorth::most_by_chance(const FitResult& fit) const {
+  return squares(fit) / data_ *
+         (parameters_of_mode_ + kClearly * std::sqrt(2.0 * parameters_of_mode_));
 }
 
 double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_one()); }

@@ -43,6 +43,8 @@ class ModeWorth {
 
   /// Decrease of sum W |E|^2 of `fit` above which one more mode is worth its parameters.
   double price(const FitResult& fit) const;
+  /// What a mode that is not there gains by fitting noise, kClearly standard deviations above the mean.
+  double most_by_chance(const FitResult& fit) const;
 
   /// Steps shorter than this many standard deviations of the parameters (Newton decrement) lower a cost by less than a
   /// hundredth of the worth of a mode, so they do not affect decisions.

@@ -29,8 +29,6 @@ inline constexpr Eigen::Index kPartChannels = 256;     ///< at most, if an input
 
 /// Times the iterations of a last fit that ended by their number, although the data determine all its modes.
 inline constexpr int kLonger = 3;
-/// Rounds in a row that add no resonance. A measured aircraft, which is nonlinear, has five before convergence.
-inline constexpr int kMostSpurious = 6;
 /// A model with this many times the cost does not follow the data: a fit that has not converged is better.
 inline constexpr double kDearest = 1.5;
 /// Standard deviations: more is not chance, even in the largest of a thousand channels (p = 6e-7 each).

@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/growth_watch.hpp"
 #include "tests/support/models/model_blind_fit.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
@@ -317,70 +316,33 @@ TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
 }
 
-/// Feeds a watch with rounds that add one mode each. @returns whether the last one ended the search
-bool ends_after(GrowthWatch& watch, const FrfEstimate& frf, FitResult& fit,
-                const std::vector<std::pair<double, double>>& modes) {
-  FitOptions options;
-  options.delay = DelayModel::estimate;  // no other is tried
-  bool ended = false;
-  for (const auto& [frequency_hz, damping] : modes) {
-    const FitResult before = fit;
-    fit.model.submodels.push_back(mode_submodel(frf, {}, {frequency_hz, damping, 1}));
-    ended = watch.ends(frf, options, before, fit, 1);
-  }
-  return ended;
+// A search that distrusted modes within the width of another discarded those of dense plants.
+TEST(AutomaticFit, ModesCloserThanTheirWidthsAreAllFound) {
+  std::vector<double> frequency_hz;
+  for (int i = 0; i < 14; ++i) frequency_hz.push_back(26.0 + 0.5 * i);
+  FrfEstimate frf = response_of(frequency_hz, 0.01, Eigen::VectorXd::LinSpaced(2000, 5.0, 60.0));
+  test::RandomNumbers random(4);
+  for (std::complex<double>& value : frf.response.reshaped())
+    value *= 1.0 + 1e-3 * random.circular();
+  const FitResult fit = automatic_fit(frf, {.rigid_body = false}, {}, {});
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
+  ASSERT_EQ(fit.model.submodels.size(), frequency_hz.size());
+  for (std::size_t i = 0; i < frequency_hz.size(); ++i)
+    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), frequency_hz[i], 0.05);
 }
 
-TEST_F(SmallStage, RoundsInARowThatOnlyModelColourEndTheSearch) {
-  FitResult fit;
-  fit.model.fit.band_hz[0] = 10.0;
-  fit.model.fit.band_hz[1] = 1000.0;
-  GrowthWatch watch;
-  // Broad, outside the lines on either side, on another; a resonance resets the count.
-  EXPECT_FALSE(ends_after(watch, frf_, fit, {{120.0, 0.01}, {300.0, 0.3}, {5.0, 0.01}}));
-  EXPECT_FALSE(ends_after(watch, frf_, fit, {{1100.0, 0.02}, {120.5, 0.01}, {500.0, 0.2}}));
-  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.0, 0.01}}));
-  EXPECT_FALSE(watch.ended());
-  EXPECT_FALSE(ends_after(watch, frf_, fit, {{300.2, 0.01}, {5.0, 0.01}, {119.9, 0.01}}));
-  watch.cut();
-  const std::size_t kept = fit.model.submodels.size();
-  EXPECT_FALSE(ends_after(watch, frf_, fit, {{400.0, 0.3}, {5.0, 0.02}, {600.0, 0.4}}));
-  EXPECT_TRUE(ends_after(watch, frf_, fit, {{700.0, 0.3}, {2000.0, 0.02}, {800.0, 0.2}}));
-  EXPECT_TRUE(watch.ended());
-  EXPECT_FALSE(watch.by_delay());
-  EXPECT_EQ(watch.model().model.submodels.size(), kept);
-  EXPECT_THAT(watch.finding(), testing::HasSubstr("its last 6 steps added no resonance"));
-}
-
-/// Whether six rounds that each went from `before` to `now` end a search.
-bool six_rounds_end(const FrfEstimate& frf, const FitResult& before, const FitResult& now) {
-  FitOptions options;
-  options.delay = DelayModel::estimate;  // no other is tried
-  GrowthWatch watch;
-  bool ended = false;
-  for (int round = 0; round < 6; ++round) ended = watch.ends(frf, options, before, now, 1);
-  return ended;
-}
-
-// Noise with heavier tails than its variances imply: every outlier looks like a mode sharper than the lines.
-TEST_F(SmallStage, ModesThatRestOnOneLineEachEndTheSearchAndResonancesDoNot) {
-  AdditiveModel less = problem_.model;
-  less.submodels.pop_back();
-  const FitResult two = fit_additive_model(frf_, less, {});
-  const FitResult three = fit_additive_model(frf_, problem_.model, {});
-  EXPECT_FALSE(six_rounds_end(frf_, two, three));
-  FitResult at_bound = three;
-  at_bound.held.push_back(three.model.submodels.size() - 1);
-  EXPECT_TRUE(six_rounds_end(frf_, two, at_bound));
-
-  constexpr Eigen::Index kOutlier = 250;
-  frf_.response.col(kOutlier) *= 3.0;
-  const FitResult before = fit_additive_model(frf_, problem_.model, {});
-  AdditiveModel more = before.model;
-  more.submodels.push_back(mode_submodel(frf_, {}, {frf_.frequency_hz[kOutlier], 1e-4, 1}));
-  const FitResult now = fit_additive_model(frf_, more, {});
-  ASSERT_LT(now.model.fit.cost, before.model.fit.cost);
-  EXPECT_TRUE(six_rounds_end(frf_, before, now));
+// An outlier is fitted by a mode that is sharper than the lines.
+TEST_F(SmallStage, OutliersAreNotModes) {
+  test::RandomNumbers random(4);
+  for (std::complex<double>& value : frf_.response.reshaped())
+    if (random.uniform() < 0.01) value *= 1.0 + 0.1 * random.circular();
+  const FitResult fit = automatic_fit(frf_, {}, {}, {});
+  for (const Submodel& s : fit.model.submodels)
+    if (s.is_mode() && s.verdict == ModeVerdict::determined) {
+      EXPECT_THAT((std::vector{120.0, 390.0, 640.0}),
+                  testing::Contains(testing::DoubleNear(s.natural_frequency_hz(), 0.1)));
+    }
+  EXPECT_THAT(fit.decisions, testing::Contains(testing::HasSubstr("as an outlier does")));
 }
 
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
