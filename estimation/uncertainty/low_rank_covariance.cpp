@@ -1,7 +1,11 @@
 #include "estimation/uncertainty/low_rank_covariance.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -67,27 +71,55 @@ Eigen::VectorXd numerator_variances(const FitProblem& problem, const FitParamete
   return out;
 }
 
+/// R with N^-1 = R R^T on the free parameters. Directions that rounding hides, because submodels imitate each other, are
+/// as uncertain as rounding allows; in them, the response hardly changes.
+Eigen::MatrixXd root_of_inverse(Eigen::MatrixXd N, const std::vector<Eigen::Index>& frozen) {
+  hold_unknowns(frozen, N);
+  const Eigen::VectorXd scale =
+      N.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  const auto eigen = symmetric_eigen(scale.asDiagonal() * N * scale.asDiagonal());
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // rising
+  const double least = static_cast<double>(values.size()) * std::numeric_limits<double>::epsilon() *
+                       values.tail(1).value();
+  Eigen::MatrixXd root = scale.asDiagonal() * eigen.eigenvectors() *
+                         values.cwiseMax(least).cwiseSqrt().cwiseInverse().asDiagonal();
+  root(frozen, Eigen::all).setZero();
+  return root;
+}
+
+/// Square roots of the sandwich and of N^-1, both scaled as covariances: C = R R^T. A variance from R is never negative.
+struct Roots {
+  Eigen::MatrixXd sandwich;
+  Eigen::MatrixXd bread;
+};
+
+Roots roots_of_covariance(const FitProblem& problem, const FitParameters& beta,
+                          const std::vector<BasisGroup>& groups, double cost,
+                          const ResidueFactors& factors, const DataNoise& noise,
+                          const std::vector<Eigen::Index>& frozen) {
+  const auto reduced = [&](const FitProblem& one) {
+    return factors.reduced_matrix(
+        beta, ArrowSystem(one, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept));
+  };
+  const double half = 0.5 * covariance_scale(problem, cost, factors.size(), noise.knowledge);
+  const Eigen::MatrixXd bread = std::sqrt(half) * root_of_inverse(reduced(problem), frozen);
+  if (!noise.correlation.known() && !noise.variance) return {bread, bread};
+  const Eigen::MatrixXd K = noise.correlation.known()
+                                ? correlated_middle(problem, beta, groups, factors, noise)
+                                : reduced(middle_problem(problem, noise));
+  const Eigen::MatrixXd middle = bread.transpose() * K * bread / half;
+  return {bread * Eigen::MatrixXd(middle.llt().matrixL()), bread};
+}
+
 }  // namespace
 
 FitCovariance low_rank_parameters(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<BasisGroup>& groups, double cost,
                                   const ResidueFactors& factors, const DataNoise& noise,
                                   const std::vector<Eigen::Index>& frozen) {
-  const auto reduced = [&](const FitProblem& one) {
-    return factors.reduced_matrix(
-        beta, ArrowSystem(one, beta, groups, FitMethod::gn, ChannelEquationsUse::only_kept));
-  };
-  const Eigen::MatrixXd N = reduced(problem);
-  Eigen::MatrixXd K = N;
-  if (noise.correlation.known()) {
-    K = correlated_middle(problem, beta, groups, factors, noise);
-  } else if (noise.variance) {
-    K = reduced(middle_problem(problem, noise));
-  }
-  const double half = 0.5 * covariance_scale(problem, cost, factors.size(), noise.knowledge);
-  const Eigen::MatrixXd inverse = free_inverse(N, frozen);
-  FitCovariance out{half * inverse * K * inverse.transpose(), half * inverse};
-  return out.sandwich.allFinite() ? out : FitCovariance{};
+  const Roots roots = roots_of_covariance(problem, beta, groups, cost, factors, noise, frozen);
+  if (!roots.sandwich.allFinite()) return {};
+  return {roots.sandwich * roots.sandwich.transpose(), roots.bread * roots.bread.transpose()};
 }
 
 ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitParameters& beta,
@@ -96,9 +128,10 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
                                         const std::vector<Eigen::Index>& frozen,
                                         bool with_response) {
   const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, true);
-  const Eigen::MatrixXd C =
-      low_rank_parameters(problem, beta, groups, cost, factors, noise, frozen).sandwich;
-  if (C.size() == 0) return {};
+  const Eigen::MatrixXd root =
+      roots_of_covariance(problem, beta, groups, cost, factors, noise, frozen).sandwich;
+  if (!root.allFinite()) return {};
+  const Eigen::MatrixXd C = root * root.transpose();
   ParameterCovariance out;
   out.residual_scale = covariance_scale(problem, cost, factors.size(), noise.knowledge);
   out.globals = C.topLeftCorner(problem.globals(), problem.globals());
@@ -112,7 +145,10 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
       if (!with_response) return;
       const SplitMatrix J =
           free_columns(problem, beta, factors, group, c, own, {0, problem.size()});
-      out.response_variance.row(c) = quadratic(J, C(own, own), J).transpose();
+      const Eigen::MatrixXd own_root = root(own, Eigen::all);
+      out.response_variance.row(c) =
+          ((J.re * own_root).rowwise().squaredNorm() + (J.im * own_root).rowwise().squaredNorm())
+              .transpose();
     });
   return out;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/correlated_stage.hpp"
@@ -107,6 +108,38 @@ TEST(LowRankCovariance, OfOtherWeightsWithoutCorrelationUsesTheKnownVariance) {
       quantities(four.model, true).array() / quantities(once.model, true).array();
   EXPECT_NEAR(ratio.minCoeff(), 2.0, 1e-9);
   EXPECT_NEAR(ratio.maxCoeff(), 2.0, 1e-9);
+}
+
+// Springs far below the lines, which hardly differ there: the variances of each are of no use, that of the response is. It
+// was negative.
+TEST(LowRankCovariance, OfTheResponseIsRightWhereModesImitateEachOther) {
+  RankOneStage stage;
+  AdditiveModel& model = stage.problem.model;
+  std::erase_if(model.submodels, [](const Submodel& s) { return !s.is_mode(); });
+  for (const double part : {1e-3, 2e-3, 4e-3}) {
+    Submodel spring = model.submodels.front();
+    const double hz = part * stage.problem.frequency_hz[0];
+    const double omega_rad_s = 2.0 * std::numbers::pi * hz;
+    spring.denominator = {1.0, 0.1 / omega_rad_s, 1.0 / (omega_rad_s * omega_rad_s)};
+    spring.frequency_held = spring.damping_held = true;
+    model.submodels.push_back(spring);
+  }
+  stage.problem.G = test::reference_response(model, stage.problem.frequency_hz, stage.problem.hold);
+  FitOptions options = test::options_with(Weighting::noise_variance);
+  options.residue_rank = 1;
+  constexpr int kFits = 100;
+  double ratio = 0.0;
+  for (int run = 0; run < kFits; ++run) {
+    const FrfEstimate frf = stage.measured_with(static_cast<std::uint64_t>(700 + run));
+    const FitResult fit = fit_additive_model(frf, model, options);
+    ASSERT_EQ(fit.response_variance.rows(), frf.response.rows()) << fit.message();
+    EXPECT_GT(fit.response_variance.minCoeff(), 0.0);
+    const Eigen::MatrixXcd error =
+        test::reference_response(fit.model, stage.problem.frequency_hz, stage.problem.hold) -
+        stage.problem.G;
+    ratio += error.cwiseAbs2().cwiseQuotient(fit.response_variance).leftCols(10).mean() / kFits;
+  }
+  EXPECT_NEAR(ratio, 1.0, 0.3);  // three standard errors
 }
 
 }  // namespace test_low_rank_covariance
