@@ -503,6 +503,8 @@ class AutomaticFit {
   /// the best line of each: an outlier, too, is fitted by a mode, which is sharper than the lines.
   bool is_worth_adding(const FitResult& trial) const {
     if (!is_better(trial)) return false;
+    for (std::size_t i = best_.model.submodels.size(); i < trial.model.submodels.size(); ++i)
+      if (mode_verdict(frf_, ModeNumber::chosen, trial, i) == ModeVerdict::at_bound) return false;
     const Team& team = *quick_.workers().team;
     Eigen::VectorXd gain = squares_of_lines(frf_, best_.model, quick_.user_weights, team) -
                            squares_of_lines(frf_, trial.model, quick_.user_weights, team);
