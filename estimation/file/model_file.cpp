@@ -149,6 +149,17 @@ std::optional<ModeShapeDeviation> shape_deviations_from_json(
                             node.member("modal_mass_std").number()};
 }
 
+/// A value that the file repeats for its readers. Changed by hand, it would have no effect.
+void check_follows(const JsonNode& node, const std::string& key, double value) {
+  constexpr double kRounded = 1e-3;  // by hand or by another program
+  const std::optional<double> given = node.optional_number(key);
+  if (given && std::abs(*given - value) > kRounded * std::abs(value))
+    node.member(key).fail(fmt::format(
+        "contradicts \"denominator\", which gives {:.7g}: change the coefficients, or remove this "
+        "key",
+        value));
+}
+
 Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::size_t n_inputs) {
   Submodel s;
   s.integrators = static_cast<int>(node.member("integrators").integer(0, 2));
@@ -163,6 +174,10 @@ Submodel submodel_from_json(const JsonNode& node, std::size_t n_outputs, std::si
   if (s.numerator.size() > s.denominator.size() + static_cast<std::size_t>(s.integrators))
     node.member("numerator")
         .fail("has a higher degree than the denominator: the submodel is improper");
+  if (s.is_mode()) {
+    check_follows(node, "natural_frequency_hz", s.natural_frequency_hz());
+    check_follows(node, "damping_ratio", s.damping_ratio());
+  }
   s.natural_frequency_std_hz = node.optional_number("natural_frequency_std_hz");
   s.damping_ratio_std = node.optional_number("damping_ratio_std");
   if (node.has("verdict")) s.verdict = from_word<ModeVerdict>(node.member("verdict").text());

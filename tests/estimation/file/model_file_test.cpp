@@ -298,6 +298,8 @@ TEST_F(ModelFile, FaultsAreNamedWithTheirPlace) {
            {"/submodels/1/denominator", "[2.0, 0.1, 0.1]", "start with 1"},
            {"/submodels/1/denominator", "[]", "start with 1"},
            {"/submodels/1/denominator", "[1, 0.1, 0]", "end with 0"},
+           {"/submodels/1/natural_frequency_hz", "1e3", "contradicts \"denominator\""},
+           {"/submodels/1/damping_ratio", "0.6", "contradicts \"denominator\""},
            {"/submodels/1/integrators", "3", "0 to 2"},
            {"/submodels/1/integrators", "0.5", "whole number"},
            {"/submodels/3/numerator", "[[[1, 2, 3], [4, 5, 6]], [[1, 2, 3], [4, 5, 6]]]",
