@@ -196,9 +196,11 @@ class FitDefaults {
     if (nonlinear.empty() && !differ) return false;
     weigh_by_total_variance();
     warn("weighting: total_variance; " +
-         (nonlinear.empty() ? "realizations differ by more than their periods, because of a "
-                              "transient or a drift: increase transient_periods or realizations"
-                            : nonlinear));
+         (!nonlinear.empty() ? nonlinear
+          : frf.nonlinearity.settled_p_value.maxCoeff() == 0.0
+              ? "realizations differ by more than their periods; the data health names the cause"
+              : "realizations differ by more than their periods, because of a transient or a "
+                "drift: increase transient_periods or realizations"));
     return true;
   }
 

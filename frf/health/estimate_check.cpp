@@ -116,6 +116,7 @@ std::vector<Finding> check_discarded_starts(const FrfEstimate& frf) {
 void withdraw_linearity_test(FrfEstimate& frf, const std::vector<Finding>& findings) {
   const bool explained = std::ranges::any_of(findings, [](const Finding& finding) {
     return finding.cause == Cause::drift || finding.cause == Cause::unsettled ||
+           finding.cause == Cause::resolution ||
            (finding.severity == Severity::fault && !finding.realizations.empty());
   });
   NonlinearityTest& test = frf.nonlinearity;

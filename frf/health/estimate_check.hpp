@@ -26,8 +26,8 @@ int runs_with_discarded_start(const FrfEstimate& frf);
 /// Reports that number as a transient.
 std::vector<Finding> check_discarded_starts(const FrfEstimate& frf);
 
-/// Withdraws the linearity test if a finding explains why the realizations differ: a drift, a transient, or a fault of
-/// only some of them. All p-values become 1, and settled_p_value 0.
+/// Withdraws the linearity test if a finding explains why the realizations differ: a drift, a transient, a coarse
+/// converter, or a fault of only some of them. All p-values become 1, and settled_p_value 0.
 void withdraw_linearity_test(FrfEstimate& frf, const std::vector<Finding>& findings);
 
 /// Finds bands in which the local models of a zippered experiment leave more than noise

@@ -49,6 +49,7 @@ void ChannelScan::add(const Eigen::Ref<const Eigen::VectorXd>& samples,
     add_some(samples.segment(first, std::min(kTogether, samples.size() - first)),
              driven != nullptr ? driven + first : nullptr);
   samples_ += static_cast<std::uint64_t>(samples.size());
+  grid_.add(samples);
 }
 
 void ChannelScan::add_some(const Eigen::Ref<const Eigen::VectorXd>& samples,
@@ -87,6 +88,7 @@ void ChannelScan::add(const ChannelScan& other) noexcept {
   high_.add(other.high_);
   low_.add(other.low_);
   samples_ += other.samples_;
+  grid_.add(other.grid_);
   stretches_ += other.stretches_;
   repeating_ += other.repeating_;
   longest_ = std::max(longest_, other.longest_);

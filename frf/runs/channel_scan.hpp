@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "frf/runs/value_grid.hpp"
+
 namespace stageid {
 
 /// The two largest distinct values and their counts.
@@ -38,6 +40,8 @@ class ChannelScan {
   /// Whether a coarse converter repeats values: n p^2 > 1 sequences of three equal samples are expected, where p is the
   /// share of the n sequences that are longer than one sample and end by a change. A stuck channel has few of them.
   bool is_coarse() const noexcept { return repeating_ * repeating_ > stretches_; }
+  /// Of the converter behind the channel; 0 if its values have none (ValueGrid).
+  double step() const noexcept { return grid_.step(); }
   const Extreme& high() const noexcept { return high_; }
   Extreme low() const noexcept;  ///< of the negated samples, with the original sign
 
@@ -56,6 +60,7 @@ class ChannelScan {
 
   Extreme high_;
   Extreme low_;  // of the negated samples
+  ValueGrid grid_;
   std::uint64_t samples_ = 0;
   std::uint64_t stretches_ = 0;
   std::uint64_t repeating_ = 0;  // of them, longer than one sample and ended by a change

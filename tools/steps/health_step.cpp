@@ -10,6 +10,7 @@
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "frf/health/estimate_check.hpp"
+#include "frf/health/sensor_steps.hpp"
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -62,7 +63,9 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
                              const std::optional<NominalStage>& nominal) {
   const std::vector<NoisyRun> noisy = record.noisy_runs;
   const bool steps_known = record.steps.size() >= frf.inputs.size();
+  std::vector<Finding> coarse = check_sensor_steps(frf, record);
   std::vector<Finding> findings = check_health(std::move(record), nominal);
+  std::ranges::move(coarse, std::back_inserter(findings));
   // A drift and a transient look like noise. So does everything if the response to an axis is not determined for want
   // of excitation.
   if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled) &&

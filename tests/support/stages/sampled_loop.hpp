@@ -71,10 +71,11 @@ inline double real_gaussian(ComplexNoise& random) {
   return std::numbers::sqrt2 * random.gaussian().real();
 }
 
-/// Samples of one run from rest; `cubic`: y gains cubic * y^3 before the noise.
+/// Samples of one run from rest; `cubic`: y gains cubic * y^3 before the noise; `step`: of the converters of y.
 inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExperiment& x,
                                        const Eigen::MatrixXd& period, double noise_std,
-                                       ComplexNoise& random, double cubic = 0.0) {
+                                       ComplexNoise& random, double cubic = 0.0,
+                                       double step = 0.0) {
   const Eigen::Index total = (x.transient_periods + x.periods) * x.period_samples;
   LogSamples record;
   record.actuators.resize(total, plant.B.cols());
@@ -85,6 +86,7 @@ inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExpe
     Eigen::VectorXd y = plant.C * state;
     y.array() += cubic * y.array().cube();
     for (Eigen::Index i = 0; i < y.size(); ++i) y[i] += noise_std * real_gaussian(random);
+    if (step > 0.0) y = step * (y / step).array().round();
     Eigen::VectorXd u = period.row(n % x.period_samples).transpose() - plant.K * y;
     record.sensors.row(n) = y;
     record.actuators.row(n) = u;
@@ -97,11 +99,13 @@ inline LogSamples simulate_sampled_run(const SampledPlant& plant, const LoopExpe
 
 /// As simulate_log(), from rest. x.transient_periods are periods like all others, only declared.
 inline MemoryLog simulate_sampled_log(const SampledPlant& plant, const LoopExperiment& x,
-                                      double noise_std, double cubic = 0.0) {
-  return log_of_runs(
-      x, plant.C.rows(), plant.B.cols(),
-      [&](std::size_t, const Eigen::MatrixXcd&, const Eigen::MatrixXd& period, ComplexNoise& random,
-          RealDft&) { return simulate_sampled_run(plant, x, period, noise_std, random, cubic); });
+                                      double noise_std, double cubic = 0.0, double step = 0.0) {
+  return log_of_runs(x, plant.C.rows(), plant.B.cols(),
+                     [&](std::size_t, const Eigen::MatrixXcd&, const Eigen::MatrixXd& period,
+                         ComplexNoise& random, RealDft&) {
+                       return simulate_sampled_run(plant, x, period, noise_std, random, cubic,
+                                                   step);
+                     });
 }
 
 /// A log of several realizations that a comparison can use: two axes, three sensors, two modes.
@@ -111,6 +115,7 @@ struct RealizationsSpec {
   double noise = 1e-4;
   double cubic = 0.0;
   double change = 0.0;  ///< relative, of the first mode's frequency
+  double step = 0.0;    ///< of the sensors' converters
 };
 inline MemoryLog record_realizations(const RealizationsSpec& spec) {
   LoopExperiment x{.sample_rate_hz = 2000.0, .period_samples = 1000, .axes = 2};
@@ -124,7 +129,7 @@ inline MemoryLog record_realizations(const RealizationsSpec& spec) {
   return simulate_sampled_log(
       sampled_plant(3, 2, {{first_hz * (1.0 + spec.change), 0.05}, {2.1 * first_hz, 0.04}},
                     x.sample_rate_hz, 0.02),
-      x, spec.noise, spec.cubic);
+      x, spec.noise, spec.cubic, spec.step);
 }
 
 }  // namespace stageid::test
