@@ -13,7 +13,6 @@
 #include "tools/report/report_comparison.hpp"
 #include "tools/report/report_diagrams.hpp"
 #include "tools/report/report_encoding.hpp"
-#include "tools/report/report_modes.hpp"
 #include "tools/report/report_uncertainty.hpp"
 #include "tools/report/report_verdict.hpp"
 #include "tools/report/timing_json.hpp"
@@ -189,7 +188,7 @@ Json model_json(const AdditiveModel& model) {
 
 Json modes_json(const ReportData& data) {
   Json out = Json::array();
-  for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
+  for (const ModeRow& row : mode_rows(*data.model, data.true_modes)) {
     Json truth;
     if (row.truth)
       truth = {{"frequency_hz", row.truth->natural_frequency_hz},

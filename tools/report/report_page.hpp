@@ -17,14 +17,9 @@
 #include "hal/stage/stage.hpp"
 #include "tools/steps/problem.hpp"
 #include "tools/steps/problem_commands.hpp"
+#include "tools/steps/truth_comparison.hpp"
 
 namespace stageid {
-
-/// A known mode of a simulated plant.
-struct TrueMode {
-  double natural_frequency_hz = 0.0;
-  double damping_ratio = 0.0;
-};
 
 /// A labelled number or word for the header, as displayed: {"error against the plant", "0.12 %"}.
 struct ReportFigure {

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "tools/report/report_modes.hpp"
 #include "tools/steps/model_verdict.hpp"
 
 namespace stageid {
@@ -19,7 +18,7 @@ using Reasons = std::vector<std::string>;
 
 void judge_modes(const ReportData& data, Reasons& reasons) {
   if (data.true_modes.empty()) return;
-  for (const ModeRow& row : mode_table(*data.model, data.true_modes)) {
+  for (const ModeRow& row : mode_rows(*data.model, data.true_modes)) {
     if (!row.truth) {
       // Outside the band, a mode represents the rest of the plant: suspension, modes above.
       const auto& band_hz = data.model->fit.band_hz;

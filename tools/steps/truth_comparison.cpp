@@ -19,38 +19,27 @@ using Json = nlohmann::ordered_json;
 /// Largest relative frequency difference of two modes that are considered the same.
 constexpr double kFarthest = 0.05;
 
-std::vector<const Submodel*> modes_of(const AdditiveModel& model) {
-  std::vector<const Submodel*> modes;
-  for (const Submodel& s : model.submodels)
-    if (s.is_mode()) modes.push_back(&s);
-  return modes;
+std::optional<double> deviation(std::optional<double> estimate, std::optional<double> truth,
+                                std::optional<double> std) {
+  if (!estimate || !truth || !std || !(*std > 0.0)) return std::nullopt;
+  return (*estimate - *truth) / *std;
 }
 
-void match(const std::vector<const Submodel*>& estimated, const FrfEstimate& frf,
-           TruthComparison& out) {
-  std::vector<double> true_hz;
-  for (const ModeComparison& mode : out.modes) true_hz.push_back(mode.true_frequency_hz);
-  std::vector<double> estimated_hz;
-  for (const Submodel* s : estimated) estimated_hz.push_back(s->natural_frequency_hz());
-  const auto partner = pair_with_truth(true_hz, estimated_hz);
-  for (std::size_t t = 0; t < partner.size(); ++t) {
-    if (!partner[t]) continue;
-    ModeComparison& mode = out.modes[t];
-    const Submodel& s = *estimated[*partner[t]];
-    mode.found = true;
-    mode.frequency_hz = s.natural_frequency_hz();
-    mode.damping = s.damping_ratio();
-    mode.frequency_std_hz = s.natural_frequency_std_hz.value_or(0.0);
-    mode.damping_std = s.damping_ratio_std.value_or(0.0);
+std::vector<ModeRow> identified(const AdditiveModel& model) {
+  std::vector<ModeRow> rows;
+  for (const Submodel& submodel : model.submodels) {
+    if (!submodel.is_mode()) continue;
+    rows.push_back({.frequency_hz = submodel.natural_frequency_hz(),
+                    .damping_ratio = submodel.damping_ratio(),
+                    .frequency_std_hz = submodel.natural_frequency_std_hz,
+                    .damping_std = submodel.damping_ratio_std,
+                    .truth = std::nullopt});
   }
-  // Modes outside the lines represent the rest of the plant there: suspension, modes above the band.
-  const double low_hz = frf.frequency_hz[0];
-  const double high_hz = frf.frequency_hz[frf.lines() - 1];
-  for (std::size_t e = 0; e < estimated_hz.size(); ++e) {
-    const double f = estimated_hz[e];
-    if (std::ranges::find(partner, std::optional(e)) == partner.end())
-      (f < low_hz || f > high_hz ? out.outside_hz : out.extra_hz).push_back(f);
-  }
+  return rows;
+}
+
+double place(const ModeRow& row) {
+  return row.frequency_hz ? *row.frequency_hz : row.truth->natural_frequency_hz;
 }
 
 /// The exact plant on the lines, channels as in `frf`, as measured in the loop.
@@ -69,8 +58,8 @@ Eigen::MatrixXcd exact_response(const FrfEstimate& frf, const StageInfo& info,
   return G;
 }
 
-std::string deviation(double value, double std) {
-  return std > 0.0 ? fmt::format("{:+.2f}", value) : "-";
+std::string in_deviations(const std::optional<double>& value) {
+  return value ? fmt::format("{:+.2f}", *value) : "-";
 }
 
 }  // namespace
@@ -99,26 +88,53 @@ std::vector<std::optional<std::size_t>> pair_with_truth(const std::vector<double
   return partner;
 }
 
-double ModeComparison::frequency_deviation() const {
-  return frequency_std_hz > 0.0 ? (frequency_hz - true_frequency_hz) / frequency_std_hz : 0.0;
+std::optional<double> ModeRow::frequency_deviation() const {
+  if (!truth) return std::nullopt;
+  return deviation(frequency_hz, truth->natural_frequency_hz, frequency_std_hz);
 }
-double ModeComparison::damping_deviation() const {
-  return damping_std > 0.0 ? (damping - true_damping) / damping_std : 0.0;
+
+std::optional<double> ModeRow::damping_deviation() const {
+  if (!truth) return std::nullopt;
+  return deviation(damping_ratio, truth->damping_ratio, damping_std);
+}
+
+std::optional<double> ModeRow::relative_frequency_error() const {
+  if (!truth || !frequency_hz) return std::nullopt;
+  return std::abs(*frequency_hz / truth->natural_frequency_hz - 1.0);
+}
+
+std::vector<ModeRow> mode_rows(const AdditiveModel& model, std::span<const TrueMode> truth) {
+  std::vector<ModeRow> rows = identified(model);
+  std::vector<double> true_hz;
+  for (const TrueMode& mode : truth) true_hz.push_back(mode.natural_frequency_hz);
+  std::vector<double> estimated_hz;
+  for (const ModeRow& row : rows) estimated_hz.push_back(*row.frequency_hz);
+  const auto partner = pair_with_truth(true_hz, estimated_hz);
+  for (std::size_t t = 0; t < partner.size(); ++t)
+    (partner[t] ? rows[*partner[t]] : rows.emplace_back()).truth = truth[t];
+  std::ranges::stable_sort(rows, {}, place);
+  return rows;
 }
 
 TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate& frf,
                                    const StageInfo& info, const PlantSpec& plant) {
   TruthComparison out;
   const double last_hz = frf.frequency_hz[frf.lines() - 1];
+  const double first_hz = frf.frequency_hz[0];
+  std::vector<TrueMode> truth;
   for (const PlantMode& mode :
        flexible_modes_seen(info, plant, frf.inputs.names, frf.outputs.names))
-    if (mode.natural_frequency_hz <= last_hz) {
-      ModeComparison comparison;
-      comparison.true_frequency_hz = mode.natural_frequency_hz;
-      comparison.true_damping = mode.damping_ratio;
-      out.modes.push_back(comparison);
+    if (mode.natural_frequency_hz <= last_hz)
+      truth.push_back({mode.natural_frequency_hz, mode.damping_ratio});
+  for (const ModeRow& row : mode_rows(model, truth)) {
+    if (row.truth) {
+      out.modes.push_back(row);
+    } else {
+      // Modes outside the lines represent the rest of the plant there: suspension, modes above the band.
+      const double f = *row.frequency_hz;
+      (f < first_hz || f > last_hz ? out.outside_hz : out.extra_hz).push_back(f);
     }
-  match(modes_of(model), frf, out);
+  }
   const Eigen::MatrixXcd G = exact_response(frf, info, plant);
   const Eigen::MatrixXcd E = response_like(model, frf) - G;
   out.relative_rms_error =
@@ -131,20 +147,21 @@ std::vector<std::string> truth_table(const TruthComparison& comparison) {
   std::vector<std::vector<std::string>> rows = {{"mode", "true/Hz", "estimated/Hz", "error",
                                                  "in std", "true damping", "estimated", "error",
                                                  "in std"}};
-  for (const ModeComparison& m : comparison.modes) {
+  for (const ModeRow& m : comparison.modes) {
     const std::string number = fmt::format("{}", rows.size());
-    const std::string frequency = fmt::format("{:.4f}", m.true_frequency_hz);
-    const std::string damping = fmt::format("{:.5f}", m.true_damping);
-    if (!m.found) {
+    const auto [true_hz, true_damping] = *m.truth;
+    const std::string frequency = fmt::format("{:.4f}", true_hz);
+    const std::string damping = fmt::format("{:.5f}", true_damping);
+    if (!m.frequency_hz) {
       rows.push_back({number, frequency, "not found", "", "", damping, "", "", ""});
       continue;
     }
-    rows.push_back({number, frequency, fmt::format("{:.4f}", m.frequency_hz),
-                    fmt::format("{:+.1e}", m.frequency_hz / m.true_frequency_hz - 1.0),
-                    deviation(m.frequency_deviation(), m.frequency_std_hz), damping,
-                    fmt::format("{:.5f}", m.damping),
-                    fmt::format("{:+.1e}", m.damping / m.true_damping - 1.0),
-                    deviation(m.damping_deviation(), m.damping_std)});
+    rows.push_back({number, frequency, fmt::format("{:.4f}", *m.frequency_hz),
+                    fmt::format("{:+.1e}", *m.frequency_hz / true_hz - 1.0),
+                    in_deviations(m.frequency_deviation()), damping,
+                    fmt::format("{:.5f}", *m.damping_ratio),
+                    fmt::format("{:+.1e}", *m.damping_ratio / true_damping - 1.0),
+                    in_deviations(m.damping_deviation())});
   }
   std::vector<std::string> lines = table_lines(rows);
   for (const double hz : comparison.extra_hz)
@@ -166,17 +183,17 @@ std::string truth_error_line(const TruthComparison& comparison) {
 
 nlohmann::ordered_json truth_json(const TruthComparison& comparison) {
   Json modes = Json::array();
-  for (const ModeComparison& m : comparison.modes) {
-    Json mode = {{"true_frequency_hz", m.true_frequency_hz},
-                 {"true_damping_ratio", m.true_damping},
-                 {"found", m.found}};
-    if (m.found) {
-      mode["natural_frequency_hz"] = m.frequency_hz;
-      mode["damping_ratio"] = m.damping;
-      mode["natural_frequency_std_hz"] = m.frequency_std_hz;
-      mode["damping_ratio_std"] = m.damping_std;
-      mode["frequency_deviation_in_std"] = m.frequency_deviation();
-      mode["damping_deviation_in_std"] = m.damping_deviation();
+  for (const ModeRow& m : comparison.modes) {
+    Json mode = {{"true_frequency_hz", m.truth->natural_frequency_hz},
+                 {"true_damping_ratio", m.truth->damping_ratio},
+                 {"found", m.frequency_hz.has_value()}};
+    if (m.frequency_hz) {
+      mode["natural_frequency_hz"] = *m.frequency_hz;
+      mode["damping_ratio"] = *m.damping_ratio;
+      mode["natural_frequency_std_hz"] = m.frequency_std_hz.value_or(0.0);
+      mode["damping_ratio_std"] = m.damping_std.value_or(0.0);
+      mode["frequency_deviation_in_std"] = m.frequency_deviation().value_or(0.0);
+      mode["damping_deviation_in_std"] = m.damping_deviation().value_or(0.0);
     }
     modes.push_back(std::move(mode));
   }

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,23 +17,35 @@ namespace stageid {
 std::vector<std::optional<std::size_t>> pair_with_truth(const std::vector<double>& true_hz,
                                                         const std::vector<double>& estimated_hz);
 
-/// A mode of the simulated plant and its estimated one, see pair_with_truth().
-struct ModeComparison {
-  double true_frequency_hz = 0.0;
-  double true_damping = 0.0;
-  bool found = false;
-  double frequency_hz = 0.0;
-  double damping = 0.0;
-  double frequency_std_hz = 0.0;  ///< 0: unknown
-  double damping_std = 0.0;
-  double frequency_deviation() const;  ///< in standard deviations; 0 if they are unknown
-  double damping_deviation() const;
+/// A known mode of a simulated plant.
+struct TrueMode {
+  double natural_frequency_hz = 0.0;
+  double damping_ratio = 0.0;
 };
 
+/// An identified mode, a true one, or a pair of both.
+struct ModeRow {
+  std::optional<double> frequency_hz;
+  std::optional<double> damping_ratio;
+  std::optional<double> frequency_std_hz;
+  std::optional<double> damping_std;
+  std::optional<TrueMode> truth;
+
+  /// (estimate - truth) / standard deviation, if all three are known.
+  std::optional<double> frequency_deviation() const;
+  std::optional<double> damping_deviation() const;
+  /// |estimate - truth| / truth of the natural frequency.
+  std::optional<double> relative_frequency_error() const;
+};
+
+/// Pairs the modes of a model with true ones, see pair_with_truth(). Rows by frequency (that of the truth if nothing was
+/// identified).
+std::vector<ModeRow> mode_rows(const AdditiveModel& model, std::span<const TrueMode> truth);
+
 struct TruthComparison {
-  std::vector<ModeComparison> modes;  ///< every true mode in the band
-  std::vector<double> extra_hz;       ///< estimated modes on the lines without a true one
-  std::vector<double> outside_hz;     ///< estimated modes below or above the lines
+  std::vector<ModeRow> modes;      ///< every true mode in the band
+  std::vector<double> extra_hz;    ///< estimated modes on the lines without a true one
+  std::vector<double> outside_hz;  ///< estimated modes below or above the lines
   /// Of the model relative to the exact plant, over responding lines and channels; NaN: there are none.
   double relative_rms_error = 0.0;
   double normalized_error = 0.0;  ///< sqrt(sum |P - G|^2 / sum |G|^2)

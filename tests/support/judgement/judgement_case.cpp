@@ -159,11 +159,10 @@ void compare(const AdditiveModel& model, const FrfEstimate& frf, const Judgement
   Json df = Json::array();
   Json dz = Json::array();
   int found = 0;
-  for (const ModeComparison& mode : truth.modes) {
-    if (!mode.found) continue;
-    ++found;
-    if (mode.frequency_std_hz > 0.0) df.push_back(mode.frequency_deviation());
-    if (mode.damping_std > 0.0) dz.push_back(mode.damping_deviation());
+  for (const ModeRow& mode : truth.modes) {
+    if (mode.frequency_hz) ++found;
+    if (const auto deviation = mode.frequency_deviation()) df.push_back(*deviation);
+    if (const auto deviation = mode.damping_deviation()) dz.push_back(*deviation);
   }
   result["true_modes"] = truth.modes.size();
   result["found"] = found;
