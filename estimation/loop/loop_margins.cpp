@@ -187,45 +187,40 @@ class MarginSearch {
     return out;
   }
 
+  /// The least value, and where it is.
+  struct Least {
+    double value = HUGE_VAL;
+    double frequency_hz = 0.0;
+
+    bool found() const { return value < HUGE_VAL; }
+    void take(double other, double other_hz) {
+      if (other < value) *this = {other, other_hz};
+    }
+  };
+
   LoopMargins of_loop(Eigen::Index k) const {
     LoopMargins out;
-    double gain = 0.0;  // the largest below 1, and the smallest above
-    double reduction = HUGE_VAL;
-    double gain_hz = 0.0;
-    double reduction_hz = 0.0;
+    Least rise;
+    Least fall;
     for (const double f : real_axis_crossings(k)) {
       const double real = -curve_at(k, f).real();
-      if (real > gain && real < 1.0) {
-        gain = real;
-        gain_hz = f;
-      }
-      if (real > 1.0 && real < reduction) {
-        reduction = real;
-        reduction_hz = f;
-      }
+      if (real > 0.0 && real < 1.0) rise.take(-real, f);
+      if (real > 1.0) fall.take(real, f);
     }
-    if (gain > 0.0) out.gain_db = gain_margin(k, gain_hz);
-    if (std::isfinite(reduction)) {
-      out.gain_reduction_db = gain_margin(k, reduction_hz);
+    if (rise.found()) out.gain_db = gain_margin(k, rise.frequency_hz);
+    if (fall.found()) {
+      out.gain_reduction_db = gain_margin(k, fall.frequency_hz);
       out.gain_reduction_db->value *= -1.0;
     }
-    double angle = HUGE_VAL;
-    double lag_s = HUGE_VAL;
-    double angle_hz = 0.0;
-    double lag_hz = 0.0;
+    Least angle;
+    Least lag_s;
     for (const double f : crossings(k, [](Complex L) { return std::norm(L) - 1.0; })) {
       const Complex L = curve_at(k, f);
-      if (std::abs(angle_to_critical(L)) < angle) {
-        angle = std::abs(angle_to_critical(L));
-        angle_hz = f;
-      }
-      if (lag_to_critical(L) / (kTwoPi * f) < lag_s) {
-        lag_s = lag_to_critical(L) / (kTwoPi * f);
-        lag_hz = f;
-      }
+      angle.take(std::abs(angle_to_critical(L)), f);
+      lag_s.take(lag_to_critical(L) / (kTwoPi * f), f);
     }
-    if (angle_hz > 0.0) out.phase_deg = phase_margin(k, angle_hz, false);
-    if (lag_hz > 0.0) out.delay_s = phase_margin(k, lag_hz, true);
+    if (angle.found()) out.phase_deg = phase_margin(k, angle.frequency_hz, false);
+    if (lag_s.found()) out.delay_s = phase_margin(k, lag_s.frequency_hz, true);
     out.modulus = least_size(k, 1.0);
     return out;
   }

@@ -109,8 +109,8 @@ TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
   if (onset <= kPeriodsToName) return out;
   // The period of the change contains its transient.
   const int since = std::exchange(onset, 0) - 1;
-  out.change = ChangeNaming(response, *reference, *scores, periods)
-                   .name(since, detector->mean_scores(since), detector->mean_scores(since - 1));
+  out.change = name_change(response, *reference, *scores, periods, since,
+                           detector->mean_scores(since), detector->mean_scores(since - 1));
   if (out.change->what.kind == ChangeKind::disturbance) {
     detector->restart();
     return out;

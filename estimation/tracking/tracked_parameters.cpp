@@ -50,39 +50,20 @@ double nominal_value(const TrackedParameter& parameter, const AdditiveModel& mod
   const auto mode = [&]() -> const Submodel& {
     return model.submodels[static_cast<std::size_t>(parameter.index)];
   };
-  switch (parameter.kind) {
-    case TrackedKind::frequency:
-      return mode().natural_frequency_hz();
-    case TrackedKind::damping:
-      return mode().damping_ratio();
-    case TrackedKind::sensor_gain:
-    case TrackedKind::actuator_gain:
-      return 1.0;
-    case TrackedKind::delay:
-      break;
-  }
-  return 0.0;
+  if (parameter.kind == TrackedKind::frequency) return mode().natural_frequency_hz();
+  if (parameter.kind == TrackedKind::damping) return mode().damping_ratio();
+  return parameter.kind == TrackedKind::delay ? 0.0 : 1.0;
 }
 
 Eigen::VectorXd largest_changes(const std::vector<TrackedParameter>& parameters,
                                 double sample_rate_hz) {
+  constexpr double kByKind[] = {0.05, 0.5, 0.3, 0.3, 1.0};  // of a delay: samples
   Eigen::VectorXd changes(std::ssize(parameters));
-  for (Eigen::Index p = 0; p < changes.size(); ++p)
-    switch (parameters[static_cast<std::size_t>(p)].kind) {
-      case TrackedKind::frequency:
-        changes[p] = 0.05;
-        break;
-      case TrackedKind::damping:
-        changes[p] = 0.5;
-        break;
-      case TrackedKind::sensor_gain:
-      case TrackedKind::actuator_gain:
-        changes[p] = 0.3;
-        break;
-      case TrackedKind::delay:
-        changes[p] = 1.0 / sample_rate_hz;
-        break;
-    }
+  for (Eigen::Index p = 0; p < changes.size(); ++p) {
+    const TrackedKind kind = parameters[static_cast<std::size_t>(p)].kind;
+    changes[p] = kByKind[static_cast<std::size_t>(kind)];
+    if (kind == TrackedKind::delay) changes[p] /= sample_rate_hz;
+  }
   return changes;
 }
 

@@ -15,6 +15,22 @@ struct TrackedResponse::Changes {
   Eigen::VectorXd sensor;  // factors
   Eigen::VectorXd actuator;
   double delay_s = 0.0;
+
+  double& of(const TrackedParameter& parameter) {
+    switch (parameter.kind) {
+      case TrackedKind::frequency:
+        return frequency[parameter.index];
+      case TrackedKind::damping:
+        return damping[parameter.index];
+      case TrackedKind::sensor_gain:
+        return sensor[parameter.index];
+      case TrackedKind::actuator_gain:
+        return actuator[parameter.index];
+      case TrackedKind::delay:
+        break;
+    }
+    return delay_s;
+  }
 };
 
 TrackedResponse::TrackedResponse(const AdditiveModel& model,
@@ -29,27 +45,15 @@ TrackedResponse::Changes TrackedResponse::changes(const Eigen::VectorXd& x) cons
   const auto submodels = std::ssize(model_.submodels);
   Changes out{Eigen::VectorXd::Zero(submodels), Eigen::VectorXd::Zero(submodels),
               Eigen::VectorXd::Ones(model_.n_outputs()), Eigen::VectorXd::Ones(model_.n_inputs())};
-  for (Eigen::Index p = 0; p < size(); ++p) {
-    const TrackedParameter& parameter = parameters_[static_cast<std::size_t>(p)];
-    switch (parameter.kind) {
-      case TrackedKind::frequency:
-        out.frequency[parameter.index] = x[p];
-        break;
-      case TrackedKind::damping:
-        out.damping[parameter.index] = x[p];
-        break;
-      case TrackedKind::sensor_gain:
-        out.sensor[parameter.index] += x[p];
-        break;
-      case TrackedKind::actuator_gain:
-        out.actuator[parameter.index] += x[p];
-        break;
-      case TrackedKind::delay:
-        out.delay_s = x[p];
-        break;
-    }
-  }
+  for (Eigen::Index p = 0; p < size(); ++p)
+    out.of(parameters_[static_cast<std::size_t>(p)]) += x[p];
   return out;
+}
+
+Submodel TrackedResponse::changed(std::size_t submodel, const Changes& change) const {
+  const Submodel& s = model_.submodels[submodel];
+  const auto i = static_cast<Eigen::Index>(submodel);
+  return s.is_mode() ? moved(s, change.frequency[i], change.damping[i]) : s;
 }
 
 Eigen::MatrixXcd TrackedResponse::response_of(AdditiveModel model, const Changes& change) const {
@@ -63,21 +67,14 @@ Eigen::MatrixXcd TrackedResponse::response_of(AdditiveModel model, const Changes
 Eigen::MatrixXcd TrackedResponse::at(const Eigen::VectorXd& x) const {
   const Changes change = changes(x);
   AdditiveModel model = model_;
-  for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    const auto m = static_cast<Eigen::Index>(i);
-    if (model.submodels[i].is_mode())
-      model.submodels[i] = moved(model.submodels[i], change.frequency[m], change.damping[m]);
-  }
+  for (std::size_t i = 0; i < model.submodels.size(); ++i) model.submodels[i] = changed(i, change);
   return response_of(std::move(model), change);
 }
 
 Eigen::MatrixXcd TrackedResponse::at(const Eigen::VectorXd& x, Eigen::Index submodel) const {
   const Changes change = changes(x);
   AdditiveModel model = model_;
-  const Submodel& wanted = model_.submodels[static_cast<std::size_t>(submodel)];
-  model.submodels = {wanted.is_mode()
-                         ? moved(wanted, change.frequency[submodel], change.damping[submodel])
-                         : wanted};
+  model.submodels = {changed(static_cast<std::size_t>(submodel), change)};
   return response_of(std::move(model), change);
 }
 
@@ -107,10 +104,8 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
     const HoldEquivalent through(lines_, delay_s + change.delay_s);
     for (std::size_t i = 0; i < model_.submodels.size(); ++i) {
       const auto m = static_cast<Eigen::Index>(i);
-      const bool mode = model_.submodels[i].is_mode();
-      const Submodel submodel =
-          mode ? moved(model_.submodels[i], change.frequency[m], change.damping[m])
-               : model_.submodels[i];
+      const Submodel submodel = changed(i, change);
+      const bool mode = submodel.is_mode();
       const SubmodelShape shape = shape_of(submodel);
       evaluate_basis(through, shape, submodel.coefficients(), {mode, true}, basis);
       for (int p = 0; p <= shape.numerator_degree; ++p) {

@@ -33,6 +33,7 @@ class TrackedResponse {
  private:
   struct Changes;  // x by its meaning
   Changes changes(const Eigen::VectorXd& x) const;
+  Submodel changed(std::size_t submodel, const Changes& change) const;
   Eigen::MatrixXcd response_of(AdditiveModel model, const Changes& change) const;
 
   AdditiveModel model_;
