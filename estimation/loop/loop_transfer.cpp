@@ -1,11 +1,9 @@
 #include "estimation/loop/loop_transfer.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/LU>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
@@ -46,9 +44,8 @@ std::vector<LoopPoint> loop_points(const AdditiveModel& model, const LoopControl
   const StateSpace& K = controller.system;
   if (controller.actuators.rows() != model.n_inputs() || K.D.cols() != model.n_outputs() ||
       K.D.rows() != controller.actuators.cols())
-    throw std::invalid_argument(fmt::format("controller: {} x {}; the model needs {} x {}",
-                                            controller.actuators.rows(), K.D.cols(),
-                                            model.n_inputs(), model.n_outputs()));
+    fail_request("controller: {} x {}; the model needs {} x {}", controller.actuators.rows(),
+                 K.D.cols(), model.n_inputs(), model.n_outputs());
   const Eigen::MatrixXcd P = response(model, frequency_hz, HoldModel::exact);
   std::vector<LoopPoint> out;
   for (Eigen::Index k = 0; k < frequency_hz.size(); ++k)

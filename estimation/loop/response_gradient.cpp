@@ -1,9 +1,8 @@
 #include "estimation/loop/response_gradient.hpp"
 
-#include <fmt/format.h>
-
 #include <numbers>
 #include <stdexcept>
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -22,9 +21,8 @@ ResponseGradient::ResponseGradient(const AdditiveModel& model, Eigen::Index para
   delays_ = parameters - first_delay_ - numerators;
   const Eigen::Index per_channel = model.n_inputs() + model.n_outputs() - 1;
   if (delays_ != 0 && delays_ != 1 && delays_ != per_channel)
-    throw std::invalid_argument(
-        fmt::format("covariance: {} parameters; the model has {} besides its delays", parameters,
-                    first_delay_ + numerators));
+    fail_request("covariance: {} parameters; the model has {} besides its delays", parameters,
+                 first_delay_ + numerators);
   const ModelLines lines{2.0 * std::numbers::pi * frequency_hz, 1.0 / model.sample_rate_hz,
                          HoldModel::exact};
   for (const auto& [delay_s, members] :

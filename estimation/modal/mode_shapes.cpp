@@ -1,9 +1,6 @@
 #include "estimation/modal/mode_shapes.hpp"
 
-#include <fmt/format.h>
-
-#include <stdexcept>
-
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/modal/submodel_residues.hpp"
 
@@ -46,9 +43,8 @@ double driving_point_mass(const ModeShape& mode, const DrivingPoint& point) {
   const auto [output, input] = point;
   if (output < 0 || output >= mode.output_shape.size() || input < 0 ||
       input >= mode.input_shape.size())
-    throw std::invalid_argument(
-        fmt::format("driving point: output {} and input {} must be below {} and {}", output, input,
-                    mode.output_shape.size(), mode.input_shape.size()));
+    fail_request("driving point: output {} and input {} must be below {} and {}", output, input,
+                 mode.output_shape.size(), mode.input_shape.size());
   return mode.modal_mass / (mode.output_shape[output] * mode.input_shape[input]).real();
 }
 

@@ -1,11 +1,9 @@
 #include "estimation/modal/model_spectra.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -16,10 +14,10 @@ std::vector<Eigen::Index> indices_of(const std::vector<std::string>& wanted,
   for (const std::string& name : wanted) {
     const auto found = std::find(there.names.begin(), there.names.end(), name);
     if (found == there.names.end())
-      throw std::invalid_argument(
-          fmt::format("{}: has no channel '{}', which the model needs; use a log with all channels "
-                      "of the model",
-                      log.path().string(), name));
+      fail_request(
+          "{}: has no channel '{}', which the model needs; use a log with all channels "
+          "of the model",
+          log.path().string(), name);
     indices.push_back(found - there.names.begin());
   }
   return indices;

@@ -1,12 +1,10 @@
 #include "estimation/modal/prediction_error.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/model_spectra.hpp"
 
 namespace stageid {
@@ -25,9 +23,8 @@ class Predictor {
       ++result_.runs;
     }
     if (periods == 0.0)
-      throw std::invalid_argument(
-          fmt::format("{}: no complete run has a measured period; use a log with a complete run",
-                      log_.path().string()));
+      fail_request("{}: no complete run has a measured period; use a log with a complete run",
+                   log_.path().string());
     result_.error_rms = (result_.error_rms / periods).cwiseSqrt();
     result_.signal_rms = (result_.signal_rms / periods).cwiseSqrt();
     return std::move(result_);
@@ -37,9 +34,8 @@ class Predictor {
   static std::vector<int> lines_of(const LogReader& log, double low_hz, double high_hz) {
     std::vector<int> lines = lines_in_band(log.info(), low_hz, high_hz);
     if (lines.empty())
-      throw std::invalid_argument(
-          fmt::format("{}: has no line between {} and {} Hz; use another --band",
-                      log.path().string(), low_hz, high_hz));
+      fail_request("{}: has no line between {} and {} Hz; use another --band", log.path().string(),
+                   low_hz, high_hz);
     return lines;
   }
 

@@ -1,10 +1,8 @@
 #include "estimation/modal/submodel_residues.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/model/basis.hpp"
 
@@ -30,10 +28,10 @@ void require_distinct(const std::vector<Complex>& poles, std::size_t index) {
   for (std::size_t i = 0; i < poles.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (std::abs(poles[i] - poles[j]) <= kClosest * std::abs(poles[i]))
-        throw std::invalid_argument(
-            fmt::format("model: submodel {}: its poles {:.6g}{:+.6g}j and {:.6g}{:+.6g}j rad/s "
-                        "coincide; a state space needs distinct poles within a submodel",
-                        index, poles[j].real(), poles[j].imag(), poles[i].real(), poles[i].imag()));
+        fail_request(
+            "model: submodel {}: its poles {:.6g}{:+.6g}j and {:.6g}{:+.6g}j rad/s "
+            "coincide; a state space needs distinct poles within a submodel",
+            index, poles[j].real(), poles[j].imag(), poles[i].real(), poles[i].imag());
 }
 
 }  // namespace
@@ -55,12 +53,9 @@ SubmodelResidues residues(const Submodel& submodel, std::size_t index) {
   const int l = submodel.integrators;
   const auto order = static_cast<std::size_t>(submodel.order() + l);
   const auto& B = submodel.numerator;
-  if (l < 0 || l > 2)
-    throw std::invalid_argument(
-        fmt::format("model: submodel {}: must have 0, 1 or 2 integrators", index));
+  if (l < 0 || l > 2) fail_request("model: submodel {}: must have 0, 1 or 2 integrators", index);
   if (B.empty() || B.size() > order + 1)
-    throw std::invalid_argument(
-        fmt::format("model: submodel {}: must be proper and have at least one numerator", index));
+    fail_request("model: submodel {}: must be proper and have at least one numerator", index);
   const std::vector<Complex> representatives = pole_representatives(submodel);
   const std::vector<Complex> poles = all_poles(representatives);
   require_distinct(poles, index);
@@ -92,10 +87,10 @@ Eigen::Index residue_rank(const Submodel& submodel, std::size_t index,
   const Eigen::Index held = *submodel.residue_rank;
   const double excess = singular_values[held] / singular_values[0];
   if (excess > kContradiction)
-    throw std::invalid_argument(
-        fmt::format("model: submodel {}: residue_rank is {}, but singular value {} of its residue "
-                    "is {:.1e} of the first; correct residue_rank or omit it",
-                    index, held, held + 1, excess));
+    fail_request(
+        "model: submodel {}: residue_rank is {}, but singular value {} of its residue "
+        "is {:.1e} of the first; correct residue_rank or omit it",
+        index, held, held + 1, excess);
   return held;
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
 
@@ -46,9 +47,8 @@ void require_same_units(const char* kind, const ChannelList& model, const Channe
   for (std::size_t i = 0; i < model.units.size() && i < data.units.size(); ++i) {
     if (model.units[i].empty() || data.units[i].empty() || model.units[i] == data.units[i])
       continue;
-    throw std::invalid_argument(
-        fmt::format("validate: {} {} is in {} in the model and in {} in the data; convert the data",
-                    kind, model.names[i], model.units[i], data.units[i]));
+    fail_request("validate: {} {} is in {} in the model and in {} in the data; convert the data",
+                 kind, model.names[i], model.units[i], data.units[i]);
   }
 }
 

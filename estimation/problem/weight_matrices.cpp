@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
@@ -16,8 +17,6 @@ constexpr double kLargestBytes = 2147483648.0;  // of whole weight matrices
 constexpr double kHermitian = 1e-9;       // relative; files may hold single precision products
 constexpr double kSemidefinite = -1e-10;  // rounding of the smallest eigenvalue
 constexpr double kSmallestPivot = 1e-12;  // of a correlation matrix
-
-[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
 
 std::string line_name(const FrfEstimate& frf, Eigen::Index k) {
   return fmt::format("line {} ({} Hz)", k, frf.frequency_hz[k]);
@@ -57,10 +56,10 @@ void require_factors(const FrfEstimate& frf) {
   for (const auto& [size, name] : {std::pair{frf.residual_covariance.size(), "residual_covariance"},
                                    std::pair{frf.input_factor.size(), "input_factor"}})
     if (size == 0)
-      refuse(fmt::format(
+      fail_request(
           "weighting likelihood needs /{0} in the FRF, which is missing. Estimate the FRF again "
           "with 'stageid frf' from at least two periods, or use noise_variance",
-          name));
+          name);
   const Eigen::Index n_y = frf.n_outputs();
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     for (Eigen::Index y = 0; y < n_y; ++y)
@@ -93,10 +92,10 @@ WeightMatrices WeightMatrices::likelihood(const FrfEstimate& frf) {
   const SmoothedCovariance C = smoothed_residual_covariance(frf);
   const double free = C.dof - static_cast<double>(n_y);
   if (C.dof > 0.0 && free < 2.0)
-    refuse(fmt::format(
+    fail_request(
         "weighting likelihood: the residual covariance of {} outputs has {} degrees of freedom "
         "over all lines but needs {}; measure more periods or realizations, or use noise_variance",
-        n_y, C.dof, n_y + 2));
+        n_y, C.dof, n_y + 2);
   const double wishart = C.dof > 0.0 ? free / C.dof : 1.0;
   const double one_output = C.dof > 0.0 ? (C.dof - 1.0) / C.dof : 1.0;
 
@@ -128,19 +127,18 @@ WeightMatrices WeightMatrices::likelihood(const FrfEstimate& frf) {
 WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixXcd& W) {
   const Eigen::Index n_c = frf.response.rows();
   if (W.rows() != n_c * n_c || W.cols() != frf.lines())
-    refuse("weight matrices: the shape must be that of the response in the band");
+    fail_request("weight matrices: the shape must be that of the response in the band");
   require_memory_for_weight_matrices(n_c, frf.lines());
   WeightMatrices out;
   out.whole_ = W;
   out.marginal_.resize(n_c, frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd W_k = W.col(k).reshaped(n_c, n_c);
-    if (!W_k.allFinite())
-      refuse(fmt::format("weight matrix of {}: is not finite", line_name(frf, k)));
+    if (!W_k.allFinite()) fail_request("weight matrix of {}: is not finite", line_name(frf, k));
     if (!is_hermitian(W_k))
-      refuse(fmt::format(
+      fail_request(
           "weight matrix of {}: is not Hermitian; element [c, d] must be the conjugate of [d, c]",
-          line_name(frf, k)));
+          line_name(frf, k));
     const Eigen::MatrixXcd inverse = definite_inverse(W_k);
     if (inverse.size() == 0 && !is_semidefinite(W_k))
       throw IndefiniteWeights(
@@ -153,7 +151,7 @@ WeightMatrices WeightMatrices::user(const FrfEstimate& frf, const Eigen::MatrixX
       out.marginal_.col(k) = W_k.diagonal().real().cwiseMax(0.0);
   }
   if (!(out.marginal_.maxCoeff() > 0.0))
-    refuse("weight matrices: all are zero; at least one must be nonzero");
+    fail_request("weight matrices: all are zero; at least one must be nonzero");
   return out;
 }
 
@@ -209,11 +207,11 @@ void require_memory_for_weight_matrices(Eigen::Index channels, Eigen::Index line
   const double bytes = 16.0 * static_cast<double>(channels) * static_cast<double>(channels) *
                        static_cast<double>(lines);
   if (bytes <= kLargestBytes) return;
-  refuse(
-      fmt::format("weight matrices: {} x {} on {} lines need {:.1f} GiB of memory, more than the "
-                  "limit of {:.0f} GiB. Choose fewer channels, a smaller band, or weighting "
-                  "likelihood, which needs less memory",
-                  channels, channels, lines, bytes / 1073741824.0, kLargestBytes / 1073741824.0));
+  fail_request(
+      "weight matrices: {} x {} on {} lines need {:.1f} GiB of memory, more than the "
+      "limit of {:.0f} GiB. Choose fewer channels, a smaller band, or weighting "
+      "likelihood, which needs less memory",
+      channels, channels, lines, bytes / 1073741824.0, kLargestBytes / 1073741824.0);
 }
 
 }  // namespace stageid

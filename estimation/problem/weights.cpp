@@ -1,11 +1,10 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/weight_matrices.hpp"
 #include "frf/statistics/distributions.hpp"
@@ -116,10 +115,10 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
                                     "channel or line, or use weighting unit");
       W(c, k) = std::pow(magnitude, -exponent);
       if (!std::isnormal(W(c, k)))
-        throw std::invalid_argument(
-            fmt::format("response of {} is {:.2g}: its weight is out of range for double "
-                        "precision; use units that suit the plant",
-                        channel_name(frf, c, k), magnitude));
+        fail_request(
+            "response of {} is {:.2g}: its weight is out of range for double "
+            "precision; use units that suit the plant",
+            channel_name(frf, c, k), magnitude);
     }
   return W;
 }

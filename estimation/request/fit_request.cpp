@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "estimation/request/request_flags.hpp"
 #include "estimation/request/structure_request.hpp"
@@ -105,9 +105,8 @@ class FitDefaults {
     const Eigen::Index lines = setup_.frf.lines();
     const Eigen::Index most = most_modes(setup_.frf, setup_.structure.common);
     if (setup_.selection.exactly > most)
-      throw std::invalid_argument(fmt::format(
-          "modes: {} is too many; {} lines support at most {}; use fewer or a wider band",
-          setup_.selection.exactly, lines, most));
+      fail_request("modes: {} is too many; {} lines support at most {}; use fewer or a wider band",
+                   setup_.selection.exactly, lines, most);
   }
 
   void choose_modes() {
@@ -119,15 +118,13 @@ class FitDefaults {
         return;
       case Kind::count:
         if (request_.modes.count < 1 || request_.modes.count > 1000)
-          throw std::invalid_argument(
-              fmt::format("modes: got {}; expected 1 to 1000 modes", request_.modes.count));
+          fail_request("modes: got {}; expected 1 to 1000 modes", request_.modes.count);
         selection.exactly = request_.modes.count;
         return;
       case Kind::given:
         for (const ModeCandidate& mode : request_.modes.given) {
           if (!(mode.frequency_hz > 0.0))
-            throw std::invalid_argument(
-                fmt::format("modes: got {} Hz; expected positive frequencies", mode.frequency_hz));
+            fail_request("modes: got {} Hz; expected positive frequencies", mode.frequency_hz);
           require_below_nyquist("modes", setup_, mode.frequency_hz);
         }
         selection.modes = request_.modes.given;
@@ -154,10 +151,10 @@ class FitDefaults {
     if (f.size() < 2) return;
     const double spacing_hz = (f.tail(f.size() - 1) - f.head(f.size() - 1)).minCoeff();
     if (!(std::abs(delay.delay_s) * 2.0 * spacing_hz <= 1.0))
-      throw std::invalid_argument(
-          fmt::format("delay: got {} s; expected a magnitude of at most {:.4g} s: lines {:.4g} Hz "
-                      "apart cannot resolve a longer delay (1/(2 df))",
-                      delay.delay_s, 0.5 / spacing_hz, spacing_hz));
+      fail_request(
+          "delay: got {} s; expected a magnitude of at most {:.4g} s: lines {:.4g} Hz "
+          "apart cannot resolve a longer delay (1/(2 df))",
+          delay.delay_s, 0.5 / spacing_hz, spacing_hz);
   }
 
   /// With one realization, the variance by periods does not include nonlinear distortion. With that weighting, the
@@ -329,12 +326,10 @@ FitSetup make_fit_setup(const FitRequest& asked, FrfEstimate frf) {
   defaults.require_affordable_modes();
   setup.options.method = request.method;
   if (request.max_iterations < 1)
-    throw std::invalid_argument(
-        fmt::format("max_iterations: got {}; expected 1 or more", request.max_iterations));
+    fail_request("max_iterations: got {}; expected 1 or more", request.max_iterations);
   setup.options.max_iterations = request.max_iterations;
   if (!(request.search_seconds >= 0.0))
-    throw std::invalid_argument(
-        fmt::format("search_seconds: got {}; expected 0 or more", request.search_seconds));
+    fail_request("search_seconds: got {}; expected 0 or more", request.search_seconds);
   setup.selection.search_seconds = request.search_seconds;
   setup.options.threads = request.threads;
   setup.request_json = provenance_of(request, setup);

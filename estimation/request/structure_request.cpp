@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/request/submodel_text.hpp"
 
 namespace stageid {
@@ -45,18 +46,16 @@ void choose_residue_rank(const FitRequest& request, FitSetup& setup) {
   const int rank = request.residue_rank;
   setup.options.residue_rank = rank;
   if (rank < 0)
-    throw std::invalid_argument(
-        fmt::format("residue rank: got {}; expected 0 (full) or a rank of 1 or more", rank));
+    fail_request("residue rank: got {}; expected 0 (full) or a rank of 1 or more", rank);
   if (setup.structure.common.general_damping && rank > 1)
-    throw std::invalid_argument(
-        fmt::format("residue rank: got {}; expected full or 1 with general damping", rank));
+    fail_request("residue rank: got {}; expected full or 1 with general damping", rank);
   if (rank == 0) return;
   for (const SubmodelRequest& submodel : request.submodels)
     if (!takes_rank(submodel, rank))
-      throw std::invalid_argument(
-          fmt::format("residue rank: got {}; expected full: a rank applies to modes only (n=2 with "
-                      "m=0, or m=1 and rank 1), not to submodel {}",
-                      rank, submodel_text(submodel)));
+      fail_request(
+          "residue rank: got {}; expected full: a rank applies to modes only (n=2 with "
+          "m=0, or m=1 and rank 1), not to submodel {}",
+          rank, submodel_text(submodel));
 }
 
 }  // namespace
@@ -98,9 +97,8 @@ void choose_structure(const FitRequest& request, FitSetup& setup) {
 void require_below_nyquist(const char* member, const FitSetup& setup, double frequency_hz) {
   const double nyquist_hz = 0.5 * setup.frf.sample_rate_hz;
   if (nyquist_hz > 0.0 && setup.options.hold != HoldModel::none && frequency_hz >= nyquist_hz)
-    throw std::invalid_argument(
-        fmt::format("{}: {} Hz is not below half the sample rate, {} Hz; use lower frequencies",
-                    member, frequency_hz, nyquist_hz));
+    fail_request("{}: {} Hz is not below half the sample rate, {} Hz; use lower frequencies",
+                 member, frequency_hz, nyquist_hz);
 }
 
 }  // namespace stageid

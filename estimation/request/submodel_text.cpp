@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <stdexcept>
 #include <vector>
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -88,7 +88,7 @@ class SubmodelParser {
   }
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw std::invalid_argument(fmt::format("--submodel: '{}': {}", text_, what));
+    fail_request("--submodel: '{}': {}", text_, what);
   }
 
   std::string_view text_;

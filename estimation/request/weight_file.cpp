@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "estimation/problem/weight_matrices.hpp"
 
@@ -28,9 +28,8 @@ std::size_t first_line(const Hdf5File& file, const char* dataset,
   std::vector<hsize_t> of_whole = wanted;
   of_whole[0] = static_cast<hsize_t>(whole.count);
   if (shape == of_whole) return static_cast<std::size_t>(whole.first);
-  throw FormatError(file.path(), dataset,
-                    fmt::format("has the shape {}; expected {}, as the response in the band",
-                                fmt::join(shape, " x "), fmt::join(wanted, " x ")));
+  fail_format(file.path(), dataset, "has the shape {}; expected {}, as the response in the band",
+              fmt::join(shape, " x "), fmt::join(wanted, " x "));
 }
 
 IndefiniteWeights indefinite(const Hdf5File& file, const char* dataset, const std::string& what) {
@@ -51,8 +50,8 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines who
     for (Eigen::Index i = 0; i < frf.n_outputs(); ++i)
       for (Eigen::Index j = 0; j < frf.n_inputs(); ++j, ++at) {
         if (!std::isfinite(values[at]))
-          throw FormatError(file.path(), kDiagonals,
-                            fmt::format("line {}: {}; weights must be finite", k, values[at]));
+          fail_format(file.path(), kDiagonals, "line {}: {}; weights must be finite", k,
+                      values[at]);
         if (values[at] < 0.0)
           throw indefinite(file, kDiagonals,
                            fmt::format("line {}: {}; weights must be 0 or more", k, values[at]));
@@ -63,11 +62,10 @@ void read_diagonals(const Hdf5File& file, const FrfEstimate& frf, WholeLines who
   // With larger numbers, squares exceed the range of doubles.
   const double power = (weights.array() * frf.response.cwiseAbs2().array()).sum();
   if (power > 0.0 && !(power > kLeastPower && power < 1.0 / kLeastPower))
-    throw FormatError(
-        file.path(), kDiagonals,
-        fmt::format("the weighted power of the response, sum W |G|^2, is {:.1e}; only "
-                    "the ratios of weights matter: scale them until it is about 1",
-                    power));
+    fail_format(file.path(), kDiagonals,
+                "the weighted power of the response, sum W |G|^2, is {:.1e}; only "
+                "the ratios of weights matter: scale them until it is about 1",
+                power);
 }
 
 void read_matrices(const Hdf5File& file, const FrfEstimate& frf, WholeLines whole,

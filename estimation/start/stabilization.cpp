@@ -1,14 +1,12 @@
 #include "estimation/start/stabilization.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
@@ -109,10 +107,10 @@ void compare(StabilizationPole& pole, const std::vector<StabilizationPole>& befo
 std::vector<StabilizationPole> stabilization(const FrfEstimate& frf,
                                              const StabilizationOptions& options) {
   if (options.most_order < 2 || Eigen::Index{2} * options.most_order >= frf.lines())
-    throw std::invalid_argument(
-        fmt::format("stabilization: most_order {} is out of range for {} lines; give 2 to less "
-                    "than half of the lines",
-                    options.most_order, frf.lines()));
+    fail_request(
+        "stabilization: most_order {} is out of range for {} lines; give 2 to less "
+        "than half of the lines",
+        options.most_order, frf.lines());
   const NormalMatrix normal(frf, options);
   std::vector<StabilizationPole> all;
   std::vector<StabilizationPole> before;

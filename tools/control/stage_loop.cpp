@@ -1,12 +1,11 @@
 #include "tools/control/stage_loop.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "hal/simulator/rigid_body.hpp"
 
 namespace stageid {
@@ -78,10 +77,10 @@ class LoopBuilder {
                            const char* kind, const char* in) {
       for (std::size_t i = 0; i < places.size(); ++i)
         if (!places[i] && used(entries, static_cast<Eigen::Index>(i)))
-          throw std::invalid_argument(fmt::format(
+          fail_request(
               "the loop of {} uses {} '{}', which is not an {} of the model; identify all channels "
               "of the controller",
-              loop.name, kind, channels[i].name, in));
+              loop.name, kind, channels[i].name, in);
     };
     check(sensors_, stage_.info.sensors, loop.sensors, "sensor", "output");
     check(actuators_, stage_.info.actuators, loop.actuators, "actuator", "input");
@@ -166,10 +165,10 @@ LoopController stage_loop(const StageSpec& stage, const AdditiveModel& model) {
         "matrices or transfer functions into a copy of the stage file");
   const double rate_hz = stage.info.sample_rate_hz;
   if (std::abs(rate_hz - model.sample_rate_hz) > kSameRate * rate_hz)
-    throw std::invalid_argument(
-        fmt::format("its sample rate is {} Hz, that of the model {} Hz; use the stage file of the "
-                    "measurement",
-                    rate_hz, model.sample_rate_hz));
+    fail_request(
+        "its sample rate is {} Hz, that of the model {} Hz; use the stage file of the "
+        "measurement",
+        rate_hz, model.sample_rate_hz);
   return LoopBuilder(stage, model).build();
 }
 

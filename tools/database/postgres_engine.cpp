@@ -6,9 +6,8 @@
 #include <charconv>
 #include <cstdlib>
 #include <optional>
-#include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/database/database.hpp"
 #include "tools/terminal/unicode.hpp"
 
@@ -75,7 +74,7 @@ struct Connection {
                       name, message));
     // 22, 23, 42: the statement is at fault; 25: it would have changed something.
     if (kind == "22" || kind == "23" || kind == "42" || (kind == "25" && reads_only))
-      throw std::invalid_argument(fmt::format("{}: {}", name, message));
+      fail_request("{}: {}", name, message);
     throw FileError(fmt::format("{}: {}", name, message));
   }
   static bool good(const PGresult* result) {

@@ -6,11 +6,10 @@
 #include <cerrno>
 #include <chrono>
 #include <optional>
-#include <stdexcept>
 #include <thread>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "tools/database/database_engine.hpp"
 
@@ -54,7 +53,7 @@ int enter_wal_mode(sqlite3* database) {
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     default:
-      throw std::invalid_argument(fmt::format("{}: {}", name, ::sqlite3_errmsg(database)));
+      fail_request("{}: {}", name, ::sqlite3_errmsg(database));
   }
 }
 
@@ -169,8 +168,7 @@ class SqliteEngine final : public DatabaseEngine {
     const int code = ::sqlite3_prepare_v2(handle_.get(), rest, -1, &second, &end);
     ::sqlite3_finalize(second);
     if (code != SQLITE_OK || second != nullptr)
-      throw std::invalid_argument(
-          fmt::format("{}: got several SQL statements; write one", file_.string()));
+      fail_request("{}: got several SQL statements; write one", file_.string());
     return prepared;
   }
   void execute(const std::string& sql) override {

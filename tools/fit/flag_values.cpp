@@ -5,12 +5,13 @@
 
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 
 namespace stageid {
 
 void refuse(const char* flag, const std::string& given, const std::string& right) {
-  throw std::invalid_argument(fmt::format("{}: got '{}'; expected {}", flag, given, right));
+  fail_request("{}: got '{}'; expected {}", flag, given, right);
 }
 
 std::string wrong_word(const std::string& flag, const std::string& word,

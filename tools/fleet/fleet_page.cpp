@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 #include "acquisition/files/version.hpp"
@@ -35,9 +35,8 @@ class FleetPage {
       if (Json content = stage(id, name); content["count"] > 0)
         stages.push_back(std::move(content));
     if (count_ == 0)
-      throw std::invalid_argument(
-          fmt::format("{}: contains no identification of this time; change --since and --until",
-                      database_.name()));
+      fail_request("{}: contains no identification of this time; change --since and --until",
+                   database_.name());
     Json content = {{"version", version()},
                     {"title", title()},
                     {"stages", stages},
@@ -69,12 +68,12 @@ class FleetPage {
     }
     for (const std::string& wanted : request_.stages)
       if (std::ranges::count(names, wanted) == 0)
-        throw std::invalid_argument(fmt::format(
-            "--stage: unknown stage '{}'{}; 'stageid fleet query {} stages' lists them", wanted,
-            nearest_word(wanted, names).empty()
-                ? ""
-                : fmt::format(", did you mean '{}'?", nearest_word(wanted, names)),
-            database_.name()));
+        fail_request("--stage: unknown stage '{}'{}; 'stageid fleet query {} stages' lists them",
+                     wanted,
+                     nearest_word(wanted, names).empty()
+                         ? ""
+                         : fmt::format(", did you mean '{}'?", nearest_word(wanted, names)),
+                     database_.name());
     return out;
   }
 
@@ -132,10 +131,10 @@ class FleetPage {
       if (doubtful || !rows.is_null(3))
         outliers_.push_back({count_, doubtful ? rows.text(4) : "", rows.text(3)});
       if (++count_ > kMostOnPage)
-        throw std::invalid_argument(fmt::format(
+        fail_request(
             "{}: more than {} identifications are too many for one page; choose some with --stage, "
             "--since and --until",
-            database_.name(), kMostOnPage));
+            database_.name(), kMostOnPage);
     }
     return {{"name", name},          {"first", first},      {"count", count_ - first},
             {"doubtful", counts[1]}, {"failed", counts[2]}, {"tracks", tracks(id, place)}};

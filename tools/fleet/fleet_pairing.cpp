@@ -8,7 +8,7 @@
 #include <complex>
 #include <numeric>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/mode_tracks.hpp"
 #include "frf/statistics/order_statistic.hpp"
 #include "tools/fleet/fleet_time.hpp"
@@ -47,8 +47,7 @@ std::size_t names_in(const std::string& list) {
 double positive_number(const Statement& row, int column, const Database& database) {
   const double number = row.number(column);
   if (!std::isfinite(number) || number <= 0.0)
-    throw FormatError(database.name(), "",
-                      fmt::format("contains the frequency {} Hz; restore a copy", number));
+    fail_format(database.name(), "", "contains the frequency {} Hz; restore a copy", number);
   return number;
 }
 

@@ -7,7 +7,7 @@
 #include <complex>
 #include <cstring>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/fleet/fleet_schema.hpp"
@@ -53,9 +53,8 @@ void require_store(const Database& database) {
   Statement store = database.prepare("SELECT format, schema_version FROM store");
   if (!store.step() || store.text(0) != kStoreFormat) throw none;
   if (store.integer(1) != kFleetSchemaVersion)
-    throw FormatError(database.name(), "",
-                      fmt::format("has schema version {}; this program supports version {}",
-                                  store.integer(1), kFleetSchemaVersion));
+    fail_format(database.name(), "", "has schema version {}; this program supports version {}",
+                store.integer(1), kFleetSchemaVersion);
 }
 
 }  // namespace

@@ -9,9 +9,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
@@ -70,9 +69,9 @@ std::vector<int> fitted_realizations(const FleetConfig& config, const LogReader&
   int count = 0;
   for (const LogRun& run : log.runs()) count = std::max(count, run.realization + 1);
   if (config.validation_realization >= count || count < 2)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: realization {} cannot be held back, {} are recorded; change validation_realization",
-        log.path().string(), config.validation_realization + 1, count));
+        log.path().string(), config.validation_realization + 1, count);
   std::vector<int> fitted;
   for (int m = 0; m < count; ++m)
     if (m != config.validation_realization) fitted.push_back(m);

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/terminal/external_program.hpp"
 #include "tools/terminal/shell_word.hpp"
 
@@ -30,8 +30,8 @@ std::string submit_fleet(const FleetConfig& config, int tasks, int workers) {
   const ExternalEnd end = run_external(words, "", "slurm-client");
   const std::string first = end.messages.substr(0, end.messages.find('\n'));
   if (end.status != 0)
-    throw FileError(fmt::format("{}: not submitted: {}", config.file.string(),
-                                first.empty() ? "sbatch failed without a message" : first));
+    fail_file(config.file, "not submitted: {}",
+              first.empty() ? "sbatch failed without a message" : first);
   // NUMBER or NUMBER;CLUSTER, possibly after warnings.
   std::string number;
   std::istringstream lines(end.messages);

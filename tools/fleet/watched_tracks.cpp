@@ -6,8 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/tracking/tracked_parameters.hpp"
 #include "tools/fleet/fleet_schema.hpp"
 #include "tools/fleet/fleet_time.hpp"
@@ -28,8 +28,8 @@ double start_of(const WatchedLog& log, const WatchedTracks& tracks) {
   const std::optional<double> days =
       days_of(log.time_utc.empty() ? tracks.started_utc : log.time_utc);
   if (days) return *days;
-  throw std::invalid_argument(fmt::format(
-      "{}: the time of its log is unknown; give --time 2026-05-04T12:34:56Z", log.file.string()));
+  fail_request("{}: the time of its log is unknown; give --time 2026-05-04T12:34:56Z",
+               log.file.string());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/modal_assurance.hpp"
 #include "tools/report/report_diagrams.hpp"
 #include "tools/steps/fit_step.hpp"
@@ -22,12 +23,12 @@ void check_channels(const ReportData& own, const std::string& title, const Chann
   const ChannelList& own_outputs = own.frf ? own.frf->outputs : own.model->outputs;
   const ChannelList& own_inputs = own.frf ? own.frf->inputs : own.model->inputs;
   if (outputs.names == own_outputs.names && inputs.names == own_inputs.names) return;
-  throw std::invalid_argument(
-      fmt::format("{}: its channels differ from those of the report ({} x {}, first {} <- {}); "
-                  "compare results with the same channels",
-                  title, own_outputs.size(), own_inputs.size(),
-                  own_outputs.names.empty() ? "none" : own_outputs.names[0],
-                  own_inputs.names.empty() ? "none" : own_inputs.names[0]));
+  fail_request(
+      "{}: its channels differ from those of the report ({} x {}, first {} <- {}); "
+      "compare results with the same channels",
+      title, own_outputs.size(), own_inputs.size(),
+      own_outputs.names.empty() ? "none" : own_outputs.names[0],
+      own_inputs.names.empty() ? "none" : own_inputs.names[0]);
 }
 
 /// The columns of `other` on the lines of `own`; 0 x 0 if one is missing.

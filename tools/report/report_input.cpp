@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/files/input_files.hpp"
@@ -57,8 +56,7 @@ std::string kind_of(const std::filesystem::path& file) {
 
 void put(std::filesystem::path& place, const std::filesystem::path& file) {
   if (!place.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: {} is of the same kind; keep one", file.string(), place.string()));
+    fail_request("{}: {} is of the same kind; keep one", file.string(), place.string());
   place = file;
 }
 
@@ -84,10 +82,10 @@ void add_directory(ReportInput& input, const std::filesystem::path& directory) {
     if (part.name != nullptr && std::filesystem::exists(directory / part.name))
       put(input.*part.place, directory / part.name);
   if (input.frf.empty() && input.model.empty() && input.log.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: contains no frf.h5, model.json or run.slog; use the output directory of "
-                    "'stageid identify', or files",
-                    directory.string()));
+    fail_request(
+        "{}: contains no frf.h5, model.json or run.slog; use the output directory of "
+        "'stageid identify', or files",
+        directory.string());
 }
 
 /// The second response is the held-back one.
@@ -97,10 +95,10 @@ void add_file(ReportInput& input, const std::filesystem::path& file) {
   };
   const auto* const part = std::ranges::find_if(kParts, of_kind);
   if (part == std::end(kParts))
-    throw std::invalid_argument(
-        fmt::format("{}: cannot be shown in a report; remove it, or use a log, FRF, model, modes, "
-                    "summary, controller view or stage file of stageid",
-                    file.string()));
+    fail_request(
+        "{}: cannot be shown in a report; remove it, or use a log, FRF, model, modes, "
+        "summary, controller view or stage file of stageid",
+        file.string());
   put(input.*part->place, file);
 }
 
@@ -223,10 +221,8 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
       return std::filesystem::equivalent(file, other, none);
     };
     if (std::any_of(files.begin(), at, same))
-      throw std::invalid_argument(fmt::format(
-          "{}: duplicate file; the held-back data are a different file", file.string()));
-    if (!std::filesystem::exists(file))
-      throw FileError(fmt::format("{}: does not exist; check the path", file.string()));
+      fail_request("{}: duplicate file; the held-back data are a different file", file.string());
+    if (!std::filesystem::exists(file)) fail_file(file, "does not exist; check the path");
     if (std::filesystem::is_directory(file)) {
       add_directory(input, file);
     } else {
@@ -272,10 +268,10 @@ ReportData read_report_data(const ReportInput& input) {
 ComparedResult read_compared(const std::vector<std::filesystem::path>& files) {
   const ReportInput input = report_input(files);
   if (input.frf.empty() && input.model.empty())
-    throw std::invalid_argument(
-        fmt::format("--compare {}: contains neither an FRF nor a model; use the output directory "
-                    "of 'stageid identify', or an FRF or model file",
-                    files.at(0).string()));
+    fail_request(
+        "--compare {}: contains neither an FRF nor a model; use the output directory "
+        "of 'stageid identify', or an FRF or model file",
+        files.at(0).string());
   const std::filesystem::path first = std::filesystem::absolute(files.at(0)).lexically_normal();
   ComparedResult result;
   result.title = (first.has_filename() ? first : first.parent_path()).filename().string();

@@ -1,9 +1,8 @@
 #include "tools/report/report_page.hpp"
 
-#include <fmt/format.h>
-
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/report/html_page.hpp"
 #include "tools/report/report_json.hpp"
@@ -15,10 +14,9 @@ template <typename Matrix>
 void check_shape(const char* name, const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
   if (matrix.size() == 0) return;
   if (matrix.rows() != rows || matrix.cols() != columns)
-    throw std::invalid_argument(fmt::format("{}: got {} x {}; expected {} x {}, as the response",
-                                            name, matrix.rows(), matrix.cols(), rows, columns));
-  if (!matrix.allFinite())
-    throw std::invalid_argument(fmt::format("{}: contains values that are not finite", name));
+    fail_request("{}: got {} x {}; expected {} x {}, as the response", name, matrix.rows(),
+                 matrix.cols(), rows, columns);
+  if (!matrix.allFinite()) fail_request("{}: contains values that are not finite", name);
 }
 
 /// Each file was checked when it was read; here, those that do not belong together are refused.

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/output_file.hpp"
 
@@ -27,7 +27,7 @@ std::string read_bounded(const std::filesystem::path& file) {
   };
   if (!std::filesystem::is_regular_file(file)) fail("is not a regular file");
   if (std::filesystem::file_size(file) > kMostBytes)
-    throw FormatError(file, "", fmt::format("too large for a file of FFT plans; {}", kRemedy));
+    fail_format(file, "", "too large for a file of FFT plans; {}", kRemedy);
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
@@ -40,10 +40,10 @@ std::string checked_plans(const std::filesystem::path& file) {
   const std::string text = read_bounded(file);
   const std::size_t line = kFormat.size() + kFingerprintDigits + 1;
   if (!text.starts_with(kFormat) || text.size() < line)
-    throw FormatError(file, "", fmt::format("is not a file of FFT plans; {}", kRemedy));
+    fail_format(file, "", "is not a file of FFT plans; {}", kRemedy);
   std::string plans = text.substr(line);
   if (text.substr(0, line) != fmt::format("{}{}\n", kFormat, fingerprint_of(plans)))
-    throw FormatError(file, "", fmt::format("is damaged; {}", kRemedy));
+    fail_format(file, "", "is damaged; {}", kRemedy);
   return plans;
 }
 
@@ -58,9 +58,8 @@ FftWisdomFile::FftWisdomFile(std::filesystem::path file) : file_(std::move(file)
   try {
     wisdom_ = std::make_unique<FftWisdom>(kept_);
   } catch (const std::invalid_argument&) {
-    throw FormatError(
-        file_, "",
-        fmt::format("contains plans for another FFTW version or processor type; {}", kRemedy));
+    fail_format(file_, "", "contains plans for another FFTW version or processor type; {}",
+                kRemedy);
   }
 }
 

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
-#include <stdexcept>
 #include <system_error>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "acquisition/files/system_reason.hpp"
@@ -21,9 +20,8 @@ void require_no_input(const std::filesystem::path& file,
   for (const std::filesystem::path& input : inputs) {
     std::error_code none;  // if one of them does not exist, they are not the same
     if (std::filesystem::equivalent(file, input, none))
-      throw std::invalid_argument(
-          fmt::format("{}: is an input file and would be overwritten; choose another name with -o",
-                      file.string()));
+      fail_request("{}: is an input file and would be overwritten; choose another name with -o",
+                   file.string());
   }
 }
 
@@ -42,15 +40,14 @@ void require_readable(const std::filesystem::path& file) {
   note_input(file);
   errno = 0;
   if (!std::ifstream(file, std::ios::binary) || std::filesystem::is_directory(file))
-    throw FileError(fmt::format("{}: cannot be read: {}", file.string(),
-                                system_reason(errno != 0 ? errno : EISDIR)));
+    fail_file(file, "cannot be read: {}", system_reason(errno != 0 ? errno : EISDIR));
 }
 
 void require_ending(const std::filesystem::path& file, const std::string& what,
                     const std::vector<std::string>& endings) {
   if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
-  throw std::invalid_argument(fmt::format("{}: {} is written as {}; use a name with that ending",
-                                          file.string(), what, fmt::join(endings, ", ")));
+  fail_request("{}: {} is written as {}; use a name with that ending", file.string(), what,
+               fmt::join(endings, ", "));
 }
 
 void require_model_ending(const std::filesystem::path& file) {
@@ -65,8 +62,8 @@ void require_directory(const std::filesystem::path& directory, const std::string
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error || !std::filesystem::is_directory(directory))
-    throw FileError(fmt::format("{}: cannot create the directory: {}; {}", directory.string(),
-                                error ? error.message() : "a file of that name exists", remedy));
+    fail_file(directory, "cannot create the directory: {}; {}",
+              error ? error.message() : "a file of that name exists", remedy);
 }
 
 }  // namespace stageid

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "estimation/request/request_flags.hpp"
 #include "tools/fit/fit_words.hpp"
@@ -24,8 +25,7 @@ constexpr std::size_t kLongestWord = 64;
 double require_number(const Json& action, const char* key, double low, double high) {
   const std::optional<double> value = number_in(action, key);
   if (!value || !(*value > low && *value < high))
-    throw std::invalid_argument(
-        fmt::format("{}: expected a number above {} and below {}", key, low, high));
+    fail_request("{}: expected a number above {} and below {}", key, low, high);
   return *value;
 }
 
@@ -35,8 +35,7 @@ Edit add_mode(const Json& action, FitRequest request) {
                                               ? require_number(action, "damping_ratio", 0.0, 1.0)
                                               : ModeCandidate{}.damping_ratio);
   std::vector<ModeCandidate>& modes = request.modes.given;
-  if (modes.size() >= kMostModes)
-    throw std::invalid_argument(fmt::format("at most {} modes", kMostModes));
+  if (modes.size() >= kMostModes) fail_request("at most {} modes", kMostModes);
   modes.insert(std::ranges::upper_bound(modes, mode.frequency_hz, {}, &ModeCandidate::frequency_hz),
                mode);
   request.modes.kind = Modes::given;
@@ -51,9 +50,9 @@ Edit remove_mode(const Json& action, FitRequest request) {
   };
   const auto nearest = std::ranges::min_element(modes, {}, distance);
   if (nearest == modes.end() || distance(*nearest) > kSameMode * frequency_hz)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "no mode at {:.6g} Hz can be removed; that of a suspension belongs to the rigid body",
-        frequency_hz));
+        frequency_hz);
   const std::string what = fmt::format("removed {:.6g} Hz", nearest->frequency_hz);
   modes.erase(nearest);
   if (modes.empty()) request.modes.kind = Modes::none;
@@ -107,7 +106,7 @@ Edit refit(const Json& action, FitRequest request) {
     const auto given = action.find(key);
     if (given == action.end()) continue;
     if (!given->is_string() || given->get_ref<const std::string&>().size() > kLongestWord)
-      throw std::invalid_argument(fmt::format("{}: expected a word", key));
+      fail_request("{}: expected a word", key);
     auto word = given->get<std::string>();
     if (member == &FitWords::residue_rank && word.empty()) word = "full";
     if (words.*member == word) continue;
@@ -116,7 +115,7 @@ Edit refit(const Json& action, FitRequest request) {
   }
   if (!words.weighting.empty() && (!from_word<Weighting>(words.weighting) ||
                                    from_word<Weighting>(words.weighting) == Weighting::user))
-    throw std::invalid_argument(fmt::format("weighting: '{}' is unknown", words.weighting));
+    fail_request("weighting: '{}' is unknown", words.weighting);
   words.modes = modes_word(action);
   FitRequest parsed;
   parse_fit_words(words, parsed);

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "estimation/request/request_flags.hpp"
 #include "tools/steps/fit_step.hpp"
@@ -31,9 +31,8 @@ ReportInput input_of(const std::vector<std::filesystem::path>& files) {
   ReportInput input = report_input(files);
   input.all_lines = true;
   if (input.frf.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: contains no FRF; add the FRF to which the model is fitted",
-                    files.empty() ? "open" : files.front().string()));
+    fail_request("{}: contains no FRF; add the FRF to which the model is fitted",
+                 files.empty() ? "open" : files.front().string());
   return input;
 }
 
@@ -59,9 +58,8 @@ FitState first_state(const ReportInput& input, const FrfEstimate& frf, const Sta
   }
   auto model = std::make_shared<const AdditiveModel>(read_model(input.model));
   if (model->inputs.names != frf.inputs.names || model->outputs.names != frf.outputs.names)
-    throw std::invalid_argument(
-        fmt::format("{}: its channels are not those of {}; open a model of this response",
-                    input.model.string(), input.frf.string()));
+    fail_request("{}: its channels are not those of {}; open a model of this response",
+                 input.model.string(), input.frf.string());
   state.request = request_of(*model);
   std::filesystem::path& weights = state.request.weight_file;
   if (!weights.empty() && weights.is_relative()) weights = input.frf.parent_path() / weights;
