@@ -59,13 +59,25 @@ inline CLI::Option* add_band(CLI::App& command, std::vector<double>& band_hz,
       ->check(kNotNegative);
 }
 
+/// An option whose value has this name in help.
+template <typename Value, typename... Checks>
+CLI::Option* add_value(CLI::App& command, const std::string& name, Value& value, const char* type,
+                       const std::string& help, const Checks&... checks) {
+  CLI::Option* option = command.add_option(name, value, help)->type_name(type);
+  (option->check(checks), ...);
+  return option;
+}
+
+/// The same with a default, which help shows.
+template <typename Value, typename... Checks>
+CLI::Option* add_setting(CLI::App& command, const std::string& name, Value& value, const char* type,
+                         const std::string& help, const Checks&... checks) {
+  return add_value(command, name, value, type, help, checks...)->capture_default_str();
+}
+
 inline void add_threads(CLI::App& command, int& threads) {
-  command
-      .add_option("--threads", threads,
-                  "number of threads; 0: all cores. The result does not depend on it")
-      ->type_name("COUNT")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_setting(command, "--threads", threads, "COUNT",
+              "number of threads; 0: all cores. The result does not depend on it", kNotNegative);
 }
 
 inline void add_force(CLI::App& command, bool& force) {

@@ -1,15 +1,12 @@
 #include "tools/commands/commands.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "hal/can/can_c_header.hpp"
 #include "hal/can/can_dbc.hpp"
@@ -75,8 +72,8 @@ void print_schema(const ConfigFlags& flags, Console& console) {
   for (const FileKind& kind : kFileKinds) {
     if (!flags.kind.empty() && flags.kind != kind.name) continue;
     const std::vector<SchemaEntry> entries = config_schema(kind.describe);
-    console.result(fmt::format("# {} file. Units are SI and part of the key names.\n{}", kind.title,
-                               schema_text(entries)));
+    console.result("# {} file. Units are SI and part of the key names.\n{}", kind.title,
+                   schema_text(entries));
     json[kind.name] = schema_json(entries);
   }
   console.result(json);
@@ -86,25 +83,23 @@ void check_file(const std::filesystem::path& file, Console& console) {
   if (format_of(file) == "stageid-stage") {
     const StageConfig stage = load_stage_config(file);
     require_stable_loop(stage, console);
-    console.result(fmt::format("{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
-                               counted(stage.spec.info.actuators.size(), "actuator"),
-                               counted(stage.spec.info.sensors.size(), "sensor"),
-                               stage.spec.info.sample_rate_hz));
+    console.result("{}: stage '{}', {}, {}, {} Hz", file.string(), stage.spec.info.name,
+                   counted(stage.spec.info.actuators.size(), "actuator"),
+                   counted(stage.spec.info.sensors.size(), "sensor"),
+                   stage.spec.info.sample_rate_hz);
     return;
   }
   if (format_of(file) == "stageid-fleet") {
     const FleetConfig fleet = load_fleet_config(file);
-    console.result(
-        fmt::format("{}: {}", file.string(), counted(fleet_logs(fleet, console).size(), "log")));
+    console.result("{}: {}", file.string(), counted(fleet_logs(fleet, console).size(), "log"));
     return;
   }
   const ExperimentConfig experiment = load_experiment_config(file);
   const ExperimentPlan plan = outline_plan(experiment);
   if (!experiment.limits || std::filesystem::exists(experiment.limits->prior))
     require_stable_loop(experiment, console);
-  console.result(fmt::format("{}: {}, {:.1f} min, {}", file.string(),
-                             counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
-                             counted(plan.grid().size(), "line")));
+  console.result("{}: {}, {:.1f} min, {}", file.string(), counted(plan.runs().size(), "run"),
+                 plan.duration_s() / 60.0, counted(plan.grid().size(), "line"));
 }
 
 void check_config(const ConfigFlags& flags, Console& console) {
@@ -135,13 +130,12 @@ template <bool kHeader>
 void write_can_file(const ConfigFlags& flags, Console& console) {
   const StageConfig stage = load_stage_config(flags.stage_file);
   if (!stage.can.present)
-    throw std::invalid_argument(fmt::format("{}: has no group 'can'; see 'stageid config schema'",
-                                            flags.stage_file.string()));
+    fail_request("{}: has no group 'can'; see 'stageid config schema'", flags.stage_file.string());
   const StageInfo& info = stage.spec.info;
   const CanLayout layout = can_layout(stage.can.spec, info);
   write_text_file(flags.output,
                   kHeader ? can_c_header(layout, info, stage.spec.limits) : can_dbc(layout, info));
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   console.result({{"file", flags.output.string()}});
 }
 

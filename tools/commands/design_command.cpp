@@ -110,12 +110,12 @@ void write_limited(const DesignFlags& flags, Console& console, const ExperimentC
                    const LimitedPlan& limited) {
   const ExperimentPlan& plan = limited.design.plan;
   write_experiment_plan(flags.output, plan);
-  console.result(fmt::format("{}, {:.1f} min in total; {}; prior {}",
-                             counted(plan.runs().size(), "run"), plan.duration_s() / 60.0,
-                             counted(plan.grid().size(), "line"), config.limits->prior.string()));
+  console.result("{}, {:.1f} min in total; {}; prior {}", counted(plan.runs().size(), "run"),
+                 plan.duration_s() / 60.0, counted(plan.grid().size(), "line"),
+                 config.limits->prior.string());
   for (const LinkLoad& link : link_loads(config.stage)) console.result(to_string(link));
   for (const std::string& line : limited_table(limited, flags.accuracy)) console.result(line);
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   Json json = {{"runs", plan.runs().size()},
                {"duration_s", plan.duration_s()},
                {"log_bytes", expected_log_bytes(plan, config.stage.spec.info)},
@@ -150,13 +150,13 @@ void design_watch(const DesignFlags& flags, Console& console, const ExperimentCo
     json["tracked"].push_back({{"name", name}, {"deviation", deviation}});
     if (std::isfinite(detected_s)) json["tracked"].back()["detected_s"] = detected_s;
   }
-  console.result(fmt::format(
+  console.result(
       "{}, {:.6g} ... {:.6g} Hz; the largest deviation of a natural frequency is within {:.1g} % "
       "of the optimum for these phases",
       counted(plan.lines.size(), "line"), plan.lines.front() / period_s,
-      plan.lines.back() / period_s, 100.0 * std::expm1(0.5 * plan.gap)));
+      plan.lines.back() / period_s, 100.0 * std::expm1(0.5 * plan.gap));
   for (const std::string& line : table_lines(rows)) console.result(line);
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   console.result(json);
 }
 
@@ -180,7 +180,7 @@ void design(const DesignFlags& flags, Console& console) {
   if (written) write_experiment_plan(flags.output, plan);
   for (const std::string& line : design_table(config, plan, prediction)) console.result(line);
   require_within_limits(config, prediction, flags.force, console);
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   console.result(design_json(config, plan, prediction));
 }
 
@@ -195,12 +195,10 @@ void design_command(CLI::App& app, Console& console) {
       .add_option("-o,--output", flags.output,
                   "HDF5 file to write; with --watch an experiment file")
       ->required();
-  command
-      .add_option("--accuracy", flags.accuracy,
-                  "print the measuring time for this mean relative variance of the response, e.g. "
-                  "1e-6 for 0.1 % rms; needs level.limits")
-      ->type_name("VARIANCE")
-      ->check(kPositive);
+  add_value(command, "--accuracy", flags.accuracy, "VARIANCE",
+            "print the measuring time for this mean relative variance of the response, e.g. "
+            "1e-6 for 0.1 % rms; needs level.limits",
+            kPositive);
   CLI::Option* watch = command.add_option(
       "--watch", flags.watch.model,
       "design a permanent excitation that tracks this model.json: an experiment file (.yaml) with "

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "frf/file/frf_file.hpp"
@@ -39,9 +40,8 @@ Eigen::VectorXd default_lines(const AdditiveModel& model) {
 Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {
   const auto found = std::find(channels.names.begin(), channels.names.end(), name);
   if (found == channels.names.end())
-    throw std::invalid_argument(
-        fmt::format("--driving-point: '{}' is not an {} of the model; use one of {}", name, kind,
-                    fmt::join(channels.names, ", ")));
+    fail_request("--driving-point: '{}' is not an {} of the model; use one of {}", name, kind,
+                 fmt::join(channels.names, ", "));
   return found - channels.names.begin();
 }
 
@@ -74,9 +74,8 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   const AdditiveModel model = read_model(flags.input);
   const Eigen::VectorXd frequency_hz = lines_of(flags, model);
   if (frequency_hz.size() == 0)
-    throw std::invalid_argument(
-        fmt::format("{}: the model does not contain its band; define the lines with --frf FRF",
-                    flags.input.string()));
+    fail_request("{}: the model does not contain its band; define the lines with --frf FRF",
+                 flags.input.string());
   const StageConfig stage = load_stage_config(flags.stage);
   Eigen::MatrixXd covariance;
   if (!flags.covariance.empty()) covariance = read_covariance(flags.covariance, model);
@@ -84,16 +83,16 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   view.model_fingerprint = fingerprint_of_file(flags.input);
   write_controller_view(flags.output, view);
   for (const std::string& line : controller_view_lines(view)) console.result(line);
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   nlohmann::ordered_json json = {{"output", flags.output.string()}};
   json.update(controller_view_json(view, false));
   console.result(json);
   if (view.view.poles.stable()) return;
   console.exit_code = kNotTrustworthy;
   console.warning(
-      fmt::format("{}: the closed loop of the model is unstable, so it has no margins. Use the "
-                  "stage file of the measurement, or correct its controller",
-                  flags.stage.string()));
+      "{}: the closed loop of the model is unstable, so it has no margins. Use the stage file of "
+      "the measurement, or correct its controller",
+      flags.stage.string());
 }
 
 /// A simulation or an observer with such a mode runs away.
@@ -101,9 +100,9 @@ void warn_if_unstable(const AdditiveModel& model, const std::filesystem::path& f
                       Console& console) {
   for (const Submodel& s : model.submodels)
     if (s.is_mode() && s.damping_ratio() < 0.0)
-      return console.warning(fmt::format(
+      return console.warning(
           "{}: the mode at {:.6g} Hz is unstable (damping ratio {:.3g}); do not simulate the model",
-          file.string(), s.natural_frequency_hz(), s.damping_ratio()));
+          file.string(), s.natural_frequency_hz(), s.damping_ratio());
 }
 
 void export_from_model(const ExportFlags& flags, Console& console) {
@@ -122,10 +121,10 @@ void export_from_model(const ExportFlags& flags, Console& console) {
 
 void export_from_frf(const ExportFlags& flags) {
   if (!flags.frf.empty() || !flags.driving_point.empty() || !flags.stage.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: is an HDF5 file, not a model; --frf, --driving-point and "
-                    "--controller-view need a model.json",
-                    flags.input.string()));
+    fail_request(
+        "{}: is an HDF5 file, not a model; --frf, --driving-point and "
+        "--controller-view need a model.json",
+        flags.input.string());
   require_no_input(flags.output, {flags.input});
   const FrfEstimate frf = read_frf(flags.input);
   require_ending(flags.output, "the frequency response of " + flags.input.string(),
@@ -142,8 +141,8 @@ void export_file(const ExportFlags& flags, Console& console) {
     return export_controller_view(flags, console);
   else
     export_from_model(flags, console);
-  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
-                             std::filesystem::file_size(flags.output)));
+  console.result("wrote {}, {} bytes", flags.output.string(),
+                 std::filesystem::file_size(flags.output));
   console.result(
       {{"output", flags.output.string()}, {"bytes", std::filesystem::file_size(flags.output)}});
 }
@@ -165,11 +164,9 @@ void export_command(CLI::App& app, Console& console) {
   command.add_option(
       "--frf", flags.frf,
       "for a model: evaluate the response at the lines of this FRF, within the band of the fit");
-  command
-      .add_option("--driving-point", flags.driving_point,
-                  "OUTPUT INPUT at the same point and in the same direction: add the modal mass of "
-                  "each mode at this point to .h5, .mat or .npz")
-      ->type_name("CHANNEL")
+  add_value(command, "--driving-point", flags.driving_point, "CHANNEL",
+            "OUTPUT INPUT at the same point and in the same direction: add the modal mass of "
+            "each mode at this point to .h5, .mat or .npz")
       ->expected(2);
   command.add_option(
       "--controller-view", flags.stage,

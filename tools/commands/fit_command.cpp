@@ -1,7 +1,5 @@
 #include "tools/commands/commands.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -60,7 +58,7 @@ void fit(const FitCommandFlags& flags, Console& console) {
   setup.options.covariance = !flags.covariance.empty();
   for (const std::string& doubt :
        health_notes(health_of(setup.frf.provenance_json), Severity::doubt))
-    console.warning(fmt::format("{}: {}", flags.frf.string(), doubt));
+    console.warning("{}: {}", flags.frf.string(), doubt);
   const FitStep step = fit_with_progress(setup, flags.frf.filename().string(),
                                          fingerprint_of_file(flags.frf), console);
   const FitResult& result = step.result;
@@ -73,9 +71,8 @@ void fit(const FitCommandFlags& flags, Console& console) {
   console.result(cost_line(result.cost));
   for (const std::string& line : mode_table(result.model)) console.result(line);
   for (const std::string& line : delay_lines(result.model)) console.result(line);
-  console.result(fmt::format("{}: {}, {} ({})", flags.output.string(),
-                             relative_error_text(result.model.fit), to_string(result.status()),
-                             result.message()));
+  console.result("{}: {}, {} ({})", flags.output.string(), relative_error_text(result.model.fit),
+                 to_string(result.status()), result.message());
   const bool whole = told || flags.covariance.empty();
   console.exit_code = fit_exit_code(result, whole);
   ResultFiles files;
@@ -96,13 +93,13 @@ void fit(const FitCommandFlags& flags, Console& console) {
   console.result(json);
   if (!explain_the_rest(verdict.problems)) {
     for (const std::string& warning : setup.warnings)
-      console.warning(fmt::format("{}: {}", flags.frf.string(), warning));
+      console.warning("{}: {}", flags.frf.string(), warning);
     for (const std::string& finding : findings_beside_message(result))
-      console.warning(fmt::format("{}: {}", flags.output.string(), finding));
+      console.warning("{}: {}", flags.output.string(), finding);
   }
   if (!whole)
-    console.warning(fmt::format("{}: not written: {}", flags.covariance.string(),
-                                result.decisions.empty() ? "" : result.decisions.back()));
+    console.warning("{}: not written: {}", flags.covariance.string(),
+                    result.decisions.empty() ? "" : result.decisions.back());
   if (!verdict.trustworthy) warn_of(verdict.problems, flags.output, console);
 }
 
@@ -144,14 +141,12 @@ void fit_command(CLI::App& app, Console& console) {
                   "full | 1: each residue is phi psi^T with one pair of mode shapes, as for a "
                   "mechanical mode")
       ->capture_default_str();
-  command
-      .add_option("--submodel", flags.words.submodels,
-                  "add the term (B_0 + ... + B_m s^m) / (s^l A) with a polynomial A of order n, "
-                  "e.g. n=4,m=3,f=120:180,zeta=0.01; repeatable. l: number of integrators, default "
-                  "0. m: default n + l - 1. f: starting frequencies in Hz, one per pole pair, and "
-                  "last that of the real pole if n is odd; default: found by a search. zeta: "
-                  "starting damping ratio. n=auto: one denominator for all modes found by a search")
-      ->type_name("TERM")
+  add_value(command, "--submodel", flags.words.submodels, "TERM",
+            "add the term (B_0 + ... + B_m s^m) / (s^l A) with a polynomial A of order n, "
+            "e.g. n=4,m=3,f=120:180,zeta=0.01; repeatable. l: number of integrators, default "
+            "0. m: default n + l - 1. f: starting frequencies in Hz, one per pole pair, and "
+            "last that of the real pole if n is odd; default: found by a search. zeta: "
+            "starting damping ratio. n=auto: one denominator for all modes found by a search")
       ->allow_extra_args(false);
   command.add_option("--damping", flags.words.damping,
                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
@@ -160,17 +155,13 @@ void fit_command(CLI::App& app, Console& console) {
       .add_option("--method", flags.words.method,
                   "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
       ->capture_default_str();
-  command.add_option("--max-iterations", flags.request.max_iterations, "iterations per fit")
-      ->type_name("COUNT")
-      ->capture_default_str();
-  command
-      .add_option("--search-seconds", flags.request.search_seconds,
-                  "limit of the search, in seconds of work on a typical core, so that the result "
-                  "does not depend on the machine. At the limit, the best model so far is written "
-                  "and the exit code is 3. 0: unlimited")
-      ->type_name("SECONDS")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_setting(command, "--max-iterations", flags.request.max_iterations, "COUNT",
+              "iterations per fit");
+  add_setting(command, "--search-seconds", flags.request.search_seconds, "SECONDS",
+              "limit of the search, in seconds of work on a typical core, so that the result "
+              "does not depend on the machine. At the limit, the best model so far is written "
+              "and the exit code is 3. 0: unlimited",
+              kNotNegative);
   add_threads(command, flags.request.threads);
 }
 

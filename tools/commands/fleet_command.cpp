@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -33,8 +34,7 @@ using Json = nlohmann::ordered_json;
 
 void require_time(const char* flag, const std::string& text) {
   if (!text.empty() && !days_of(text))
-    throw std::invalid_argument(
-        fmt::format("{}: got '{}'; expected 2026-05-04 or 2026-05-04T12:34:56Z", flag, text));
+    fail_request("{}: got '{}'; expected 2026-05-04 or 2026-05-04T12:34:56Z", flag, text);
 }
 
 /// stageid fleet FLEET.yaml
@@ -53,13 +53,13 @@ bool submit_jobs(const FleetFlags& flags, const FleetConfig& config,
   const std::string number = submit_fleet(config, tasks, flags.workers);
   if (!is_database_url(config.store))
     console.message(
-        fmt::format("{}: this kind of store needs all tasks on the machine of its "
-                    "disk; for several machines, set 'store: postgresql://...'",
-                    shown_place(config.store)));
-  console.result(fmt::format(
+        "{}: this kind of store needs all tasks on the machine of its disk; for several machines, "
+        "set 'store: postgresql://...'",
+        shown_place(config.store));
+  console.result(
       "Slurm job {}: {} share {}; 'squeue -j {}' shows them. When they have ended, run the command "
       "again without --slurm",
-      number, counted(tasks, "task"), counted(jobs, "job"), number));
+      number, counted(tasks, "task"), counted(jobs, "job"), number);
   console.result({{"slurm_job", number}, {"tasks", tasks}, {"open_jobs", jobs}});
   return true;
 }
@@ -73,10 +73,9 @@ void run_jobs(const FleetFlags& flags, Console& console) {
   const FleetSummary summary = run_fleet(config, logs, flags.workers, console);
   FleetStore store(config.store, Database::Access::write);
   pair_fleet(store);
-  console.result(
-      fmt::format("{}: {}: {} done before, {} done now, {} of them not trustworthy; {} failed",
-                  shown_place(config.store), counted(summary.jobs, "job"), summary.done_before,
-                  summary.done, summary.not_trustworthy, summary.failed));
+  console.result("{}: {}: {} done before, {} done now, {} of them not trustworthy; {} failed",
+                 shown_place(config.store), counted(summary.jobs, "job"), summary.done_before,
+                 summary.done, summary.not_trustworthy, summary.failed);
   console.result({{"store", shown_place(config.store)},
                   {"jobs", summary.jobs},
                   {"done_before", summary.done_before},
@@ -84,8 +83,8 @@ void run_jobs(const FleetFlags& flags, Console& console) {
                   {"not_trustworthy", summary.not_trustworthy},
                   {"failed", summary.failed}});
   if (summary.failed > 0)
-    console.warning(fmt::format("{}: {} failed; remove the cause and run the command again",
-                                shown_place(config.store), counted(summary.failed, "job")));
+    console.warning("{}: {} failed; remove the cause and run the command again",
+                    shown_place(config.store), counted(summary.failed, "job"));
   console.exit_code = summary.failed > 0            ? kWorldFailed
                       : summary.not_trustworthy > 0 ? kNotTrustworthy
                                                     : kDone;
@@ -104,8 +103,7 @@ void run_job(const FleetJobFlags& flags, Console& console) {
   require_time("--time", log.time_utc);
   for (const std::string& tag : flags.tags) {
     const std::size_t at = tag.find('=');
-    if (at == std::string::npos)
-      throw std::invalid_argument(fmt::format("--tag: got '{}'; expected NAME=VALUE", tag));
+    if (at == std::string::npos) fail_request("--tag: got '{}'; expected NAME=VALUE", tag);
     log.tags.emplace_back(tag.substr(0, at), tag.substr(at + 1));
   }
   require_readable(log.file);
@@ -119,8 +117,8 @@ void run_job(const FleetJobFlags& flags, Console& console) {
     if (identification.verdict == IdentificationVerdict::not_trustworthy)
       console.exit_code = kNotTrustworthy;
   }
-  console.result(fmt::format("{}: {}", job_folder(config.results, job).string(),
-                             added ? "done" : "was done before"));
+  console.result("{}: {}", job_folder(config.results, job).string(),
+                 added ? "done" : "was done before");
   console.result({{"job", job}, {"added", added}});
 }
 
@@ -135,8 +133,8 @@ void add_watched_log(const FleetAddFlags& flags, Console& console) {
   require_readable(flags.log.file);
   FleetStore store(flags.store, Database::Access::create);
   const std::size_t rows = add_watched(store, flags.log);
-  console.result(fmt::format("{}: {} of stage '{}'", shown_place(flags.store),
-                             counted(rows, "watched value"), flags.log.stage));
+  console.result("{}: {} of stage '{}'", shown_place(flags.store), counted(rows, "watched value"),
+                 flags.log.stage);
   console.result({{"stage", flags.log.stage}, {"values", rows}});
 }
 
@@ -154,7 +152,7 @@ void report_fleet(const FleetReportFlags& flags, Console& console) {
   require_time("--until", flags.request.until);
   pair_fleet(store);  // jobs of other processes
   write_text_file(flags.request.output, fleet_page(store, flags.request));
-  console.result(fmt::format("wrote {}", flags.request.output.string()));
+  console.result("wrote {}", flags.request.output.string());
   console.result({{"output", flags.request.output.string()}});
 }
 
@@ -172,9 +170,8 @@ bool is_name(const std::string& text) {
 void require_table(const Database& database, const std::string& name) {
   const std::vector<std::string> tables = database.tables();
   if (std::ranges::find(tables, name) == tables.end())
-    throw std::invalid_argument(
-        fmt::format("{}: unknown table '{}'; use one of {}, or an SQL statement", database.name(),
-                    name, fmt::join(tables, ", ")));
+    fail_request("{}: unknown table '{}'; use one of {}, or an SQL statement", database.name(),
+                 name, fmt::join(tables, ", "));
 }
 
 Json value_of(const Statement& row, int column) {
@@ -195,8 +192,7 @@ void query_fleet(const FleetQueryFlags& flags, Console& console) {
   Statement rows =
       store.database().prepare(is_name(flags.sql) ? "SELECT * FROM " + flags.sql : flags.sql);
   if (!rows.changes_nothing() || rows.columns() == 0)
-    throw std::invalid_argument(
-        fmt::format("{}: expected a table or a SELECT statement", shown_place(flags.store)));
+    fail_request("{}: expected a table or a SELECT statement", shown_place(flags.store));
   std::vector<std::vector<std::string>> table(1);
   for (int c = 0; c < rows.columns(); ++c) table[0].push_back(rows.name(c));
   Json list = Json::array();
@@ -221,7 +217,7 @@ void query_fleet(const FleetQueryFlags& flags, Console& console) {
     for (std::size_t c = 0; c < row.size(); ++c)
       text += csv_field(row[c]) + (c + 1 < row.size() ? "," : "\n");
   write_text_file(flags.csv, text);
-  console.result(fmt::format("wrote {}: {}", flags.csv.string(), counted(table.size() - 1, "row")));
+  console.result("wrote {}: {}", flags.csv.string(), counted(table.size() - 1, "row"));
 }
 
 }  // namespace
@@ -233,8 +229,7 @@ void fleet_command(CLI::App& app, Console& console) {
   // Before the subcommand runs: its surplus arguments end up here.
   fleet.parse_complete_callback([&fleet, flags] {
     if (!fleet.get_subcommands().empty() && !flags->config.empty())
-      throw std::invalid_argument(fmt::format(
-          "unexpected argument '{}'; see 'stageid fleet --help'", flags->config.string()));
+      fail_request("unexpected argument '{}'; see 'stageid fleet --help'", flags->config.string());
     if (fleet.get_subcommands().empty() && flags->config.empty())
       throw std::invalid_argument(
           "fleet: a fleet file or a subcommand is missing; see 'stageid fleet --help'");
@@ -243,29 +238,23 @@ void fleet_command(CLI::App& app, Console& console) {
     if (!flags->config.empty()) run_jobs(*flags, console);
   });
   fleet.add_option("config", flags->config, "fleet file (.yaml)");
-  fleet.add_option("--workers", flags->workers, "jobs at a time; 0: one per core")
-      ->type_name("COUNT")
-      ->check(kNotNegative)
-      ->capture_default_str();
-  fleet
-      .add_option("--slurm", flags->slurm_tasks,
-                  "submit this many tasks to Slurm, which share the jobs; sbatch reads its options "
-                  "from SBATCH_... in the environment")
-      ->type_name("TASKS")
-      ->check(kPositive);
+  add_setting(fleet, "--workers", flags->workers, "COUNT", "jobs at a time; 0: one per core",
+              kNotNegative);
+  add_value(fleet, "--slurm", flags->slurm_tasks, "TASKS",
+            "submit this many tasks to Slurm, which share the jobs; sbatch reads its options "
+            "from SBATCH_... in the environment",
+            kPositive);
 
   auto [job, job_flags] =
       add_command(fleet, console, "job",
                   "Run one job, as 'stageid fleet' does for every log; for schedulers", run_job);
   job.add_option("config", job_flags.config, "fleet file (.yaml)")->required();
   job.add_option("log", job_flags.log.file, "its log")->required();
-  job.add_option("--stage", job_flags.log.stage, "name of the stage; default: see 'stage_name'")
-      ->type_name("NAME");
-  job.add_option("--time", job_flags.log.time_utc,
-                 "time of the measurement, ISO 8601 in UTC; default: that in the log")
-      ->type_name("TIME");
-  job.add_option("--tag", job_flags.tags, "NAME=VALUE; repeatable")
-      ->type_name("NAME=VALUE")
+  add_value(job, "--stage", job_flags.log.stage, "NAME",
+            "name of the stage; default: see 'stage_name'");
+  add_value(job, "--time", job_flags.log.time_utc, "TIME",
+            "time of the measurement, ISO 8601 in UTC; default: that in the log");
+  add_value(job, "--tag", job_flags.tags, "NAME=VALUE", "NAME=VALUE; repeatable")
       ->allow_extra_args(false);
 
   auto [add, add_flags] = add_command(
@@ -274,12 +263,9 @@ void fleet_command(CLI::App& app, Console& console) {
   add.add_option("store", add_flags.store, "store of a fleet (.db, or postgresql://...)")
       ->required();
   add.add_option("tracks", add_flags.log.file, "watch.h5")->required();
-  add.add_option("--stage", add_flags.log.stage, "name of the stage")
-      ->type_name("NAME")
-      ->required();
-  add.add_option("--time", add_flags.log.time_utc,
-                 "start of the log, ISO 8601 in UTC; default: that in the log")
-      ->type_name("TIME");
+  add_value(add, "--stage", add_flags.log.stage, "NAME", "name of the stage")->required();
+  add_value(add, "--time", add_flags.log.time_utc, "TIME",
+            "start of the log, ISO 8601 in UTC; default: that in the log");
 
   auto [report, report_flags] = add_command(
       fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
@@ -287,13 +273,11 @@ void fleet_command(CLI::App& app, Console& console) {
       ->required();
   report.add_option("-o,--output", report_flags.request.output, "page to write (.html)")
       ->required();
-  report.add_option("--stage", report_flags.request.stages, "stages to show; default: all")
-      ->type_name("NAME");
-  report
-      .add_option("--since", report_flags.request.since, "first time to show, such as 2026-05-04")
-      ->type_name("TIME");
-  report.add_option("--until", report_flags.request.until, "end of the time to show, not included")
-      ->type_name("TIME");
+  add_value(report, "--stage", report_flags.request.stages, "NAME", "stages to show; default: all");
+  add_value(report, "--since", report_flags.request.since, "TIME",
+            "first time to show, such as 2026-05-04");
+  add_value(report, "--until", report_flags.request.until, "TIME",
+            "end of the time to show, not included");
 
   auto [query, query_flags] = add_command(
       fleet, console, "query", "Print a table of a store, or write it as CSV", query_fleet);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/formats/open_log.hpp"
@@ -83,8 +84,8 @@ void estimate_response(const FrfFlags& flags, Console& console) {
   FrfOptions options = flags.options;
   for (const int realization : flags.realizations) {
     if (realization < 1)
-      throw std::invalid_argument(fmt::format(
-          "--realizations: {} is out of range; realizations are counted from 1", realization));
+      fail_request("--realizations: {} is out of range; realizations are counted from 1",
+                   realization);
     options.realizations.push_back(realization - 1);
   }
   if (flags.delay_s && flags.compensate == Compensation::none)
@@ -110,12 +111,12 @@ void estimate_response(const FrfFlags& flags, Console& console) {
   }
   if (console.team->rank() == 0) write_frf(flags.output, step.frf);
   const double rate = step.seconds > 0.0 ? step.bytes / step.seconds / 1e6 : 0.0;
-  console.result(fmt::format("{}: {}", flags.output.string(), describe(step.frf)));
-  console.result(fmt::format("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6,
-                             step.seconds, rate));
+  console.result("{}: {}", flags.output.string(), describe(step.frf));
+  console.result("{:.1f} MB of samples in {:.2f} s, {:.0f} MB/s", step.bytes / 1e6, step.seconds,
+                 rate);
   if (step.frf.noise_variance.size() > 0)
-    console.result(fmt::format("median relative standard deviation from noise: {:.2e}",
-                               median_relative_std(step.frf, step.frf.noise_variance)));
+    console.result("median relative standard deviation from noise: {:.2e}",
+                   median_relative_std(step.frf, step.frf.noise_variance));
   for (const std::string& line : linearity_lines(step.frf)) console.message(line);
   if (!flags.no_health)
     for (const std::string& line : health_lines(step.findings)) console.result(line);
@@ -133,54 +134,41 @@ void frf_command(CLI::App& app, Console& console) {
       app, console, "frf", "Estimate the plant's FRF from closed-loop logs", estimate_response);
   command.add_option("logs", flags.logs, "logs (.slog or .h5)")->required();
   command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
-  command
-      .add_option("--inputs", flags.options.inputs, "actuators A,B,...; default: the excited ones")
-      ->type_name("CHANNELS")
+  add_value(command, "--inputs", flags.options.inputs, "CHANNELS",
+            "actuators A,B,...; default: the excited ones")
       ->delimiter(',');
-  command.add_option("--outputs", flags.options.outputs, "sensors C,D,...; default: all")
-      ->type_name("CHANNELS")
+  add_value(command, "--outputs", flags.options.outputs, "CHANNELS",
+            "sensors C,D,...; default: all")
       ->delimiter(',');
-  command
-      .add_option("--realizations", flags.realizations,
-                  "counted from 1; default: all complete ones")
-      ->type_name("NUMBERS")
+  add_value(command, "--realizations", flags.realizations, "NUMBERS",
+            "counted from 1; default: all complete ones")
       ->delimiter(',');
-  command
-      .add_option(
-          "--transient-periods", flags.options.transient_periods,
-          "periods to discard at the start of each run; default: as declared in the log, 0 for lpm")
-      ->type_name("COUNT");
+  add_value(
+      command, "--transient-periods", flags.options.transient_periods, "COUNT",
+      "periods to discard at the start of each run; default: as declared in the log, 0 for lpm");
   add_choice(command, "--method", flags.options.method,
              "periodic: means over periods | lpm: local polynomial method, which models the "
              "transient in whole records");
   add_choice(command, "--periods", flags.options.periods,
              "consistent: replace short glitches, discard periods with bumps or transients (lpm: "
              "discard periods with glitches) | unmarked: use all periods without marked samples");
-  command
-      .add_option("--smooth-covariance", flags.options.covariance_lines,
-                  "odd number of neighbouring lines over which the noise covariance is averaged; "
-                  "more lines give it more degrees of freedom")
-      ->type_name("LINES")
-      ->check(kPositive)
-      ->capture_default_str();
+  add_setting(command, "--smooth-covariance", flags.options.covariance_lines, "LINES",
+              "odd number of neighbouring lines over which the noise covariance is averaged; "
+              "more lines give it more degrees of freedom",
+              kPositive);
   add_choice(command, "--covariance", flags.options.covariance,
              "diagonal: variances | full: also the covariances between channels");
   add_choice(command, "--compensate", flags.compensate,
              "remove from the response: none | delay | hold: hold and delay");
-  command
-      .add_option("--delay", flags.delay_s,
-                  "delay to remove with --compensate, in s, without the half sample of the "
-                  "hold; default: as declared in the log")
-      ->type_name("SECONDS");
+  add_value(command, "--delay", flags.delay_s, "SECONDS",
+            "delay to remove with --compensate, in s, without the half sample of the "
+            "hold; default: as declared in the log");
   command.add_option(
       "--stage", flags.stage,
       "stage or controller file for the health checks; default: the one stored in the log");
   command.add_flag("--no-health", flags.no_health, "skip the health checks of the data");
-  command
-      .add_option(
-          "--fft-wisdom", flags.fft_wisdom,
-          "file of FFT plans: its plans are reused; missing ones are found by timing and added")
-      ->type_name("FILE");
+  add_value(command, "--fft-wisdom", flags.fft_wisdom, "FILE",
+            "file of FFT plans: its plans are reused; missing ones are found by timing and added");
   add_threads(command, flags.options.threads);
 }
 

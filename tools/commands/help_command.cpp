@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/manual/command_tree.hpp"
@@ -23,9 +24,9 @@ void print_help(const CLI::App& app, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
     const std::vector<std::string> names = names_of(command_tree(*command).commands);
     if (std::find(names.begin(), names.end(), word) == names.end())
-      throw std::invalid_argument(fmt::format(
+      fail_request(
           "help: unknown command '{}'{}; {}", word, path.empty() ? "" : " of" + path,
-          names.empty() ? fmt::format("write 'stageid help{}'", path) : suggest_key(word, names)));
+          names.empty() ? fmt::format("write 'stageid help{}'", path) : suggest_key(word, names));
     command = command->get_subcommand(word);
     path += " " + word;
   }

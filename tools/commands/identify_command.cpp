@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/input_files.hpp"
 #include "acquisition/files/output_file.hpp"
@@ -127,7 +127,7 @@ class Identification {
   }
 
   void finish_step(const char* name, double seconds, std::string note) {
-    console_.message(fmt::format("{:<9} {:6.1f} s  {}", name, seconds, note));
+    console_.message("{:<9} {:6.1f} s  {}", name, seconds, note);
     steps_.push_back({name, seconds, std::move(note)});
   }
 
@@ -164,10 +164,9 @@ class Identification {
                             stage_s, result.seconds > 0.0 ? stage_s / result.seconds : 0.0,
                             static_cast<double>(result.log_bytes) / 1e6));
     if (result.exit_code != kDone && result.exit_code != kNotTrustworthy)
-      console_.warning(fmt::format("{}; {} of {} runs are kept{}",
-                                   named(request.log, result.message),
-                                   result.runs_before + result.experiment.runs_done,
-                                   result.runs_total, advice_behind(result)));
+      console_.warning("{}; {} of {} runs are kept{}", named(request.log, result.message),
+                       result.runs_before + result.experiment.runs_done, result.runs_total,
+                       advice_behind(result));
     return result.exit_code;
   }
 
@@ -246,8 +245,8 @@ class Identification {
     add_notes(findings_beside_message(step.result));
     write_model(path("model.json"), model_);
     if (step.result.status() == FitStatus::interrupted)
-      console_.warning(fmt::format("{}: {}; continue with --resume", path("model.json").string(),
-                                   step.result.message()));
+      console_.warning("{}: {}; continue with --resume", path("model.json").string(),
+                       step.result.message());
     finish_step("fit", step.seconds,
                 fmt::format("{}, {}, {}", counted(model_.submodels.size(), "submodel"),
                             relative_error_text(model_.fit), cost_line(step.result.cost)));
@@ -328,7 +327,7 @@ class Identification {
     if (!explain_the_rest(verdict_.problems))
       for (const std::string& note : notes_) console_.warning(note);
     for (const std::string& line : verdict_lines(verdict_)) console_.result(line);
-    console_.result(fmt::format("report: {}", path("report.html").string()));
+    console_.result("report: {}", path("report.html").string());
     console_.result(summary_);
   }
 
@@ -354,15 +353,15 @@ class Identification {
 void identify(const IdentifyFlags& flags, Console& console) {
   const ExperimentConfig config = load_experiment_config(flags.config);
   if (config.experiment.scheme == ExcitationScheme::simultaneous)
-    throw std::invalid_argument(
-        fmt::format("{}: scheme: 'simultaneous' does not determine a response, only the changes of "
-                    "a model (run --watch); write single_axis or orthogonal_dft",
-                    flags.config.string()));
+    fail_request(
+        "{}: scheme: 'simultaneous' does not determine a response, only the changes of "
+        "a model (run --watch); write single_axis or orthogonal_dft",
+        flags.config.string());
   if (!flags.resume && std::filesystem::exists(flags.output / "run.slog"))
-    throw std::invalid_argument(
-        fmt::format("{}: already contains a run; continue it with --resume, or choose another "
-                    "directory with -o",
-                    flags.output.string()));
+    fail_request(
+        "{}: already contains a run; continue it with --resume, or choose another "
+        "directory with -o",
+        flags.output.string());
   require_stable_loop(config, console);
   console.exit_code = Identification(config, flags, console).run();
 }

@@ -69,8 +69,7 @@ void list_arrays(const ImportFlags& flags, Console& console) {
   }
   for (const std::string& line : table_lines(rows)) console.result(line);
   for (const UnreadVariable& variable : arrays.unread)
-    console.result(
-        fmt::format("{}: {} cannot be read. {}", variable.name, variable.what, variable.remedy));
+    console.result("{}: {} cannot be read. {}", variable.name, variable.what, variable.remedy);
   console.result({{"arrays", json}});
 }
 
@@ -115,7 +114,7 @@ void import_file(const ImportFlags& flags, Console& console) {
   }
   const auto bytes = std::filesystem::file_size(flags.output);
   for (const std::string& line : summary.lines) console.result(line);
-  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(), bytes));
+  console.result("wrote {}, {} bytes", flags.output.string(), bytes);
   nlohmann::ordered_json json = {{"output", flags.output.string()}, {"bytes", bytes}};
   json.update(summary.json);
   console.result(json);

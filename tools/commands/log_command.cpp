@@ -6,10 +6,9 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/formats/convert_log.hpp"
 #include "acquisition/formats/open_log.hpp"
@@ -103,13 +102,12 @@ struct LogFlags {
 void list_log(const LogFlags& flags, Console& console) {
   const std::unique_ptr<LogReader> log = open_log(flags.file);
   const LogInfo& info = log->info();
-  console.result(fmt::format("{}: {} Hz, period {} ({} s), {}", flags.file.string(),
-                             info.sample_rate_hz, counted(info.period_samples, "sample"),
-                             info.period_samples / info.sample_rate_hz,
-                             counted(info.transient_periods, "transient period")));
-  console.result(fmt::format("excitation {}", fmt::join(info.excitation.names, " ")));
-  console.result(fmt::format("actuators  {}", fmt::join(info.actuators.names, " ")));
-  console.result(fmt::format("sensors    {}", fmt::join(info.sensors.names, " ")));
+  console.result("{}: {} Hz, period {} ({} s), {}", flags.file.string(), info.sample_rate_hz,
+                 counted(info.period_samples, "sample"), info.period_samples / info.sample_rate_hz,
+                 counted(info.transient_periods, "transient period"));
+  console.result("excitation {}", fmt::join(info.excitation.names, " "));
+  console.result("actuators  {}", fmt::join(info.actuators.names, " "));
+  console.result("sensors    {}", fmt::join(info.sensors.names, " "));
   std::vector<std::vector<std::string>> rows = {
       {"run", "realization", "experiment", "samples", "late", "missing", "marked", "", "started"}};
   for (const LogRun& run : log->runs())
@@ -133,14 +131,13 @@ void list_log(const LogFlags& flags, Console& console) {
 void verify_file(const LogFlags& flags, Console& console) {
   const VerifyReport report = verify_log(flags.file);
   throw_if_interrupted();
-  console.result(fmt::format("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete",
-                             flags.file.string(), static_cast<double>(report.bytes) / 1e6,
-                             counted(report.blocks, "block"), counted(report.rows, "row"),
-                             report.marked_rows, report.complete_runs,
-                             counted(report.runs, "run")));
+  console.result("{}: {:.1f} MB, {}, {} ({} marked), {} of {} complete", flags.file.string(),
+                 static_cast<double>(report.bytes) / 1e6, counted(report.blocks, "block"),
+                 counted(report.rows, "row"), report.marked_rows, report.complete_runs,
+                 counted(report.runs, "run"));
   for (const LogDamage& damage : report.damage) console.result(damage_line(damage));
   if (report.closed && !report.exit_message.empty())
-    console.result(fmt::format("ended with {}: {}", report.exit_code, report.exit_message));
+    console.result("ended with {}: {}", report.exit_code, report.exit_message);
   console.result({{"file", flags.file.string()},
                   {"intact", report.intact()},
                   {"closed", report.closed},
@@ -158,23 +155,22 @@ void verify_file(const LogFlags& flags, Console& console) {
   const std::string what = !report.damage.empty()
                                ? "damaged at " + counted(report.damage.size(), "place")
                                : "was not closed: the experiment was interrupted";
-  throw FormatError(flags.file, "",
-                    fmt::format("{}; save the intact part with 'stageid log recover {} -o "
-                                "NEW.slog', or continue the experiment with --resume",
-                                what, flags.file.string()));
+  fail_format(flags.file, "",
+              "{}; save the intact part with 'stageid log recover {} -o "
+              "NEW.slog', or continue the experiment with --resume",
+              what, flags.file.string());
 }
 
 void recover_file(const LogFlags& flags, Console& console) {
   if (std::filesystem::exists(flags.output))
-    throw std::invalid_argument(
-        fmt::format("{}: already exists; choose another name with -o", flags.output.string()));
+    fail_request("{}: already exists; choose another name with -o", flags.output.string());
   const RecoverReport report = recover_log(flags.file, flags.output);
   for (const LogDamage& damage : report.damage) console.result(damage_line(damage));
-  console.result(fmt::format("{}: {}, {}, {} of {} complete; lost: {}, {}, {}",
-                             flags.output.string(), counted(report.blocks_kept, "block"),
-                             counted(report.rows_kept, "row"), report.complete_runs,
-                             counted(report.runs, "run"), counted(report.blocks_lost, "block"),
-                             counted(report.rows_lost, "row"), counted(report.bytes_lost, "byte")));
+  console.result("{}: {}, {}, {} of {} complete; lost: {}, {}, {}", flags.output.string(),
+                 counted(report.blocks_kept, "block"), counted(report.rows_kept, "row"),
+                 report.complete_runs, counted(report.runs, "run"),
+                 counted(report.blocks_lost, "block"), counted(report.rows_lost, "row"),
+                 counted(report.bytes_lost, "byte"));
   console.result({{"output", flags.output.string()},
                   {"blocks_kept", report.blocks_kept},
                   {"blocks_lost", report.blocks_lost},
@@ -200,8 +196,8 @@ void convert_file(const LogFlags& flags, Console& console) {
     write_mat_log(*log, flags.output, flags.mat_version, options);
   else
     convert_log(*log, flags.output, options);
-  console.result(fmt::format("wrote {}, {:.1f} MB", flags.output.string(),
-                             static_cast<double>(std::filesystem::file_size(flags.output)) / 1e6));
+  console.result("wrote {}, {:.1f} MB", flags.output.string(),
+                 static_cast<double>(std::filesystem::file_size(flags.output)) / 1e6);
   console.result(
       {{"output", flags.output.string()}, {"bytes", std::filesystem::file_size(flags.output)}});
 }

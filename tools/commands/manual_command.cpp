@@ -1,7 +1,5 @@
 #include "tools/commands/commands.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -35,7 +33,7 @@ void write_manual(const CLI::App& app, const std::filesystem::path& output, Cons
     write(pages / page.file, page.text);
   write(completions / program.name, bash_completion(program));
   write(functions / ("_" + program.name), zsh_completion(program));
-  console.result(fmt::format("wrote {} files below {}", written.size(), output.string()));
+  console.result("wrote {} files below {}", written.size(), output.string());
   console.result(nlohmann::ordered_json{{"written", written}});
 }
 

@@ -34,7 +34,7 @@ void find_modes(const ModesFlags& flags, Console& console) {
   FrfEstimate frf = read_frf(flags.frf);
   if (!flags.band_hz.empty()) frf = select_band(std::move(frf), flags.band_hz[0], flags.band_hz[1]);
   if (has_dc_line(frf)) {
-    console.warning(fmt::format("{}: {}", flags.frf.string(), kDcLineLeftOut));
+    console.warning("{}: {}", flags.frf.string(), kDcLineLeftOut);
     frf = without_dc_line(std::move(frf));
   }
   PeakOptions options;
@@ -53,7 +53,7 @@ void find_modes(const ModesFlags& flags, Console& console) {
                     {"cmif_curve", mode.cmif_curve}});
   }
   for (const std::string& line : table_lines(rows)) console.result(line);
-  if (!flags.output.empty()) console.result(fmt::format("wrote {}", flags.output.string()));
+  if (!flags.output.empty()) console.result("wrote {}", flags.output.string());
   console.result({{"modes", list}, {"output", flags.output.string()}});
 }
 
@@ -70,10 +70,8 @@ void modes_command(CLI::App& app, Console& console) {
       command, "--kind", flags.kind,
       "matrix to analyse: response: the FRF G | accelerance: omega^2 G | whitened: G divided by "
       "its standard deviations");
-  command.add_option("--prominence", flags.prominence_db, "minimum prominence of a peak, dB")
-      ->type_name("DB")
-      ->check(kNotNegative)
-      ->capture_default_str();
+  add_setting(command, "--prominence", flags.prominence_db, "DB",
+              "minimum prominence of a peak, dB", kNotNegative);
 }
 
 }  // namespace stageid

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_socket.hpp"
 #include "hal/can/faulty_can.hpp"
@@ -53,7 +53,7 @@ auto parsed_faults(const char* option, const std::vector<std::string>& texts, Pa
     try {
       faults.push_back(parse(text));
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: {}", option, error.what()));
+      fail_request("{}: {}", option, error.what());
     }
   }
   return faults;
@@ -129,30 +129,19 @@ class ModbusFront {
 };
 
 void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
-  command
-      .add_option("--modbus-tcp", flags.tcp_port,
-                  "Modbus TCP port on the loopback interface; 0: a free one")
-      ->type_name("PORT")
-      ->check(CLI::Range(0, 65535));
-  command.add_option("--modbus-rtu", flags.rtu_device, "Modbus RTU on this serial line")
-      ->type_name("DEVICE");
-  command.add_option("--modbus-baud", flags.baud, "baud rate of the serial line")
-      ->type_name("BAUD")
-      ->capture_default_str();
+  add_value(command, "--modbus-tcp", flags.tcp_port, "PORT",
+            "Modbus TCP port on the loopback interface; 0: a free one", CLI::Range(0, 65535));
+  add_value(command, "--modbus-rtu", flags.rtu_device, "DEVICE", "Modbus RTU on this serial line");
+  add_setting(command, "--modbus-baud", flags.baud, "BAUD", "baud rate of the serial line");
   command.add_option("--modbus-parity", flags.parity, "N | E | O")
       ->check(CLI::IsMember({"N", "E", "O"}))
       ->capture_default_str();
-  command.add_option("--modbus-unit", flags.unit, "unit identifier of the node")
-      ->type_name("ADDRESS")
-      ->check(CLI::Range(1, 247))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--modbus-fault", flags.faults,
-          "KIND[@REQUEST][xCOUNT][:VALUE]: inject a fault; requests are counted from 1. Kinds: "
-          "late_reply:SECONDS, half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, "
-          "interlock, temperature:KELVIN, gravity:NEWTON")
-      ->type_name("FAULT");
+  add_setting(command, "--modbus-unit", flags.unit, "ADDRESS", "unit identifier of the node",
+              CLI::Range(1, 247));
+  add_value(command, "--modbus-fault", flags.faults, "FAULT",
+            "KIND[@REQUEST][xCOUNT][:VALUE]: inject a fault; requests are counted from 1. Kinds: "
+            "late_reply:SECONDS, half_frame, wrong_unit, exception:CODE, dead_server, heartbeat, "
+            "interlock, temperature:KELVIN, gravity:NEWTON");
 }
 
 bool forces_act(NodeState state) {
@@ -187,13 +176,11 @@ NodePanel panel_of(const StageConfig& config) {
 /// Interfaces from the command line replace those in the file.
 CanSpec can_spec(const StageConfig& config, const std::vector<std::string>& interfaces) {
   if (!config.can.present)
-    throw std::invalid_argument(
-        fmt::format("{}: has no group 'can'; see 'stageid config schema'", config.file.string()));
+    fail_request("{}: has no group 'can'; see 'stageid config schema'", config.file.string());
   CanSpec spec = config.can.spec;
   if (interfaces.size() != spec.buses.size())
-    throw std::invalid_argument(fmt::format("--can: {} interfaces, but {} has {} buses",
-                                            interfaces.size(), config.file.string(),
-                                            spec.buses.size()));
+    fail_request("--can: {} interfaces, but {} has {} buses", interfaces.size(),
+                 config.file.string(), spec.buses.size());
   for (std::size_t i = 0; i < interfaces.size(); ++i) spec.buses[i].interface = interfaces[i];
   return spec;
 }
@@ -231,10 +218,10 @@ double node_watchdog_s(const NodeFlags& flags, const StageConfig& config) {
   if (!flags.can_interfaces.empty() && config.can.mode == CanMode::streaming)
     pause_s = std::max(pause_s, can_longest_pause_s(config.can.spec, info));
   if (flags.watchdog_s > 0.0 && flags.watchdog_s < pause_s)
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "--watchdog: {:.4g} s is too short: the node would stop the stage before a lost reply is "
         "repeated. Use more than {:.4g} s, or shorter reply times in the stage file",
-        flags.watchdog_s, pause_s));
+        flags.watchdog_s, pause_s);
   if (flags.watchdog_s > 0.0) return flags.watchdog_s;
   const double can_s = config.can.present ? config.can.spec.watchdog_s : 0.0;
   return std::max(can_s, pause_s + 1.0 / info.sample_rate_hz);
@@ -257,8 +244,8 @@ void serve_can(const NodeFlags& flags, Console& console, const StageConfig& conf
   const auto faults = parsed_faults("--can-fault", flags.can_faults, parse_can_fault);
   FaultyCan transport(socket, faults);
   CanNode front(node, layout, transport, flags.pace, config.can.spec.node_clock);
-  console.result(fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
-                             fmt::join(flags.can_interfaces, ", ")));
+  console.result("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name,
+                 fmt::join(flags.can_interfaces, ", "));
   std::fflush(stdout);  // programs that wait for the node read this line
   serve_to_rest(node, [&] { front.serve(socket.now_ns() + kTick_ns); });
 }
@@ -281,8 +268,7 @@ void serve(const NodeFlags& flags, Console& console) {
   if (flags.modbus.wanted()) {
     modbus.emplace(flags.modbus, node, config.spec.limits);
     for (const std::string& place : modbus->places())
-      console.result(
-          fmt::format("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place));
+      console.result("'{}' on {}; SIGINT or SIGTERM ends it", config.spec.info.name, place);
   }
   std::fflush(stdout);  // programs that wait for the node read these lines
   if (flags.can_interfaces.empty())
@@ -293,7 +279,7 @@ void serve(const NodeFlags& flags, Console& console) {
   else
     serve_can(flags, console, config, node);
   modbus.reset();
-  console.result(fmt::format("at rest: {}", to_string(node.state())));
+  console.result("at rest: {}", to_string(node.state()));
 }
 
 }  // namespace
@@ -304,41 +290,26 @@ void node_command(CLI::App& app, Console& console) {
       "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM",
       serve);
   command.add_option("config", flags.config, "stage file (.yaml)")->required();
-  command
-      .add_option(
-          "--can", flags.can_interfaces,
-          "CAN FD interfaces, one per bus, in the order of the stage file, such as can0,can1")
-      ->type_name("INTERFACE")
+  add_value(command, "--can", flags.can_interfaces, "INTERFACE",
+            "CAN FD interfaces, one per bus, in the order of the stage file, such as can0,can1")
       ->delimiter(',');
-  command
-      .add_option("--can-fault", flags.can_faults,
-                  "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
-                  "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
-                  "lost@100x3,late@500:0.004")
-      ->type_name("FAULT")
+  add_value(command, "--can-fault", flags.can_faults, "FAULT",
+            "KIND@FRAME[xCOUNT][:SECONDS]: disturb measurement frames, counted from 0. "
+            "Kinds: lost, repeated, swapped, late, corrupt, shortened, foreign. Example: "
+            "lost@100x3,late@500:0.004")
       ->delimiter(',');
-  command
-      .add_option("--pace", flags.pace,
-                  "speed of resident experiments. 0: as fast as possible; 1: wall clock")
-      ->type_name("SPEED")
-      ->check(kNotNegative)
-      ->capture_default_str();
-  command
-      .add_option("--hold", flags.hold_s,
-                  "after a quick stop or a fault, seconds for which the node keeps the loop closed "
-                  "before it cuts the forces")
-      ->type_name("SECONDS")
-      ->check(CLI::Range(0.0, 60.0))
-      ->capture_default_str();
+  add_setting(command, "--pace", flags.pace, "SPEED",
+              "speed of resident experiments. 0: as fast as possible; 1: wall clock", kNotNegative);
+  add_setting(command, "--hold", flags.hold_s, "SECONDS",
+              "after a quick stop or a fault, seconds for which the node keeps the loop closed "
+              "before it cuts the forces",
+              CLI::Range(0.0, 60.0));
   add_modbus_options(command, flags.modbus);
-  command
-      .add_option(
-          "--watchdog", flags.watchdog_s,
-          "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
-          "'watchdog_s' of the group 'can'; over Modbus, the longest time that the host needs to "
-          "repeat a lost request, plus one sample")
-      ->type_name("SECONDS")
-      ->check(CLI::Range(0.0, 3600.0));
+  add_value(command, "--watchdog", flags.watchdog_s, "SECONDS",
+            "stop the stage if the host is silent for this many seconds. Default, or 0: over CAN, "
+            "'watchdog_s' of the group 'can'; over Modbus, the longest time that the host needs to "
+            "repeat a lost request, plus one sample",
+            CLI::Range(0.0, 3600.0));
 }
 
 }  // namespace stageid

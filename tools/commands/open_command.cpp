@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <chrono>
 #include <cstdio>
 #include <stdexcept>
@@ -22,7 +20,7 @@ void open_workbench(const WorkbenchOptions& flags, Console& console) {
   Workbench workbench(flags);
   const CleanedUpAtInterrupt tells_the_pages([&workbench] { workbench.end(); });
   say_at_interrupt("saved models are kept");
-  console.result(fmt::format("workbench: {}", workbench.url()));
+  console.result("workbench: {}", workbench.url());
   console.result({{"url", workbench.url()}});
   std::fflush(stdout);  // programs that wait for the page read this line
   console.message("open this address in a browser; SIGINT or SIGTERM ends it");

@@ -13,6 +13,7 @@
 #include <tuple>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/model/cmif.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/fit/flag_values.hpp"
@@ -59,9 +60,8 @@ Eigen::Index one_place(const char* flag, const std::vector<std::string>& names,
                        const ChannelList& channels) {
   const std::vector<Eigen::Index> all = places(flag, names, channels);
   if (all.size() != 1)
-    throw std::invalid_argument(
-        fmt::format("{}: the figure 'entry' needs exactly one channel; choose from {}", flag,
-                    fmt::join(channels.names, ", ")));
+    fail_request("{}: the figure 'entry' needs exactly one channel; choose from {}", flag,
+                 fmt::join(channels.names, ", "));
   return all[0];
 }
 
@@ -91,19 +91,16 @@ PictureStyle style_of(const PlotFlags& flags) {
         std::tuple("--height", flags.height_mm, &style.height_in)}) {
     if (size_mm == 0.0) continue;
     if (!(size_mm >= kLeast_mm && size_mm <= kMost_mm))
-      throw std::invalid_argument(
-          fmt::format("{}: got {} mm; expected {} to {}", flag, size_mm, kLeast_mm, kMost_mm));
+      fail_request("{}: got {} mm; expected {} to {}", flag, size_mm, kLeast_mm, kMost_mm);
     *size_in = size_mm / kInch_mm;
   }
   if (!(style.font_pt >= 4.0 && style.font_pt <= 40.0))
-    throw std::invalid_argument(
-        fmt::format("--font-size: got {} pt; expected 4 to 40", style.font_pt));
+    fail_request("--font-size: got {} pt; expected 4 to 40", style.font_pt);
   const auto of_names = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == ' ' || c == '-';
   };
   if (style.font.empty() || !std::ranges::all_of(style.font, of_names))
-    throw std::invalid_argument(
-        fmt::format("--font: got '{}'; expected the name of a font, such as Times", style.font));
+    fail_request("--font: got '{}'; expected the name of a font, such as Times", style.font);
   return style;
 }
 
@@ -154,13 +151,13 @@ void plot(const PlotFlags& flags, Console& console) {
   require_writable(flags.output, flags.inputs);
   const ReportInput input = report_input(flags.inputs);
   if (input.frf.empty())
-    throw std::invalid_argument(fmt::format("{}: contains no frequency response; add an FRF file",
-                                            flags.inputs.front().string()));
+    fail_request("{}: contains no frequency response; add an FRF file",
+                 flags.inputs.front().string());
   ReportData data = read_response_data(input);
   keep_band(flags.band_hz, data);
   draw(requested_picture(flags, data), flags.output);
-  console.result(fmt::format("wrote {}, {} bytes", flags.output.string(),
-                             std::filesystem::file_size(flags.output)));
+  console.result("wrote {}, {} bytes", flags.output.string(),
+                 std::filesystem::file_size(flags.output));
   console.result({{"output", flags.output.string()},
                   {"figure", flags.figure},
                   {"bytes", std::filesystem::file_size(flags.output)}});
@@ -181,16 +178,12 @@ void plot_command(CLI::App& app, Console& console) {
                   "output directory of 'stageid identify', or files: FRF, model, modes "
                   "(the candidates shown in cmif)")
       ->required();
-  command
-      .add_option("--output-channel", flags.output_channels,
-                  "entry: the output; bode: outputs A,B,... (default: all)")
-      ->type_name("CHANNEL")
+  add_value(command, "--output-channel", flags.output_channels, "CHANNEL",
+            "entry: the output; bode: outputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command
-      .add_option("--input-channel", flags.input_channels,
-                  "entry: the input; bode: inputs A,B,... (default: all)")
-      ->type_name("CHANNEL")
+  add_value(command, "--input-channel", flags.input_channels, "CHANNEL",
+            "entry: the input; bode: inputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command.add_option("-o,--output", flags.output, "picture to write: .pdf, .svg or .png")
@@ -199,14 +192,10 @@ void plot_command(CLI::App& app, Console& console) {
   add_choice(
       command, "--preset", flags.preset,
       "width: of the figure | single: a column of a journal, 88.9 mm | double: both, 181.9 mm");
-  command.add_option("--width", flags.width_mm, "width of the picture, mm")->type_name("MM");
-  command.add_option("--height", flags.height_mm, "height of the picture, mm")->type_name("MM");
-  command.add_option("--font", flags.style.font, "font, as of fontconfig")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command.add_option("--font-size", flags.style.font_pt, "size of the font, pt")
-      ->type_name("PT")
-      ->capture_default_str();
+  add_value(command, "--width", flags.width_mm, "MM", "width of the picture, mm");
+  add_value(command, "--height", flags.height_mm, "MM", "height of the picture, mm");
+  add_setting(command, "--font", flags.style.font, "NAME", "font, as of fontconfig");
+  add_setting(command, "--font-size", flags.style.font_pt, "PT", "size of the font, pt");
   add_choice(command, "--theme", flags.theme, "colour, which also differs in brightness | grey");
 }
 

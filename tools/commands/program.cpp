@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 #include "acquisition/files/system_reason.hpp"
 #include "acquisition/files/version.hpp"
@@ -152,16 +152,14 @@ class Program {
         team.size(), 2,
         {Eigen::Vector2d(static_cast<double>(sent.messages), static_cast<double>(sent.bytes))});
     if (team.size() > 1 && console_.verbosity == Verbosity::debug)
-      console_.message(
-          fmt::format("{} processes sent {} messages with {} bytes", team.size(), all[0], all[1]));
+      console_.message("{} processes sent {} messages with {} bytes", team.size(), all[0], all[1]);
   }
 
   /// An empty word is a variable without value in a script. As the name of an output it would mean none.
   static void refuse_empty_words(int argc, const char* const* argv) {
     for (int k = 2; k < argc; ++k)
       if (*argv[k] == '\0')
-        throw std::invalid_argument(fmt::format(
-            "the word after '{}' is empty; write a value, or leave both out", argv[k - 1]));
+        fail_request("the word after '{}' is empty; write a value, or leave both out", argv[k - 1]);
   }
 
   /// Index of the first word that is not an option.
@@ -178,9 +176,8 @@ class Program {
     if (console_.team->size() == 1 || at >= argc) return;
     constexpr std::array kDivided = {"frf", "modes", "fit", "validate", "help"};
     if (std::find(kDivided.begin(), kDivided.end(), std::string_view(argv[at])) == kDivided.end())
-      throw std::invalid_argument(fmt::format(
-          "{0}: cannot be divided between {1} processes; run 'stageid {0}' without mpirun",
-          argv[at], console_.team->size()));
+      fail_request("{0}: cannot be divided between {1} processes; run 'stageid {0}' without mpirun",
+                   argv[at], console_.team->size());
   }
 
   void refuse_unknown_command(int argc, const char* const* argv) const {
@@ -188,10 +185,9 @@ class Program {
     const int first = command_at(argc, argv);
     if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
     const std::string nearest = nearest_word(argv[first], names);
-    throw std::invalid_argument(fmt::format("unknown command '{}'; {}", argv[first],
-                                            nearest.empty()
-                                                ? "'stageid --help' lists them"
-                                                : fmt::format("did you mean '{}'?", nearest)));
+    fail_request("unknown command '{}'; {}", argv[first],
+                 nearest.empty() ? "'stageid --help' lists them"
+                                 : fmt::format("did you mean '{}'?", nearest));
   }
 
   /// Handles the exceptions of CLI11, which also uses them for help.

@@ -1,11 +1,9 @@
 #include "tools/commands/commands.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
-#include <stdexcept>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/report/report_input.hpp"
 #include "tools/report/report_verdict.hpp"
@@ -28,13 +26,13 @@ void report(const ReportFlags& flags, Console& console) {
   require_writable(flags.output, read);
   const std::string ending = flags.output.extension().string();
   if (ending != ".html" && ending != ".htm")
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: the report is an HTML page; use a name ending in .html. To print it, use a browser",
-        flags.output.string()));
+        flags.output.string());
   ReportData data = read_report_data(report_input(flags.inputs));
   if (!flags.compare.empty()) add_comparison(data, flags.compare);
   write_report(flags.output, data);
-  console.result(fmt::format("wrote {}", flags.output.string()));
+  console.result("wrote {}", flags.output.string());
   const Verdict verdict = judge(data);
   console.result({{"output", flags.output.string()}, {"verdict", verdict_json(verdict)}});
   if (verdict.level != Verdict::Level::bad) return;

@@ -4,10 +4,10 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <string>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/experiment_config.hpp"
@@ -21,8 +21,7 @@ namespace {
 Backend backend_of(const std::string& name, Backend configured) {
   if (name.empty()) return configured;
   if (const auto backend = from_word<Backend>(name)) return *backend;
-  throw std::invalid_argument(
-      fmt::format("--backend: unknown back end '{}'; use {}", name, one_of(kWords<Backend>)));
+  fail_request("--backend: unknown back end '{}'; use {}", name, one_of(kWords<Backend>));
 }
 
 /// stageid run CONFIG -o run.slog
@@ -40,10 +39,10 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   MeasurementRequest request = flags.request;
   const std::string ending = request.log.extension().string();
   if (ending == ".h5" || ending == ".hdf5" || ending == ".csv")
-    throw std::invalid_argument(
-        fmt::format("{}: a measurement is recorded as .slog, which survives a crash; use a name "
-                    "ending in .slog and 'stageid log convert' to obtain {}",
-                    request.log.string(), ending));
+    fail_request(
+        "{}: a measurement is recorded as .slog, which survives a crash; use a name "
+        "ending in .slog and 'stageid log convert' to obtain {}",
+        request.log.string(), ending);
   require_ending(request.log, "a log", {".slog"});
   const ExperimentConfig config = load_experiment_config(flags.config);
   request.backend = backend_of(flags.backend, config.stage.backend);
@@ -60,14 +59,13 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   const RunHealth& health = result.experiment.health;
   const double stage_s = static_cast<double>(health.cycles) / plan.grid().sample_rate_hz();
   const int complete = result.runs_before + result.experiment.runs_done;
-  console.result(fmt::format(
-      "{}: {} of {} complete{}", request.log.string(), complete, counted(result.runs_total, "run"),
-      result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : ""));
   console.result(
-      fmt::format("{}, {} late, {} missing, {} marked; {:.1f} s of stage time in "
-                  "{:.1f} s, {:.1f} MB",
-                  counted(health.cycles, "cycle"), health.late, health.missing, health.marked,
-                  stage_s, result.seconds, static_cast<double>(result.log_bytes) / 1e6));
+      "{}: {} of {} complete{}", request.log.string(), complete, counted(result.runs_total, "run"),
+      result.runs_before > 0 ? fmt::format(" ({} of them before)", result.runs_before) : "");
+  console.result(
+      "{}, {} late, {} missing, {} marked; {:.1f} s of stage time in {:.1f} s, {:.1f} MB",
+      counted(health.cycles, "cycle"), health.late, health.missing, health.marked, stage_s,
+      result.seconds, static_cast<double>(result.log_bytes) / 1e6);
   if (result.variance) console.result(result.message);
   if (request.watch) console.result("watch: " + result.watch_summary);
   nlohmann::ordered_json json = {{"log", request.log.string()},
@@ -86,8 +84,8 @@ void measure_and_log(const RunFlags& flags, Console& console) {
   if (request.watch) json["watch"] = result.watch;
   console.result(json);
   if (result.exit_code != 0)
-    console.warning(fmt::format("{}{}", named(request.log, result.message),
-                                complete < result.runs_total ? advice_behind(result) : ""));
+    console.warning("{}{}", named(request.log, result.message),
+                    complete < result.runs_total ? advice_behind(result) : "");
   result.show_end();
 }
 
@@ -101,33 +99,23 @@ void run_command(CLI::App& app, Console& console) {
   command.add_option("--backend", flags.backend,
                      "sim | can | modbus | plugin | replay; default: from the stage file");
   command.add_option("--replay", flags.request.replay, "log to replay with --backend replay");
-  command
-      .add_option("--replay-tolerance", flags.request.replay_tolerance_n,
-                  "largest allowed difference between a command and the replayed one, in the unit "
-                  "of the actuator")
-      ->type_name("TOLERANCE")
-      ->capture_default_str();
-  command
-      .add_option("--pace", flags.request.pace,
-                  "0: as fast as possible; 1: wall clock; default: from the stage file")
-      ->type_name("SPEED")
-      ->check(kNotNegative);
+  add_setting(command, "--replay-tolerance", flags.request.replay_tolerance_n, "TOLERANCE",
+              "largest allowed difference between a command and the replayed one, in the unit "
+              "of the actuator");
+  add_value(command, "--pace", flags.request.pace, "SPEED",
+            "0: as fast as possible; 1: wall clock; default: from the stage file", kNotNegative);
   command.add_option("--excitation", flags.excitation,
                      "play this result of 'stageid design' instead of designing again");
-  command
-      .add_option("--until", flags.request.until,
-                  "stop after the realization that lowers the mean relative variance of the "
-                  "response to this value, e.g. 1e-6 for 0.1 % rms")
-      ->type_name("VARIANCE")
-      ->check(kPositive);
+  add_value(command, "--until", flags.request.until, "VARIANCE",
+            "stop after the realization that lowers the mean relative variance of the "
+            "response to this value, e.g. 1e-6 for 0.1 % rms",
+            kPositive);
   command.add_flag("--resume", flags.request.resume,
                    "continue an interrupted log; complete runs are not repeated");
-  command
-      .add_option("--dashboard", flags.dashboard,
-                  "live view in a browser. PORT: on this machine (0: any free port) | "
-                  "HOST:PORT: also on other machines. These and the stop button need the "
-                  "access token in the printed address")
-      ->type_name("ADDRESS");
+  add_value(command, "--dashboard", flags.dashboard, "ADDRESS",
+            "live view in a browser. PORT: on this machine (0: any free port) | "
+            "HOST:PORT: also on other machines. These and the stop button need the "
+            "access token in the printed address");
   CLI::Option* const watch =
       command.add_option("--watch", flags.watch.model,
                          "model.json: report how the stage differs from this model during the run");

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
@@ -78,10 +78,10 @@ void require_channels(const ValidateFlags& flags, const std::vector<std::string>
                       const std::vector<std::string>& of_model, const char* kind) {
   for (const std::string& name : of_model)
     if (std::find(of_data.begin(), of_data.end(), name) == of_data.end())
-      throw FormatError(flags.data, "",
-                        fmt::format("has no {0} '{1}', which {2} has; its {0}s are {3}. Use data "
-                                    "and a model of the same stage",
-                                    kind, name, flags.model.string(), fmt::join(of_data, ", ")));
+      fail_format(flags.data, "",
+                  "has no {0} '{1}', which {2} has; its {0}s are {3}. Use data "
+                  "and a model of the same stage",
+                  kind, name, flags.model.string(), fmt::join(of_data, ", "));
 }
 
 void validate_model(const ValidateFlags& flags, Console& console) {

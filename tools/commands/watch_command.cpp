@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -45,7 +43,7 @@ void watch(const WatchFlags& flags, Console& console) {
   if (watch.stage_changed()) console.exit_code = kNotTrustworthy;
   if (const std::string why = watch.doubt(); !why.empty()) {
     console.exit_code = kNotTrustworthy;
-    console.warning(fmt::format("{}: {}", flags.log.string(), why));
+    console.warning("{}: {}", flags.log.string(), why);
   }
   for (const std::string& line : watch.lines()) console.result(line);
   console.result(watch.summary());
@@ -59,24 +57,15 @@ void watch(const WatchFlags& flags, Console& console) {
 }  // namespace
 
 std::vector<CLI::Option*> add_watch_options(CLI::App& command, WatchOptions& options) {
-  return {
-      add_band(command, options.band_hz, "the band of the fit"),
-      command
-          .add_option("--learn", options.learn,
-                      "periods without change, from which noise and reference are learned")
-          ->type_name("PERIODS")
-          ->check(CLI::Range(4, 10000))
-          ->capture_default_str(),
-      command
-          .add_option("--memory", options.memory_s,
-                      "s; after this time the weight of a period is 1/e; default: 100 periods")
-          ->type_name("SECONDS")
-          ->check(kPositive),
-      command
-          .add_option("--false-alarms", options.false_alarms,
-                      "rate of alarms without change: NUMBER/period, /hour, /day, /week or /year")
-          ->type_name("RATE")
-          ->capture_default_str()};
+  return {add_band(command, options.band_hz, "the band of the fit"),
+          add_setting(command, "--learn", options.learn, "PERIODS",
+                      "periods without change, from which noise and reference are learned",
+                      CLI::Range(4, 10000)),
+          add_value(command, "--memory", options.memory_s, "SECONDS",
+                    "s; after this time the weight of a period is 1/e; default: 100 periods",
+                    kPositive),
+          add_setting(command, "--false-alarms", options.false_alarms, "RATE",
+                      "rate of alarms without change: NUMBER/period, /hour, /day, /week or /year")};
 }
 
 void watch_command(CLI::App& app, Console& console) {

@@ -170,7 +170,7 @@ std::string why_untested(const StageConfig& stage) {
 
 void judge(const std::filesystem::path& file, const LoopCheck& check, const Console& console) {
   if (!check.problem.empty()) throw FormatError(file, "", check.problem);
-  if (!check.doubt.empty()) console.warning(fmt::format("{}: {}", file.string(), check.doubt));
+  if (!check.doubt.empty()) console.warning("{}: {}", file.string(), check.doubt);
 }
 
 }  // namespace
@@ -215,9 +215,9 @@ DesignPrediction predict_signals(const ExperimentConfig& config, const Experimen
   if (const std::string reason = why_unpredictable(config.stage.spec, config.stage.plant);
       !reason.empty())
     console.warning(
-        fmt::format("{}: actuator and sensor signals are not predicted: {}. The limits "
-                    "are enforced by stopping the run. Begin with a low level",
-                    config.stage.file.string(), reason));
+        "{}: actuator and sensor signals are not predicted: {}. The limits are enforced by "
+        "stopping the run. Begin with a low level",
+        config.stage.file.string(), reason);
   return predict_closed_loop(plan, config.stage.spec, config.stage.plant);
 }
 

@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
-#include <stdexcept>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
@@ -79,11 +78,10 @@ std::vector<FleetLog> fleet_logs(const FleetConfig& config, const Console& conso
   if (!config.table.empty())
     for (FleetLog& log : logs_of_table(config.table)) add(std::move(log));
   if (logs.empty())
-    throw std::invalid_argument(
-        fmt::format("{}: no log matches; check 'logs' and 'table'", config.file.string()));
+    fail_request("{}: no log matches; check 'logs' and 'table'", config.file.string());
   for (const std::string& pattern : unmatched)
-    console.warning(fmt::format("{}: logs: no file matches '{}'; correct or remove the pattern",
-                                config.file.string(), pattern));
+    console.warning("{}: logs: no file matches '{}'; correct or remove the pattern",
+                    config.file.string(), pattern);
   return logs;
 }
 

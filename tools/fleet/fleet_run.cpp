@@ -130,8 +130,8 @@ class FleetRun {
 
   void wait_for_others() {
     if (!waiting_)
-      console_.message(fmt::format("{} by other processes; waiting for them",
-                                   counted(open_.size(), "job is run", "jobs are run")));
+      console_.message("{} by other processes; waiting for them",
+                       counted(open_.size(), "job is run", "jobs are run"));
     waiting_ = true;
     std::this_thread::sleep_for(kLook);
   }

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "excitation/threads/team.hpp"
@@ -31,6 +34,20 @@ class Console {
   void result(const nlohmann::ordered_json& object) const;
   void message(const std::string& line) const;  ///< unless quiet
   void warning(const std::string& line) const;  ///< always
+
+  // The same with a formatted line.
+  template <typename Part, typename... Parts>
+  void result(fmt::format_string<Part, Parts...> line, Part&& part, Parts&&... parts) const {
+    result(fmt::format(line, std::forward<Part>(part), std::forward<Parts>(parts)...));
+  }
+  template <typename Part, typename... Parts>
+  void message(fmt::format_string<Part, Parts...> line, Part&& part, Parts&&... parts) const {
+    message(fmt::format(line, std::forward<Part>(part), std::forward<Parts>(parts)...));
+  }
+  template <typename Part, typename... Parts>
+  void warning(fmt::format_string<Part, Parts...> line, Part&& part, Parts&&... parts) const {
+    warning(fmt::format(line, std::forward<Part>(part), std::forward<Parts>(parts)...));
+  }
 };
 
 /// Shows the progress of a long step: a bar with rate and remaining time on a terminal, else a plain line every few

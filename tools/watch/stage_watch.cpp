@@ -147,7 +147,7 @@ void StageWatch::add(const WatchedPeriod& period) {
 void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
   stage_changed_ = stage_changed_ || is_of_stage(change.what.kind);
   nlohmann::ordered_json event = change_json(change, *tracker_, model_, period, period_s_);
-  console_.result(fmt::format("{:.6g} s: {}", period.time_s, event["text"].get<std::string>()));
+  console_.result("{:.6g} s: {}", period.time_s, event["text"].get<std::string>());
   if (events_ != nullptr && !told_before_.contains(line_of(event)))
     events_->write("change", fields_of(event));
   const std::lock_guard lock(mutex_);
