@@ -23,38 +23,62 @@ using test::model_of;
 using test::StageProperties;
 using test::tracked_lines_hz;
 
-ModelTracker tracker_of(const AdditiveModel& model = model_of({}),
-                        const TrackerOptions& options = {}) {
-  return {model, tracked_lines_hz(), options};
-}
-
-TrackedPeriod watch(ModelTracker& tracker, LoopSpectra& loop, int periods) {
-  TrackedPeriod last;
-  for (int t = 0; t < periods; ++t) {
-    last = tracker.add(loop.next());
-    EXPECT_FALSE(last.change) << describe(last.change->what, tracker.parameters(), model_of({}))
-                              << " in period " << t;
+/// A stage, and a tracker that has watched some periods of it.
+struct Watched {
+  explicit Watched(std::uint64_t seed, int periods = 0, const AdditiveModel& model = model_of({}))
+      : loop(seed), tracker(model, tracked_lines_hz(), {}) {
+    watch(periods);
   }
-  return last;
+  TrackedPeriod watch(int periods) {
+    TrackedPeriod last;
+    for (int t = 0; t < periods; ++t) {
+      last = tracker.add(loop.next());
+      EXPECT_FALSE(last.change) << name(*last.change) << " in period " << t;
+    }
+    return last;
+  }
+  /// The change that the tracker finds in the next periods.
+  StageChange next_change() {
+    for (int t = 0; t < 40; ++t)
+      if (const auto period = tracker.add(loop.next()); period.change) return *period.change;
+    ADD_FAILURE() << "no change";
+    return {};
+  }
+  std::string name(const StageChange& change) const {
+    return describe(change.what, tracker.parameters(), model_of({}));
+  }
+  /// The stage of the model, changed so.
+  void become(const std::function<void(StageProperties&)>& change) {
+    StageProperties stage;
+    change(stage);
+    loop.become(stage);
+  }
+  /// The estimates, in their deviations from the truth.
+  Eigen::VectorXd errors(const Eigen::VectorXd& truth = Eigen::VectorXd::Zero(14)) const {
+    return (tracker.estimate() - truth).cwiseQuotient(tracker.covariance().diagonal().cwiseSqrt());
+  }
+  LoopSpectra loop;
+  ModelTracker tracker;
+};
+
+void expect_small(const Eigen::VectorXd& errors) {
+  EXPECT_LT(errors.cwiseAbs().maxCoeff(), 4.5) << errors.transpose();
 }
 
-/// The estimates, in their deviations from the truth.
-Eigen::VectorXd errors(const ModelTracker& tracker, const Eigen::VectorXd& truth) {
-  return (tracker.estimate() - truth).cwiseQuotient(tracker.covariance().diagonal().cwiseSqrt());
-}
+/// By three half-power bandwidths.
+void move_second_mode(StageProperties& stage) { stage.frequency_hz[1] *= 1.06; }
 
 TEST(ModelTracker, LearnsThenWatches) {
-  LoopSpectra loop(1);
-  ModelTracker tracker = tracker_of();
-  EXPECT_EQ(tracker.reference().chi_square.size(), 0);
-  EXPECT_TRUE(watch(tracker, loop, 32).learning);
-  const TrackedPeriod first = watch(tracker, loop, 1);
+  Watched w(1);
+  EXPECT_EQ(w.tracker.reference().chi_square.size(), 0);
+  EXPECT_TRUE(w.watch(32).learning);
+  const TrackedPeriod first = w.watch(1);
   EXPECT_FALSE(first.learning);
   EXPECT_EQ(first.noise_power.size(), 0) << "there is no difference yet";
   EXPECT_LT(first.largest_statistic, first.threshold);
   ASSERT_EQ(first.statistics.size(), 14 + 2) << "properties, and the noise of each sensor";
   EXPECT_LE(first.statistics.maxCoeff(), first.largest_statistic);
-  EXPECT_EQ(watch(tracker, loop, 1).noise_power.size(), 2);
+  EXPECT_EQ(w.watch(1).noise_power.size(), 2);
 }
 
 TEST(ModelTracker, EstimatesOfAnUnchangedStageAreWithinTheirDeviations) {
@@ -62,13 +86,11 @@ TEST(ModelTracker, EstimatesOfAnUnchangedStageAreWithinTheirDeviations) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(14);
   Eigen::VectorXd chi_square = Eigen::VectorXd::Zero(2);
   for (int run = 0; run < kRuns; ++run) {
-    LoopSpectra loop(100 + static_cast<std::uint64_t>(run));
-    ModelTracker tracker = tracker_of();
-    watch(tracker, loop, 32 + 30);
-    const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+    Watched w(100 + static_cast<std::uint64_t>(run), 32 + 30);
+    const Eigen::VectorXd ratio = w.errors();
     squares += ratio.cwiseAbs2() / kRuns;
     EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
-    chi_square += tracker.reference().chi_square / kRuns;
+    chi_square += w.tracker.reference().chi_square / kRuns;
   }
   // 10 runs of about 10 independent estimates: one deviation is 0.14.
   EXPECT_NEAR(squares.mean(), 1.0, 0.4) << squares.transpose();
@@ -81,23 +103,22 @@ TEST(ModelTracker, TheResponseHasTheTrackedChangesAndTheirCovariance) {
   StageProperties changed;
   changed.frequency_hz[1] *= 1.0 + 1e-4;
   changed.sensor_gain[0] = 1.001;
-  ModelTracker tracker = tracker_of();
-  LoopSpectra loop(5);
-  loop.become(changed);
-  watch(tracker, loop, 32 + 30);
-  const Eigen::VectorXd x = tracker.estimate();
-  const TrackedResponse response(model_of({}), tracker.parameters(), tracked_lines_hz());
-  const Eigen::MatrixXcd P = tracker.response();
+  Watched w(5);
+  w.loop.become(changed);
+  w.watch(32 + 30);
+  const Eigen::VectorXd x = w.tracker.estimate();
+  const TrackedResponse response(model_of({}), w.tracker.parameters(), tracked_lines_hz());
+  const Eigen::MatrixXcd P = w.tracker.response();
   EXPECT_EQ(P, response.at(x));
   // By differences, along the principal directions of the covariance.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(tracker.covariance());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(w.tracker.covariance());
   Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(P.rows(), P.cols());
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const Eigen::VectorXd step =
         axes.eigenvectors().col(i) * std::sqrt(std::max(axes.eigenvalues()[i], 0.0));
     variance += (0.5 * (response.at(x + step) - response.at(x - step))).cwiseAbs2();
   }
-  const Eigen::MatrixXd told = tracker.response_variance();
+  const Eigen::MatrixXd told = w.tracker.response_variance();
   EXPECT_LT(((told - variance).array() / variance.array()).abs().maxCoeff(), 1e-3);
   const Eigen::MatrixXcd truth = TrackedResponse(model_of(changed), {}, tracked_lines_hz()).at({});
   const Eigen::ArrayXXd ratio = (P - truth).cwiseAbs2().array() / told.array();
@@ -109,25 +130,20 @@ TEST(ModelTracker, AWrongResidueShowsInTheReferenceAndCausesNoAlarms) {
   AdditiveModel model = model_of({});
   // Not a gain of a channel: one entry of one mode.
   model.submodels[2].numerator[0](1, 0) *= 1.5;
-  LoopSpectra loop(2);
-  ModelTracker tracker = tracker_of(model);
-  watch(tracker, loop, 32 + 60);
-  EXPECT_GT(tracker.reference().chi_square[1], 3.0);
-  EXPECT_GT(tracker.reference().relative_error[1], 1e-3);
-  EXPECT_LT(tracker.reference().relative_error[1], 0.3);
+  const Watched w(2, 32 + 60, model);
+  EXPECT_GT(w.tracker.reference().chi_square[1], 3.0);
+  EXPECT_GT(w.tracker.reference().relative_error[1], 1e-3);
+  EXPECT_LT(w.tracker.reference().relative_error[1], 0.3);
 }
 
 TEST(ModelTracker, TheErrorOfTheModelIsThatBeforeTrackedChanges) {
-  StageProperties other;
-  other.sensor_gain[1] = 1.4;
-  LoopSpectra loop(3);
-  loop.become(other);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 32);
+  Watched w(3);
+  w.become([](StageProperties& stage) { stage.sensor_gain[1] = 1.4; });
+  w.watch(32);
   // The response of y2 is 1.4 times that of the model.
-  EXPECT_NEAR(tracker.reference().model_error[1], 0.4 / 1.4, 0.01);
-  EXPECT_LT(tracker.reference().model_error[0], 0.01);
-  EXPECT_LT(tracker.reference().relative_error.maxCoeff(), 0.01);
+  EXPECT_NEAR(w.tracker.reference().model_error[1], 0.4 / 1.4, 0.01);
+  EXPECT_LT(w.tracker.reference().model_error[0], 0.01);
+  EXPECT_LT(w.tracker.reference().relative_error.maxCoeff(), 0.01);
 }
 
 struct Case {
@@ -140,8 +156,7 @@ std::vector<Case> cases() {
   const std::string gains = "gains of all sensors or of all actuators";
   return {
       {"frequency of the mode at 122 Hz", 2e-3, [](auto& s) { s.frequency_hz[1] *= 1.002; }},
-      // By three half-power bandwidths.
-      {"frequency of the mode at 122 Hz", 0.06, [](auto& s) { s.frequency_hz[1] *= 1.06; }},
+      {"frequency of the mode at 122 Hz", 0.06, move_second_mode},
       {"frequency of the mode at 122 Hz", -0.06, [](auto& s) { s.frequency_hz[1] *= 0.94; }},
       // General viscous damping.
       {"frequency of the mode at 253 Hz", -4e-3, [](auto& s) { s.frequency_hz[3] *= 0.996; }},
@@ -159,26 +174,14 @@ std::vector<Case> cases() {
   };
 }
 
-/// The change that the tracker finds in the next periods.
-StageChange next_change(ModelTracker& tracker, LoopSpectra& loop) {
-  for (int t = 0; t < 40; ++t)
-    if (const TrackedPeriod period = tracker.add(loop.next()); period.change) return *period.change;
-  ADD_FAILURE() << "no change";
-  return {};
-}
-
 TEST(ModelTracker, NamesAndSizesEachChange) {
   std::uint64_t seed = 200;
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
-    LoopSpectra loop(++seed);
-    ModelTracker tracker = tracker_of();
-    watch(tracker, loop, 40);
-    StageProperties stage;
-    c.change(stage);
-    loop.become(stage);
-    const StageChange change = next_change(tracker, loop);
-    EXPECT_EQ(describe(change.what, tracker.parameters(), model_of({})), c.name);
+    Watched w(++seed, 40);
+    w.become(c.change);
+    const StageChange change = w.next_change();
+    EXPECT_EQ(w.name(change), c.name);
     EXPECT_LT(std::abs(change.size - c.size), 4.0 * change.deviation) << change.size;
     EXPECT_LT(change.deviation, 0.25 * std::abs(c.size)) << "too small to be tested";
     EXPECT_GT(change.probability, 0.9);
@@ -190,25 +193,18 @@ TEST(ModelTracker, NamesAndSizesEachChange) {
 // In the response before the change, the noise in U raises that of the residual up to fifty times with these seeds.
 TEST(ModelTracker, DoesNotTakeALargeChangeForNoise) {
   for (const std::uint64_t seed : {5, 18, 29}) {
-    LoopSpectra loop(seed);
-    ModelTracker tracker = tracker_of();
-    watch(tracker, loop, 40);
-    StageProperties stage;
-    stage.frequency_hz[1] *= 1.06;
-    loop.become(stage);
-    EXPECT_EQ(describe(next_change(tracker, loop).what, tracker.parameters(), model_of({})),
-              "frequency of the mode at 122 Hz");
+    Watched w(seed, 40);
+    w.become(move_second_mode);
+    EXPECT_EQ(w.name(w.next_change()), "frequency of the mode at 122 Hz");
   }
 }
 
 /// Size of a change of noise by a factor, in its deviations from the truth.
 double error_of_noise_change(double factor, std::uint64_t seed) {
-  LoopSpectra loop(seed);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 40);
-  loop.multiply_noise(1, factor);
-  const StageChange change = next_change(tracker, loop);
-  EXPECT_EQ(describe(change.what, tracker.parameters(), model_of({})), "noise of sensor 'y2'");
+  Watched w(seed, 40);
+  w.loop.multiply_noise(1, factor);
+  const StageChange change = w.next_change();
+  EXPECT_EQ(w.name(change), "noise of sensor 'y2'");
   EXPECT_LT(change.deviation, 0.25 * factor) << "too small to be tested";
   return (change.size - (factor - 1.0)) / change.deviation;
 }
@@ -224,80 +220,62 @@ TEST(ModelTracker, NamesAndSizesMoreAndLessNoise) {
 
 // Far from the model, where the derivatives of the first reference no longer apply.
 TEST(ModelTracker, LearnsTheStageAgainAfterAChange) {
-  LoopSpectra loop(4);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 40);
-  StageProperties stage;
-  stage.frequency_hz[1] *= 1.06;
-  loop.become(stage);
-  next_change(tracker, loop);
-  EXPECT_TRUE(watch(tracker, loop, 32).learning);
-  EXPECT_FALSE(watch(tracker, loop, 30).learning);
+  Watched w(4, 40);
+  w.become(move_second_mode);
+  w.next_change();
+  EXPECT_TRUE(w.watch(32).learning);
+  EXPECT_FALSE(w.watch(30).learning);
   Eigen::VectorXd truth = Eigen::VectorXd::Zero(14);
   truth[1] = 0.06;
-  const Eigen::VectorXd ratio = errors(tracker, truth);
-  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
-  for (const double value : tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
+  expect_small(w.errors(truth));
+  for (const double value : w.tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
 }
 
 // The power of the motion is some hundred times that of the noise on the lines near two resonances.
 TEST(ModelTracker, AMotionThatWasLearnedCausesNeitherAlarmsNorErrors) {
-  LoopSpectra loop(11);
-  loop.move(10.0);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 32 + 100);
-  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
-  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
-  for (const double value : tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
+  Watched w(11);
+  w.loop.move(10.0);
+  w.watch(32 + 100);
+  expect_small(w.errors());
+  for (const double value : w.tracker.reference().chi_square) EXPECT_NEAR(value, 1.0, 0.5);
   // Not because nothing is seen any more.
-  StageProperties stage;
-  stage.frequency_hz[2] *= 1.005;
-  loop.become(stage);
-  EXPECT_EQ(describe(next_change(tracker, loop).what, tracker.parameters(), model_of({})),
-            "frequency of the mode at 188 Hz");
+  w.become([](StageProperties& stage) { stage.frequency_hz[2] *= 1.005; });
+  EXPECT_EQ(w.name(w.next_change()), "frequency of the mode at 188 Hz");
 }
 
 TEST(ModelTracker, AMotionThatBeginsIsNamedAndLearned) {
-  LoopSpectra loop(12);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 40);
-  loop.move(10.0);
-  EXPECT_EQ(next_change(tracker, loop).what.kind, ChangeKind::motion);
-  EXPECT_TRUE(watch(tracker, loop, 32).learning);
-  EXPECT_FALSE(watch(tracker, loop, 60).learning);
-  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
-  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+  Watched w(12, 40);
+  w.loop.move(10.0);
+  EXPECT_EQ(w.next_change().what.kind, ChangeKind::motion);
+  EXPECT_TRUE(w.watch(32).learning);
+  EXPECT_FALSE(w.watch(60).learning);
+  expect_small(w.errors());
 }
 
 TEST(ModelTracker, ADisturbancePassesWithoutAChange) {
-  LoopSpectra loop(4);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 40);
-  const Eigen::VectorXd before = tracker.estimate();
-  const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
-  EXPECT_FALSE(tracker.add(loop.next(20.0)).change) << "it may still last";
-  EXPECT_EQ(next_change(tracker, loop).what.kind, ChangeKind::disturbance);
-  EXPECT_EQ(tracker.estimate(), before);
-  EXPECT_FALSE(watch(tracker, loop, 20).learning);
+  Watched w(4, 40);
+  const Eigen::VectorXd before = w.tracker.estimate();
+  const Eigen::VectorXd deviation = w.tracker.covariance().diagonal().cwiseSqrt();
+  EXPECT_FALSE(w.tracker.add(w.loop.next(20.0)).change) << "it may still last";
+  EXPECT_EQ(w.next_change().what.kind, ChangeKind::disturbance);
+  EXPECT_EQ(w.tracker.estimate(), before);
+  EXPECT_FALSE(w.watch(20).learning);
   // 20 of 60 periods are new: the estimates move by less than their deviations.
-  EXPECT_LT((tracker.estimate() - before).cwiseQuotient(deviation).cwiseAbs().maxCoeff(), 3.0);
+  EXPECT_LT((w.tracker.estimate() - before).cwiseQuotient(deviation).cwiseAbs().maxCoeff(), 3.0);
 }
 
 TEST(ModelTracker, AnotherExcitationIsLearnedAndTheEstimatesContinue) {
-  LoopSpectra loop(5);
-  ModelTracker tracker = tracker_of();
-  watch(tracker, loop, 50);
-  const Eigen::VectorXd before = tracker.covariance().diagonal();
-  tracker.change_excitation();
-  loop.excite();
-  const TrackedPeriod learning = watch(tracker, loop, 32);
+  Watched w(5, 50);
+  const Eigen::VectorXd before = w.tracker.covariance().diagonal();
+  w.tracker.change_excitation();
+  w.loop.excite();
+  const TrackedPeriod learning = w.watch(32);
   EXPECT_TRUE(learning.learning);
-  EXPECT_FALSE(watch(tracker, loop, 30).learning);
-  const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
-  EXPECT_LT(ratio.cwiseAbs().maxCoeff(), 4.5) << ratio.transpose();
+  EXPECT_FALSE(w.watch(30).learning);
+  expect_small(w.errors());
   // With a memory of 100, the variance after n periods is proportional to (1 - e^(-2n/100)) / (1 - e^(-n/100))^2: 0.48
   // of that after 50 remain after 112. The excitations differ by a factor of two on some lines.
-  const double kept = tracker.covariance().diagonal().cwiseQuotient(before).mean();
+  const double kept = w.tracker.covariance().diagonal().cwiseQuotient(before).mean();
   EXPECT_GT(kept, 0.48 / 2.0);
   EXPECT_LT(kept, 0.48 * 1.6);
 }
@@ -307,14 +285,13 @@ TEST(ModelTracker, AnExcitationThatShowsAModeCorrectsOneThatDoesNot) {
   constexpr int kRuns = 10;
   double squares = 0.0;
   for (int run = 0; run < kRuns; ++run) {
-    LoopSpectra loop(300 + static_cast<std::uint64_t>(run));
-    ModelTracker tracker = tracker_of();
-    loop.excite_all_but(2);
-    watch(tracker, loop, 34);
-    tracker.change_excitation();
-    loop.excite();
-    watch(tracker, loop, 34);
-    const Eigen::VectorXd ratio = errors(tracker, Eigen::VectorXd::Zero(14));
+    Watched w(300 + static_cast<std::uint64_t>(run));
+    w.loop.excite_all_but(2);
+    w.watch(34);
+    w.tracker.change_excitation();
+    w.loop.excite();
+    w.watch(34);
+    const Eigen::VectorXd ratio = w.errors();
     squares += (ratio[2] * ratio[2] + ratio[6] * ratio[6]) / (2 * kRuns);
   }
   // Frequency and damping ratio of the mode: 20 values, one deviation is 0.32. Without a new linearization it is 2.5.
