@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdint>
 #include <numbers>
-#include <random>
+
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test {
 namespace {
@@ -16,27 +16,9 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr double delay_s = 1.63e-4;
 
-/// Uniform and normal numbers that do not depend on the standard library's distributions.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
-  double normal() {
-    return std::sqrt(-2.0 * std::log(1.0 - uniform())) * std::cos(2.0 * pi * uniform());
-  }
-  /// E|z|^2 = 1.
-  std::complex<double> circular() {
-    const double re = normal();
-    return std::complex<double>(re, normal()) / std::sqrt(2.0);
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
-
 /// Circular Gaussian noise of the variance on every number.
 Eigen::MatrixXcd with_noise(const Eigen::MatrixXcd& response, const Eigen::MatrixXd& variance,
-                            Random& random) {
+                            RandomNumbers& random) {
   Eigen::MatrixXcd out = response;
   for (Eigen::Index k = 0; k < out.cols(); ++k)
     for (Eigen::Index c = 0; c < out.rows(); ++c)
@@ -68,15 +50,14 @@ std::pair<double, double> position(Eigen::Index i, Eigen::Index of) {
 std::vector<Channel> places(const ChannelList& channels) {
   std::vector<Channel> out;
   for (const std::string& name : channels.names) {
-    const auto [x, y] = position(static_cast<Eigen::Index>(out.size()),
-                                 static_cast<Eigen::Index>(channels.names.size()));
+    const auto [x, y] = position(std::ssize(out), std::ssize(channels.names));
     out.push_back({name, {}, {0.3 * x, 0.3 * y, 0.0}});
   }
   return out;
 }
 
 AdditiveModel synthetic_model(const SyntheticSize& size, std::vector<TrueMode>& truth,
-                              Random& random) {
+                              RandomNumbers& random) {
   AdditiveModel model;
   model.inputs = named("az", size.inputs, "N");
   model.outputs = named("z", size.outputs, "m");
@@ -150,7 +131,7 @@ Eigen::MatrixXd noise_variance(const Eigen::MatrixXcd& response, const Eigen::Ve
 }
 
 /// Random estimates with `dof` degrees of freedom: chi-square variables divided by them.
-Eigen::MatrixXd estimated(const Eigen::MatrixXd& variance, int dof, Random& random) {
+Eigen::MatrixXd estimated(const Eigen::MatrixXd& variance, int dof, RandomNumbers& random) {
   return variance.unaryExpr([&](double exact) {
     double sum = 0.0;
     for (int i = 0; i < dof; ++i) sum += std::pow(random.normal(), 2);
@@ -158,7 +139,7 @@ Eigen::MatrixXd estimated(const Eigen::MatrixXd& variance, int dof, Random& rand
   });
 }
 
-void add_measurement(ReportData& data, const SyntheticSize& size, Random& random) {
+void add_measurement(ReportData& data, const SyntheticSize& size, RandomNumbers& random) {
   FrfEstimate frf;
   const double step = 2000.0 / static_cast<double>(size.lines);
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(size.lines, 0.5 * step, 2000.0 - 0.5 * step);
@@ -290,7 +271,7 @@ void add_checks(ReportData& data) {
 }  // namespace
 
 ReportData synthetic_report(const SyntheticSize& size) {
-  Random random(1);
+  RandomNumbers random(1);
   ReportData data;
   data.title = "Wafer stage, out of plane";
   data.model = synthetic_model(size, data.true_modes, random);
@@ -340,7 +321,7 @@ void add_other_day(ReportData& data) {
       submodel.denominator[1] /= 1.0 + kOtherDayShift;
       submodel.denominator[2] /= (1.0 + kOtherDayShift) * (1.0 + kOtherDayShift);
     }
-  Random random(2);
+  RandomNumbers random(2);
   other.model_response = 0.98 * data.model_response;
   other.response = with_noise(other.model_response, data.frf->total_variance, random);
   data.comparison = other;
