@@ -1,5 +1,6 @@
 #include "tools/fleet/identify_log.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -38,14 +39,8 @@ std::string changed_utc(const std::filesystem::path& log) {
   std::error_code error;
   const auto changed = std::filesystem::last_write_time(log, error);
   if (error) return "";
-  const auto time = std::chrono::file_clock::to_sys(changed);
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(
-      std::chrono::time_point_cast<std::chrono::system_clock::duration>(time));
-  std::tm utc{};
-  ::gmtime_r(&seconds, &utc);
-  char text[32];
-  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", std::chrono::floor<std::chrono::seconds>(
+                                                  std::chrono::file_clock::to_sys(changed)));
 }
 
 /// Stage and time that neither table nor key determine.
