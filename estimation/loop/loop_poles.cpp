@@ -3,8 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
@@ -86,13 +86,13 @@ int outside(const Eigen::VectorXcd& poles) {
 LoopPoles loop_poles(const AdditiveModel& model, const LoopController& controller) {
   const SampledStateSpace sampled = sampled_state_space(model);
   if (sampled.input_delay_samples.minCoeff() < 0)
-    throw std::invalid_argument(
+    fail_request(
         "model: a delay is negative, so the poles of the loop are unknown; fit with '--delay "
         "estimate'");
   const Eigen::VectorXcd poles =
       balanced_eigenvalues(closed_loop(with_delay_states(sampled), controller));
   if (!poles.allFinite())
-    throw std::invalid_argument("model: the poles of the loop with this controller are not finite");
+    fail_request("model: the poles of the loop with this controller are not finite");
   LoopPoles out;
   Eigen::Index outermost = 0;
   if (poles.size() > 0) out.largest_pole = poles.cwiseAbs().maxCoeff(&outermost);

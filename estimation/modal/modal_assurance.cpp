@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -45,8 +46,7 @@ std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
 }  // namespace
 
 Eigen::MatrixXd modal_assurance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b) {
-  if (a.rows() != b.rows())
-    throw std::invalid_argument("MAC: both sets of shapes must have the same channels");
+  if (a.rows() != b.rows()) fail_request("MAC: both sets of shapes must have the same channels");
   Eigen::MatrixXd mac = (a.adjoint() * b).cwiseAbs2();
   for (Eigen::Index i = 0; i < mac.rows(); ++i)
     for (Eigen::Index j = 0; j < mac.cols(); ++j)

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "excitation/threads/team.hpp"
 #include "frf/response/neighbour_scatter.hpp"
@@ -233,7 +233,7 @@ ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelBlockResponse&
   const Team& team = of_processes != nullptr ? *of_processes : Team::one();
   if (weights.size() > 0 &&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
-    throw std::invalid_argument("residual: the weights must have the shape of the response");
+    fail_request("residual: the weights must have the shape of the response");
   const auto judge_with = [&](ResidualVariance kind, const Eigen::MatrixXd& variance, double dof) {
     return judge_by(
         frf, model, weights, kind, dof, variance,

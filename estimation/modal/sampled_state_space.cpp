@@ -1,8 +1,8 @@
 #include "estimation/modal/sampled_state_space.hpp"
 
 #include <cmath>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/modal/singular_shapes.hpp"
 #include "estimation/model/hold_integral.hpp"
 
@@ -134,7 +134,7 @@ void append_delay_states(const Eigen::MatrixXd& late, StateSpace& system) {
 
 SampledStateSpace sampled_state_space(const AdditiveModel& model) {
   if (!(model.sample_rate_hz > 0.0))
-    throw std::invalid_argument(
+    fail_request(
         "model: a sampled state space needs a sample rate, but the model has none; set "
         "sample_rate_hz");
   const StateSpace continuous = state_space(model);

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/fail.hpp"
@@ -71,7 +70,7 @@ void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
 
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Distortion& known) {
   if (model.inputs.names != frf.inputs.names || model.outputs.names != frf.outputs.names)
-    throw std::invalid_argument(
+    fail_request(
         "validate: the model and the FRF have different channels; select the same inputs and "
         "outputs in the same order");
   require_same_units("input", model.inputs, frf.inputs);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/model/basis.hpp"
 
 namespace stageid {
@@ -41,12 +41,10 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
                           const Eigen::Ref<const Eigen::VectorXd>& frequency_hz, HoldModel hold,
                           Eigen::Index first, Eigen::Index count) {
   if (hold != HoldModel::none && !(model.sample_rate_hz > 0.0))
-    throw std::invalid_argument(
-        "model: a hold needs a sample rate, but the model has none; use hold none");
+    fail_request("model: a hold needs a sample rate, but the model has none; use hold none");
   if (hold == HoldModel::exact && frequency_hz.size() > 0 &&
       frequency_hz.maxCoeff() > 0.5 * model.sample_rate_hz * (1.0 + 1e-9))
-    throw std::invalid_argument(
-        "model: a frequency is above half the sample rate; omit it or use hold none");
+    fail_request("model: a frequency is above half the sample rate; omit it or use hold none");
   const ModelLines lines{2.0 * std::numbers::pi * frequency_hz,
                          model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0, hold};
   Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(count, frequency_hz.size());

@@ -1,8 +1,8 @@
 #include "estimation/model/basis.hpp"
 
 #include <cmath>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "estimation/model/partial_fractions.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
@@ -54,8 +54,8 @@ void evaluate_basis(const HoldEquivalent& through, const SubmodelShape& shape,
   const Eigen::Index N = through.lines();
   const int n = shape.order;
   const int l = shape.integrators;
-  if (shape.numerator_degree > n + l) throw std::invalid_argument("model: a submodel is improper");
-  if (l > 2) throw std::invalid_argument("model: at most two integrators in a submodel");
+  if (shape.numerator_degree > n + l) fail_request("model: a submodel is improper");
+  if (l > 2) fail_request("model: at most two integrators in a submodel");
 
   std::vector<Complex> poles(1);  // [0]: the origin
   for (const Complex lambda : roots(a)) poles.push_back(lambda);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/response/dc_line.hpp"
@@ -23,8 +23,7 @@ Eigen::MatrixXd element_weights(const FrfEstimate& frf, CmifKind kind, Eigen::In
     const Eigen::MatrixXd& noise =
         frf.noise_variance.size() > 0 ? frf.noise_variance : frf.total_variance;
     if (noise.size() == 0)
-      throw std::invalid_argument(
-          "CMIF: whitening needs variances, but the FRF has none; use accelerance");
+      fail_request("CMIF: whitening needs variances, but the FRF has none; use accelerance");
     weights.reshaped() = noise.col(k).cwiseSqrt().cwiseInverse();
   }
   return weights;
@@ -143,7 +142,7 @@ Eigen::MatrixXd cmif(const FrfEstimate& frf, CmifKind kind) {
 Eigen::MatrixXd cmif_deviation(const FrfEstimate& frf, CmifKind kind,
                                const Eigen::MatrixXd& variance) {
   if (variance.rows() != frf.response.rows() || variance.cols() != frf.response.cols())
-    throw std::invalid_argument("CMIF: the variance must have the shape of the response");
+    fail_request("CMIF: the variance must have the shape of the response");
   const Eigen::Index curves = std::min(frf.n_outputs(), frf.n_inputs());
   Eigen::MatrixXd deviation(curves, frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {

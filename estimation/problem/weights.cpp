@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -92,15 +91,16 @@ Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& 
 Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof, const char* name) {
   if (variance.size() == 0)
-    throw std::invalid_argument(
-        std::string("weighting ") + name + " needs /" + name +
-        " in the FRF, which is missing; use relative, or measure more periods or realizations");
+    fail_request(
+        "weighting {0} needs /{0} in the FRF, which is missing; use relative, or measure more "
+        "periods or realizations",
+        name);
   for (Eigen::Index k = 0; k < variance.cols(); ++k)
     for (Eigen::Index c = 0; c < variance.rows(); ++c)
       if (!(variance(c, k) > 0.0) || !std::isfinite(variance(c, k)))
-        throw std::invalid_argument(
-            std::string(name) + " of " + channel_name(frf, c, k) +
-            " is zero or not finite; with this weighting every variance must be positive");
+        fail_request(
+            "{} of {} is zero or not finite; with this weighting every variance must be positive",
+            name, channel_name(frf, c, k));
   return smoothed_inverse(frf, variance, dof);
 }
 
@@ -110,9 +110,10 @@ Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
     for (Eigen::Index c = 0; c < W.rows(); ++c) {
       const double magnitude = std::abs(frf.response(c, k));
       if (!(magnitude > 0.0))
-        throw std::invalid_argument("response of " + channel_name(frf, c, k) +
-                                    " is zero, so its relative error is undefined; exclude the "
-                                    "channel or line, or use weighting unit");
+        fail_request(
+            "response of {} is zero, so its relative error is undefined; exclude the channel or "
+            "line, or use weighting unit",
+            channel_name(frf, c, k));
       W(c, k) = std::pow(magnitude, -exponent);
       if (!std::isnormal(W(c, k)))
         fail_request(
@@ -190,13 +191,12 @@ SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOpti
   }
   const Eigen::MatrixXd& W = options.user_weights;
   if (W.rows() != frf.response.rows() || W.cols() != frf.response.cols())
-    throw std::invalid_argument("user weights: the shape must be that of the response in the band");
+    fail_request("user weights: the shape must be that of the response in the band");
   if (W.allFinite() && W.minCoeff() < 0.0)
     throw IndefiniteWeights(
         "user weights: a weight is negative, so the cost would have no minimum");
   if (!W.allFinite() || !(W.maxCoeff() > 0.0))
-    throw std::invalid_argument(
-        "user weights: all weights must be finite, and at least one positive");
+    fail_request("user weights: all weights must be finite, and at least one positive");
   return options.user_weights;
 }
 

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-
 #include "acquisition/files/fail.hpp"
 #include "estimation/request/submodel_text.hpp"
 
@@ -27,7 +25,7 @@ void choose_submodels(const FitRequest& request, FitSetup& setup) {
   const bool nothing = structure.submodels.empty() && !structure.suspension &&
                        !structure.common.rigid_body && !structure.common.direct_term;
   if (modes_kind(request) == ModesRequest::Kind::none && nothing)
-    throw std::invalid_argument(
+    fail_request(
         "modes: got none; expected at least one of modes, a rigid body, a direct term and a "
         "submodel");
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -68,7 +67,7 @@ Eigen::VectorXd lines_of(const ExportFlags& flags, const AdditiveModel& model) {
 /// The loop of the model with the controller of a stage file.
 void export_controller_view(const ExportFlags& flags, Console& console) {
   if (!flags.driving_point.empty())
-    throw std::invalid_argument("--driving-point: not with --controller-view; remove one");
+    fail_request("--driving-point: not with --controller-view; remove one");
   require_ending(flags.output, "a controller view", {".json", ".csv"});
   require_no_input(flags.output, {flags.input, flags.frf, flags.stage, flags.covariance});
   const AdditiveModel model = read_model(flags.input);
@@ -134,7 +133,7 @@ void export_from_frf(const ExportFlags& flags) {
 
 void export_file(const ExportFlags& flags, Console& console) {
   if (!flags.covariance.empty() && flags.stage.empty())
-    throw std::invalid_argument("--covariance: needs --controller-view STAGE; add it");
+    fail_request("--covariance: needs --controller-view STAGE; add it");
   if (is_hdf5(flags.input))
     export_from_frf(flags);
   else if (!flags.stage.empty())

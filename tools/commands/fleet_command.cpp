@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -231,8 +230,7 @@ void fleet_command(CLI::App& app, Console& console) {
     if (!fleet.get_subcommands().empty() && !flags->config.empty())
       fail_request("unexpected argument '{}'; see 'stageid fleet --help'", flags->config.string());
     if (fleet.get_subcommands().empty() && flags->config.empty())
-      throw std::invalid_argument(
-          "fleet: a fleet file or a subcommand is missing; see 'stageid fleet --help'");
+      fail_request("fleet: a fleet file or a subcommand is missing; see 'stageid fleet --help'");
   });
   fleet.final_callback([&console, flags] {
     if (!flags->config.empty()) run_jobs(*flags, console);

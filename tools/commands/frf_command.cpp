@@ -7,7 +7,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -89,13 +88,13 @@ void estimate_response(const FrfFlags& flags, Console& console) {
     options.realizations.push_back(realization - 1);
   }
   if (flags.delay_s && flags.compensate == Compensation::none)
-    throw std::invalid_argument(
+    fail_request(
         "--delay: has no effect without --compensate; add --compensate delay or hold, or omit "
         "--delay");
   require_writable(flags.output, flags.logs);
   require_frf_ending(flags.output);
   if (!flags.fft_wisdom.empty() && console.team->size() > 1)
-    throw std::invalid_argument(
+    fail_request(
         "--fft-wisdom: each process would time its own plans; omit it, or use one process");
   std::optional<FftWisdomFile> wisdom;
   if (!flags.fft_wisdom.empty()) wisdom.emplace(flags.fft_wisdom);

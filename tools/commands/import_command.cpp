@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/version.hpp"
@@ -51,7 +52,7 @@ struct ImportFlags {
 };
 
 void list_arrays(const ImportFlags& flags, Console& console) {
-  if (!flags.map.empty()) throw std::invalid_argument("--map: needs an output file; add -o FILE");
+  if (!flags.map.empty()) fail_request("--map: needs an output file; add -o FILE");
   std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   const ArrayList arrays = read_foreign_arrays(flags.input);
@@ -74,7 +75,7 @@ void list_arrays(const ImportFlags& flags, Console& console) {
 }
 
 void require_foreign_file(const ImportFlags& flags) {
-  if (flags.input.empty()) throw std::invalid_argument("FILE is missing; give the file to import");
+  if (flags.input.empty()) fail_request("FILE is missing; give the file to import");
 }
 
 ImportSummary import_with_map(const ImportFlags& flags) {

@@ -252,7 +252,7 @@ void serve_can(const NodeFlags& flags, Console& console, const StageConfig& conf
 
 void serve(const NodeFlags& flags, Console& console) {
   if (flags.can_interfaces.empty() && !flags.modbus.wanted())
-    throw std::invalid_argument(
+    fail_request(
         "node: nothing to serve; add --can INTERFACE, --modbus-tcp PORT or --modbus-rtu DEVICE");
   const StageConfig config = load_stage_config(flags.config);
   if (!config.plant)

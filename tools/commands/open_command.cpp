@@ -1,8 +1,8 @@
 #include <chrono>
 #include <cstdio>
-#include <stdexcept>
 #include <thread>
 
+#include "acquisition/files/fail.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/terminal/interrupt.hpp"
@@ -15,7 +15,7 @@ namespace {
 /// stageid open DIR|FILE...
 void open_workbench(const WorkbenchOptions& flags, Console& console) {
   if (!flags.write && !flags.directory.empty())
-    throw std::invalid_argument("--output: the workbench is read-only; add --write");
+    fail_request("--output: the workbench is read-only; add --write");
   if (!flags.directory.empty()) require_directory(flags.directory);
   Workbench workbench(flags);
   const CleanedUpAtInterrupt tells_the_pages([&workbench] { workbench.end(); });

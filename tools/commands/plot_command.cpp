@@ -8,7 +8,6 @@
 #include <cctype>
 #include <filesystem>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -118,7 +117,7 @@ void keep_band(const std::vector<double>& band_hz, ReportData& data) {
 
 Picture cmif_of(const PlotFlags& flags, const ReportData& data) {
   if (!flags.output_channels.empty() || !flags.input_channels.empty())
-    throw std::invalid_argument(
+    fail_request(
         "cmif: always uses all channels; --output-channel and --input-channel are for bode and "
         "entry");
   // Without modes.json and model, show the modes with which a fit would start.

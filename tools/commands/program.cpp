@@ -138,7 +138,7 @@ class Program {
     refuse_empty_words(argc, argv);
     if (!parse(argc, argv)) return kDone;
     if (app_.get_subcommands().empty())
-      throw std::invalid_argument("no command given; 'stageid --help' lists the commands");
+      fail_request("no command given; 'stageid --help' lists the commands");
     meet_team();
     return console_.exit_code;
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <stdexcept>
 
 #include "acquisition/files/fail.hpp"
 #include "hal/can/can_zeromq.hpp"
@@ -96,8 +95,7 @@ CanConfig complete_can(const CanFile& file, const StageInfo& info, const StageLi
   CanConfig config = file.config;
   CanSpec& spec = config.spec;
   if (spec.node_clock && info.clock != Clock::wall)
-    throw std::invalid_argument(
-        "can: clock: node needs the wall clock; set pace: 1, or clock: host");
+    fail_request("can: clock: node needs the wall clock; set pace: 1, or clock: host");
   const double pause_s = can_longest_pause_s(spec, info);
   if (file.watchdog_s > 0.0 && file.watchdog_s < pause_s && config.mode == CanMode::streaming)
     fail_request(

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 
 #include "acquisition/files/fail.hpp"
 #include "hal/simulator/rigid_body.hpp"
@@ -139,7 +138,7 @@ class LoopBuilder {
   LoopController finish(std::vector<std::string> names, Eigen::MatrixXd T,
                         const ControllerStateSpace& k) const {
     if (names.empty())
-      throw std::invalid_argument(
+      fail_request(
           "its controller closes no loop between channels of the model; use the stage file of the "
           "measurement");
     LoopController out{std::move(names), std::move(T), {}};
@@ -160,7 +159,7 @@ class LoopBuilder {
 
 LoopController stage_loop(const StageSpec& stage, const AdditiveModel& model) {
   if (stage.controller.by_peer)
-    throw std::invalid_argument(
+    fail_request(
         "the stage closes its loop by a controller of its own ('controller: peer'); write its "
         "matrices or transfer functions into a copy of the stage file");
   const double rate_hz = stage.info.sample_rate_hz;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <stdexcept>
 
 #include "acquisition/files/fail.hpp"
 #include "estimation/modal/modal_assurance.hpp"
@@ -108,8 +107,7 @@ ReportComparison make_comparison(ReportData& own, std::string title,
                                  std::optional<AdditiveModel> model,
                                  const std::optional<FrfEstimate>& frf) {
   if (!own.frf && !own.model)
-    throw std::invalid_argument(
-        "--compare: the report has neither a response nor a model; add one to its inputs");
+    fail_request("--compare: the report has neither a response nor a model; add one to its inputs");
   if (frf) check_channels(own, title, frf->outputs, frf->inputs);
   if (model) check_channels(own, title, model->outputs, model->inputs);
   ReportComparison comparison;

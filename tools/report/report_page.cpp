@@ -1,7 +1,5 @@
 #include "tools/report/report_page.hpp"
 
-#include <stdexcept>
-
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/output_file.hpp"
 #include "tools/report/html_page.hpp"
@@ -23,8 +21,7 @@ void check_shape(const char* name, const Matrix& matrix, Eigen::Index rows, Eige
 void check_data(const ReportData& data) {
   if (!data.frf) {
     if (data.validation_frf)
-      throw std::invalid_argument(
-          "report: the held-back response needs the fitted one; add its file");
+      fail_request("report: the held-back response needs the fitted one; add its file");
     return;
   }
   const FrfEstimate& frf = *data.frf;
@@ -32,14 +29,14 @@ void check_data(const ReportData& data) {
   check_shape("model_response", data.model_response, channels, frf.lines());
   check_shape("model_variance", data.model_variance, channels, frf.lines());
   if (data.model_variance.size() > 0 && data.model_variance.minCoeff() < 0.0)
-    throw std::invalid_argument("model_variance: negative");
+    fail_request("model_variance: negative");
   if (data.comparison)
     check_shape("comparison.model_response", data.comparison->model_response, channels,
                 frf.lines());
   if (!data.validation_frf) return;
   check_shape("validation_frf", data.validation_frf->response, channels, frf.lines());
   if (data.validation_frf->frequency_hz != frf.frequency_hz)
-    throw std::invalid_argument("validation_frf: its lines differ from those of frf");
+    fail_request("validation_frf: its lines differ from those of frf");
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
@@ -94,8 +93,7 @@ constexpr std::pair<const char*, std::string FitWords::*> kControls[] = {
 std::string modes_word(const Json& action) {
   std::string word = text_in(action, "modes");
   const bool number = word.find_first_not_of("0123456789") == std::string::npos && word.size() <= 4;
-  if (word != "auto" && !number)
-    throw std::invalid_argument("modes: expected auto or a number of modes");
+  if (word != "auto" && !number) fail_request("modes: expected auto or a number of modes");
   return word;
 }
 
@@ -141,7 +139,7 @@ Edit edited(const Json& action, FitRequest request) {
   if (kind == "remove") return remove_mode(action, std::move(request));
   if (kind == "band") return set_band(action, std::move(request));
   if (kind == "refit") return refit(action, std::move(request));
-  throw std::invalid_argument("unknown action");
+  fail_request("unknown action");
 }
 
 Json controls_json(const FitRequest& request) {

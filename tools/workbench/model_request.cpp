@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "tools/fit/fit_words.hpp"
@@ -80,7 +80,7 @@ ModeCandidate rounded_mode(double frequency_hz, double damping_ratio) {
 FitRequest with_modes_of(const AdditiveModel& model, FitRequest request, double lowest_hz) {
   using Body = RigidBodyRequest::Kind;
   if (!request.submodels.empty())
-    throw std::invalid_argument(
+    fail_request(
         "a model with requested submodels cannot be edited mode by mode; fit it without "
         "--submodel");
   const bool suspended = request.rigid_body.kind == Body::suspension;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
@@ -68,7 +69,7 @@ FitRequest Workbench::editable() const {
   FitRequest request = state.request;
   if (request.modes.kind == ModesRequest::Kind::given) return request;
   if (state.needs_fit() && request.modes.kind != ModesRequest::Kind::none)
-    throw std::invalid_argument("the search is not finished; wait for it, stop it, or undo");
+    fail_request("the search is not finished; wait for it, stop it, or undo");
   request.modes = {ModesRequest::Kind::none, 0, {}};
   return request;
 }
