@@ -128,7 +128,7 @@ void ArrowSystem::add_denominators(const LineSums& sums, GlobalSums& out) const 
   auto M = out.M();
   auto e = out.e();
   const Eigen::Index n_a = problem_.denominators();
-  const auto n_d = static_cast<Eigen::Index>(shared_.columns.size());
+  const auto n_d = std::ssize(shared_.columns);
   for (Eigen::Index d = 0; d < n_d; ++d)
     for (Eigen::Index o = 0; o < n_d; ++o) {
       const Eigen::Index p = shared_.columns[static_cast<std::size_t>(d)].parameter;
@@ -147,7 +147,7 @@ void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Ei
                               Channel& channel) const {
   const Eigen::Index n_f = problem_.functions();
   const Eigen::Index n_a = problem_.denominators();
-  const auto n_d = static_cast<Eigen::Index>(shared_.columns.size());
+  const auto n_d = std::ssize(shared_.columns);
   channel.bb = from_triangle(sums.FF.col(member), n_f);
   channel.ab.setZero(problem_.globals(), n_f);
   const auto FD = sums.FD.col(member).reshaped(n_d, n_f);

@@ -72,8 +72,8 @@ Eigen::VectorXd FactoredEquations::solve_globals(double damping,
                                                  const std::vector<Eigen::Index>& frozen) const {
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < R_.cols(); ++i)
-    if (std::find(frozen.begin(), frozen.end(), i) == frozen.end()) free.push_back(i);
-  const auto n = static_cast<Eigen::Index>(free.size());
+    if (std::ranges::find(frozen, i) == frozen.end()) free.push_back(i);
+  const auto n = std::ssize(free);
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(R_.rows() + n, n);
   A.topRows(R_.rows()) = R_(Eigen::all, free);
   const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300).cwiseInverse();

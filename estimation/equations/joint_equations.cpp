@@ -64,7 +64,7 @@ Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Index
   const Eigen::MatrixXd dB = v.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
   Eigen::MatrixXcd change(problem_.channels(), lines);
   for (const BasisGroup& group : groups_) {
-    Eigen::MatrixXd coefficients(static_cast<Eigen::Index>(group.channels.size()), 2 * n_f);
+    Eigen::MatrixXd coefficients(std::ssize(group.channels), 2 * n_f);
     coefficients << dB(group.channels, Eigen::all), beta_.B(group.channels, Eigen::all);
     Eigen::MatrixXd re = Eigen::MatrixXd::Zero(lines, 2 * n_f);
     Eigen::MatrixXd im = Eigen::MatrixXd::Zero(lines, 2 * n_f);

@@ -60,7 +60,7 @@ NumeratorSums gram_sums(const FitProblem& problem, const BasisGroup& group,
                         const PairReduction& pairs, const TileRange& block) {
   const auto add = [&](const TileRange& share) {
     NumeratorSums sums;
-    sums.FF.setZero(static_cast<Eigen::Index>(pairs.direct().size()), share.members);
+    sums.FF.setZero(std::ssize(pairs.direct()), share.members);
     sums.FE.setZero(problem.functions(), share.members);
     sums.S.setZero(share.members, group.fractions.simple_columns());
     DataTile data;
@@ -213,8 +213,7 @@ void gather_numerators(const FitProblem& problem, Eigen::MatrixXd& B) {
 
 std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                                   const Eigen::MatrixXd& B) {
-  Eigen::MatrixXd costs =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(problem.shapes.size()), problem.channels());
+  Eigen::MatrixXd costs = Eigen::MatrixXd::Zero(std::ssize(problem.shapes), problem.channels());
   visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
     visit_submodels(problem, M, [&](std::size_t i, Eigen::Index f, const Eigen::MatrixXd& inverse) {
       const Eigen::VectorXd b = B.row(c).segment(f, inverse.cols()).transpose();

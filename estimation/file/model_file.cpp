@@ -129,9 +129,9 @@ Eigen::VectorXcd shape_deviation_from_json(const JsonNode& node, const std::stri
   Eigen::VectorXcd out = Eigen::VectorXcd::Zero(size);
   const auto read = [&](const std::string& key) {
     const std::vector<double> values = node.member(key).numbers();
-    if (static_cast<Eigen::Index>(values.size()) != size)
+    if (std::ssize(values) != size)
       node.member(key).fail("must have " + std::to_string(size) + " numbers, one per channel");
-    if (*std::min_element(values.begin(), values.end()) < 0.0)
+    if (*std::ranges::min_element(values) < 0.0)
       node.member(key).fail("must not contain a negative standard deviation");
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(values.data(), size));
   };

@@ -300,7 +300,7 @@ double scaled_gradient(const Eigen::MatrixXd& M, const Eigen::VectorXd& e,
                        const std::vector<Eigen::Index>& frozen, double squares) {
   double largest = 0.0;
   for (Eigen::Index i = 0; i < e.size(); ++i)
-    if (std::find(frozen.begin(), frozen.end(), i) == frozen.end())
+    if (std::ranges::find(frozen, i) == frozen.end())
       largest = std::max(largest,
                          std::abs(e[i]) / std::sqrt(std::max(std::abs(M(i, i)) * squares, 1e-300)));
   return largest;

@@ -34,7 +34,7 @@ Eigen::VectorXd search_grid(const AdditiveModel& model) {
       const double f = s.natural_frequency_hz() * (1.0 + 0.2 * s.damping_ratio() * i);
       if (f > 0.0 && f < highest) out.push_back(f);
     }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return Eigen::Map<const Eigen::VectorXd>(out.data(), std::ssize(out));
 }
 

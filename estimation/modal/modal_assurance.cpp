@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "acquisition/files/fail.hpp"
 
@@ -17,8 +18,7 @@ struct Candidate {
 
 Eigen::MatrixXcd as_columns(const std::vector<ModeShape>& modes,
                             Eigen::VectorXcd ModeShape::*shape) {
-  Eigen::MatrixXcd out(modes.empty() ? 0 : (modes[0].*shape).size(),
-                       static_cast<Eigen::Index>(modes.size()));
+  Eigen::MatrixXcd out(modes.empty() ? 0 : (modes[0].*shape).size(), std::ssize(modes));
   for (std::size_t m = 0; m < modes.size(); ++m)
     out.col(static_cast<Eigen::Index>(m)) = modes[m].*shape;
   return out;
@@ -66,8 +66,7 @@ std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
                                  const std::vector<ModeShape>& second) {
   if (first.empty() || second.empty()) return {};
   std::vector<Candidate> sorted = candidates(first, second);
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.worth > b.worth; });
+  std::ranges::stable_sort(sorted, std::greater<>(), &Candidate::worth);
   std::vector<bool> first_taken(first.size(), false);
   std::vector<bool> second_taken(second.size(), false);
   std::vector<ModePair> out;
@@ -77,8 +76,7 @@ std::vector<ModePair> pair_modes(const std::vector<ModeShape>& first,
     first_taken[pair.first] = second_taken[pair.second] = true;
     out.push_back(pair);
   }
-  std::sort(out.begin(), out.end(),
-            [](const ModePair& a, const ModePair& b) { return a.first < b.first; });
+  std::ranges::sort(out, {}, &ModePair::first);
   return out;
 }
 

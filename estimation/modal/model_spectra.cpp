@@ -12,7 +12,7 @@ std::vector<Eigen::Index> indices_of(const std::vector<std::string>& wanted,
                                      const ChannelList& there, const LogReader& log) {
   std::vector<Eigen::Index> indices;
   for (const std::string& name : wanted) {
-    const auto found = std::find(there.names.begin(), there.names.end(), name);
+    const auto found = std::ranges::find(there.names, name);
     if (found == there.names.end())
       fail_request(
           "{}: has no channel '{}', which the model needs; use a log with all channels "

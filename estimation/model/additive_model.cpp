@@ -51,7 +51,7 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
   SubmodelBasis basis;
   for (const auto& [delay, members] :
        channels_by_delay(model.input_delays_s(), model.output_delays_s())) {
-    const auto begin = std::lower_bound(members.begin(), members.end(), first);
+    const auto begin = std::ranges::lower_bound(members, first);
     const auto end = std::lower_bound(begin, members.end(), first + count);
     if (begin == end) continue;
     const HoldEquivalent through(lines, delay);

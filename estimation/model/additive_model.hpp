@@ -106,8 +106,8 @@ struct AdditiveModel {
   std::vector<double> cost_history;
   std::string provenance_json = "{}";
 
-  Eigen::Index n_outputs() const noexcept { return static_cast<Eigen::Index>(outputs.size()); }
-  Eigen::Index n_inputs() const noexcept { return static_cast<Eigen::Index>(inputs.size()); }
+  Eigen::Index n_outputs() const noexcept { return std::ssize(outputs); }
+  Eigen::Index n_inputs() const noexcept { return std::ssize(inputs); }
   Eigen::VectorXd input_delays_s() const;   ///< n_u, also if input_delay_s is empty
   Eigen::VectorXd output_delays_s() const;  ///< n_y
   double mean_delay_s() const;              ///< from an input to an output, over the channels

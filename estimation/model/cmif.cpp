@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "acquisition/files/fail.hpp"
@@ -183,15 +184,12 @@ std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions&
                        prominence});
     }
   }
-  std::stable_sort(peaks.begin(), peaks.end(),
-                   [](const Peak& a, const Peak& b) { return a.prominence > b.prominence; });
+  std::ranges::stable_sort(peaks, std::greater<>(), &Peak::prominence);
   if (peaks.size() > static_cast<std::size_t>(options.most_peaks))
     peaks.resize(static_cast<std::size_t>(options.most_peaks));
   std::vector<ModeCandidate> modes;
   for (const Peak& peak : peaks) modes.push_back(peak.mode);
-  std::stable_sort(modes.begin(), modes.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
-    return a.frequency_hz < b.frequency_hz;
-  });
+  std::ranges::stable_sort(modes, {}, &ModeCandidate::frequency_hz);
   return modes;
 }
 

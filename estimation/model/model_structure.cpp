@@ -81,14 +81,13 @@ bool is_searched_mode(const Submodel& submodel) noexcept {
 }
 
 int count_modes(const AdditiveModel& model) {
-  return static_cast<int>(
-      std::count_if(model.submodels.begin(), model.submodels.end(), is_searched_mode));
+  return static_cast<int>(std::ranges::count_if(model.submodels, is_searched_mode));
 }
 
 std::vector<std::size_t> mode_order(const AdditiveModel& model) {
   std::vector<std::size_t> order(model.submodels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+  std::ranges::stable_sort(order, [&](std::size_t i, std::size_t j) {
     const Submodel& a = model.submodels[i];
     const Submodel& b = model.submodels[j];
     const bool mode = is_searched_mode(a);

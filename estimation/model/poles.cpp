@@ -32,7 +32,7 @@ double deviation(const Eigen::VectorXd& gradient,
 }  // namespace
 
 Eigen::VectorXd denominator_of(const std::vector<Complex>& poles) {
-  Eigen::VectorXcd A = Eigen::VectorXcd::Zero(static_cast<Eigen::Index>(poles.size()) + 1);
+  Eigen::VectorXcd A = Eigen::VectorXcd::Zero(std::ssize(poles) + 1);
   A[0] = 1.0;
   Eigen::Index degree = 0;
   for (const Complex lambda : poles) {
@@ -66,9 +66,7 @@ std::vector<PoleEstimate> pole_estimates(const Eigen::Ref<const Eigen::VectorXd>
     }
     out.push_back(pole);
   }
-  std::stable_sort(out.begin(), out.end(), [](const PoleEstimate& l, const PoleEstimate& r) {
-    return l.natural_frequency_hz < r.natural_frequency_hz;
-  });
+  std::ranges::stable_sort(out, {}, &PoleEstimate::natural_frequency_hz);
   return out;
 }
 

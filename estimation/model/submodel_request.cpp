@@ -26,7 +26,7 @@ std::string fault_of_start(const SubmodelRequest& request) {
                        counted(poles, "frequency", "frequencies"),
                        request.has_real_pole() && pairs > 0 ? ", the last for the real pole" : "",
                        f.size());
-  if (!std::all_of(f.begin(), f.end(), [](double x) { return std::isfinite(x) && x > 0.0; }))
+  if (!std::ranges::all_of(f, [](double x) { return std::isfinite(x) && x > 0.0; }))
     return "frequencies must be above 0 Hz";
   if (!zeta.empty() && f.empty())
     return "a damping ratio needs a frequency; give both, or neither to search for them";
@@ -34,7 +34,7 @@ std::string fault_of_start(const SubmodelRequest& request) {
     return fmt::format("n={} needs one damping ratio or {}; {} given", request.shape.order, pairs,
                        zeta.size());
   if (!zeta.empty() && pairs == 0) return "a real pole has no damping ratio; omit it";
-  if (!std::all_of(zeta.begin(), zeta.end(), [](double x) { return x > 0.0 && x <= 0.9; }))
+  if (!std::ranges::all_of(zeta, [](double x) { return x > 0.0 && x <= 0.9; }))
     return "damping ratios must be above 0 and at most 0.9";
   for (auto at = f.begin();
        at != f.begin() + static_cast<std::ptrdiff_t>(std::min(pairs, f.size())); ++at)
@@ -63,9 +63,7 @@ std::string fault_of(const SubmodelRequest& request) {
 
 std::string fault_of(const std::vector<SubmodelRequest>& requests, bool rigid_body,
                      bool direct_term) {
-  const auto count = [&](auto predicate) {
-    return std::count_if(requests.begin(), requests.end(), predicate);
-  };
+  const auto count = [&](auto predicate) { return std::ranges::count_if(requests, predicate); };
   const auto integrating = count([](const SubmodelRequest& r) { return r.shape.integrators > 0; }) +
                            (rigid_body ? 1 : 0);
   if (integrating > 1)

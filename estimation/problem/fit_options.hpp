@@ -140,7 +140,7 @@ struct FitResult {
   const std::string& message() const noexcept { return model.fit.message; }
   bool trustworthy() const noexcept { return model.fit.status && model.fit.trustworthy(); }
   bool is_held(std::size_t submodel) const noexcept {
-    return std::find(held.begin(), held.end(), submodel) != held.end();
+    return std::ranges::find(held, submodel) != held.end();
   }
 };
 

@@ -49,7 +49,7 @@ Eigen::Index FitProblem::delays() const noexcept {
 }
 
 bool FitProblem::is_held(Eigen::Index global) const noexcept {
-  return std::find(held.begin(), held.end(), global) != held.end();
+  return std::ranges::find(held, global) != held.end();
 }
 
 std::vector<DerivativeColumn> derivative_columns(const FitProblem& problem) {

@@ -25,8 +25,7 @@ void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
     const auto [l, n, m] = shape_of(s);
     require(n >= 0 && s.denominator[0] == 1.0, "fit: a denominator must start with 1");
     require(l >= 0 && l <= 2, "fit: a submodel must have 0, 1 or 2 integrators");
-    require(std::all_of(s.denominator.begin(), s.denominator.end(),
-                        [](double a) { return std::isfinite(a); }) &&
+    require(std::ranges::all_of(s.denominator, [](double a) { return std::isfinite(a); }) &&
                 s.denominator.back() != 0.0,
             "fit: a denominator must be finite and not end with 0");
     require(m >= 0 && m <= n + l, "fit: a submodel must be proper and have a numerator");

@@ -115,7 +115,7 @@ FractionColumns fraction_columns(const HoldEquivalent& through, double highest_r
     for (int m = 0; m < shapes[i].functions(); ++m) {
       out.F.push_back(pair ? pair->column(m, 1, 1.0) : FractionColumn{});
       for (int q = 1; q <= order; ++q)  // d/da_q = -s^(m+q) / A^2
-        if (std::find(held.begin(), held.end(), before + q - 1) == held.end())
+        if (std::ranges::find(held, before + q - 1) == held.end())
           out.D.push_back(pair ? pair->column(m + q, 2, -1.0) : FractionColumn{});
     }
     for (int q = 1; q <= order; ++q)

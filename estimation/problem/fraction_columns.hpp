@@ -32,7 +32,7 @@ struct FractionColumns {
   std::vector<FractionColumn> D;  ///< empty without squares
   std::vector<FractionColumn> Y;  ///< of the equation error, see EquationMethod::Y
 
-  Eigen::Index pairs() const noexcept { return static_cast<Eigen::Index>(lambda.size()); }
+  Eigen::Index pairs() const noexcept { return std::ssize(lambda); }
   Eigen::Index simple_columns() const noexcept { return 1 + 4 * pairs(); }
 };
 

@@ -137,7 +137,7 @@ std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
 
 bool PoleBounds::at_bound(std::size_t i, const Eigen::VectorXd& a) const {
   const std::vector<Complex> poles = roots(a);
-  return std::any_of(poles.begin(), poles.end(), [&](Complex pole) {
+  return std::ranges::any_of(poles, [&](Complex pole) {
     const double size = std::abs(pole);
     const double highest = pole.imag() == 0.0 ? highest_real_rad_s_ : highest_rad_s_;
     return size < lowest_rad_s_[i] * kPoleAtBound || size * kPoleAtBound > highest ||

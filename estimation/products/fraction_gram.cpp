@@ -5,7 +5,7 @@ namespace stageid {
 using Complex = std::complex<double>;
 
 FractionGram::FractionGram(const PoleSet& poles, const Eigen::VectorXcd& x, bool unit_circle)
-    : pairs_(static_cast<Eigen::Index>(poles.pairs.size())),
+    : pairs_(std::ssize(poles.pairs)),
       unit_circle_(unit_circle),
       poles_(poles.size()),
       q_(x.size(), poles.size()),

@@ -17,8 +17,8 @@ class Share {
         range_(range),
         n_f_(problem_.functions()),
         n_a_(problem_.denominators()),
-        n_d_(static_cast<Eigen::Index>(columns_.size())) {
-    BB_.resize(range.members, static_cast<Eigen::Index>(products.functions.size()));
+        n_d_(std::ssize(columns_)) {
+    BB_.resize(range.members, std::ssize(products.functions));
     Eigen::Index p = 0;
     for (const auto& [functions, pairs] : products.functions)
       BB_.col(p++) = B_.col(functions.first).cwiseProduct(B_.col(functions.second));
@@ -47,7 +47,7 @@ class Share {
   void clear() {
     const Eigen::Index members = range_.members;
     const auto direct = [&](const PairReduction& pairs, Eigen::MatrixXd& sums) {
-      sums.setZero(static_cast<Eigen::Index>(pairs.direct().size()), members);
+      sums.setZero(std::ssize(pairs.direct()), members);
     };
     direct(products_.FF, sums_.FF);
     direct(products_.FD, sums_.FD);
@@ -217,11 +217,11 @@ GroupProducts::GroupProducts(const EquationMethod& of_method, const BasisGroup& 
       FF(group.fractions, group.fractions.F, group.fractions.F,
          triangular_pairs(method.problem.functions())),
       FD(group.fractions, group.fractions.F, group.fractions.D,
-         all_pairs(method.problem.functions(), static_cast<Eigen::Index>(method.columns.size()))),
+         all_pairs(method.problem.functions(), std::ssize(method.columns))),
       FY(group.fractions, group.fractions.F, group.fractions.Y,
          all_pairs(method.problem.functions(), method.Y.cols())),
       DD(group.fractions, group.fractions.D, group.fractions.D,
-         triangular_pairs(static_cast<Eigen::Index>(method.columns.size()))) {
+         triangular_pairs(std::ssize(method.columns))) {
   for (const auto& [l, r] : DD.direct()) {
     const Eigen::Index f = method.columns[static_cast<std::size_t>(l)].function;
     const Eigen::Index g = method.columns[static_cast<std::size_t>(r)].function;

@@ -105,7 +105,7 @@ PairReduction::PairReduction(const FractionColumns& columns,
       const FractionColumn& Y = right[static_cast<std::size_t>(pairs_[p].right)];
       if (X.pair >= 0 && Y.pair >= 0 && order(X) + order(Y) <= largest(X.pair, Y.pair)) continue;
     }
-    place_[p] = static_cast<Eigen::Index>(direct_.size());
+    place_[p] = std::ssize(direct_);
     direct_.push_back(pairs_[p]);
   }
 }
@@ -158,7 +158,7 @@ double PairReduction::weighted_sum(std::size_t pair, const Eigen::MatrixXd& S,
 template <typename Row>
 Eigen::MatrixXd PairReduction::expand_rows(const Eigen::MatrixXd& direct, int threads,
                                            Row&& row) const {
-  Eigen::MatrixXd out(direct.cols(), static_cast<Eigen::Index>(pairs_.size()));
+  Eigen::MatrixXd out(direct.cols(), std::ssize(pairs_));
   for_each_pair(threads, [&](std::size_t p) {
     auto to = out.col(static_cast<Eigen::Index>(p));
     if (is_reduced(p))

@@ -14,7 +14,7 @@ constexpr Eigen::Index kShares = 8;  // per block, if there are that many tiles 
 template <typename Fill>
 void add_products(const Eigen::MatrixXd& V, const std::vector<ColumnPair>& pairs,
                   Eigen::MatrixXd& sums, const Fill& fill) {
-  const auto n_pairs = static_cast<Eigen::Index>(pairs.size());
+  const auto n_pairs = std::ssize(pairs);
   Eigen::MatrixXd products(V.cols(), std::min(kBlockPairs, n_pairs));
   for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
     const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);

@@ -240,8 +240,7 @@ FitRequest with_structure(FitRequest request, const FrfEstimate& frf,
                           std::vector<std::string>& notes) {
   const std::vector<std::string>& units = frf.outputs.units;
   const bool any_rank = request.residue_rank <= 1;
-  const bool accelerations = !units.empty() &&
-                             std::all_of(units.begin(), units.end(), is_acceleration) &&
+  const bool accelerations = !units.empty() && std::ranges::all_of(units, is_acceleration) &&
                              request.submodels.empty() && any_rank;
   const bool silent = !request.general_damping && !request.direct_term &&
                       request.rigid_body.kind == RigidBodyRequest::Kind::by_submodels;

@@ -57,9 +57,7 @@ class SubmodelParser {
       fail(fmt::format("unknown key '{}'; use l, n, m, f or zeta", key));
   }
 
-  bool has(std::string_view key) const {
-    return std::find(seen_.begin(), seen_.end(), key) != seen_.end();
-  }
+  bool has(std::string_view key) const { return std::ranges::find(seen_, key) != seen_.end(); }
 
   int whole(const std::string& key, std::string_view value) const {
     int number = 0;

@@ -144,9 +144,9 @@ class Relocation {
       else
         found.pairs.push_back(to_x(s));
     }
-    std::sort(found.pairs.begin(), found.pairs.end(),
-              [&](Complex a, Complex b) { return to_s(a).imag() < to_s(b).imag(); });
-    std::sort(found.reals.begin(), found.reals.end());
+    std::ranges::sort(found.pairs,
+                      [&](Complex a, Complex b) { return to_s(a).imag() < to_s(b).imag(); });
+    std::ranges::sort(found.reals);
     double largest = found.pairs.size() == poles_.pairs.size() ? 0.0 : 1.0;
     for (std::size_t i = 0; i < std::min(found.pairs.size(), poles_.pairs.size()); ++i) {
       const Complex s = to_s(found.pairs[i]);
@@ -168,14 +168,12 @@ class Relocation {
     }
     std::vector<double> decays;
     for (const double real : poles_.reals) decays.push_back(-to_s(real).real());
-    std::sort(decays.begin(), decays.end());
+    std::ranges::sort(decays);
     for (std::size_t i = 0; i + 1 < decays.size(); i += 2) {
       const double omega = std::sqrt(decays[i] * decays[i + 1]);
       add(omega, 0.5 * (decays[i] + decays[i + 1]) / omega);
     }
-    std::sort(modes.begin(), modes.end(), [](const ModeCandidate& a, const ModeCandidate& b) {
-      return a.frequency_hz < b.frequency_hz;
-    });
+    std::ranges::sort(modes, {}, &ModeCandidate::frequency_hz);
     return modes;
   }
 

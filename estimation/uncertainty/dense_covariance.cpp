@@ -208,8 +208,8 @@ bool are_affordable(const FitProblem& problem, const std::vector<IndexRange>& ra
 
 bool has_deviations(const FitResult& result) {
   return result.status() != FitStatus::singular &&
-         std::all_of(result.model.submodels.begin(), result.model.submodels.end(),
-                     [](const Submodel& s) { return !s.numerator_std.empty(); });
+         std::ranges::all_of(result.model.submodels,
+                             [](const Submodel& s) { return !s.numerator_std.empty(); });
 }
 
 std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
@@ -352,7 +352,7 @@ std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model) {
   std::vector<IndexRange> out;
   Eigen::Index next = 0;
   for (const Submodel& s : model.submodels) {
-    out.push_back({next, static_cast<Eigen::Index>(s.numerator.size())});
+    out.push_back({next, std::ssize(s.numerator)});
     next += out.back().count;
   }
   return out;

@@ -19,7 +19,7 @@ std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitPara
   for (Eigen::Index c = first_channel; c < first_channel + channels; ++c)
     for (const ResidueFactors::Entry& t : factors.channel_entries(beta, c))
       own.push_back(t.parameter);
-  std::sort(own.begin(), own.end());
+  std::ranges::sort(own);
   own.erase(std::unique(own.begin(), own.end()), own.end());
   return own;
 }
@@ -29,11 +29,11 @@ SplitMatrix free_columns(const FitProblem& problem, const FitParameters& beta,
                          const ResidueFactors& factors, const BasisGroup& group, Eigen::Index c,
                          const std::vector<Eigen::Index>& own, IndexRange lines) {
   SplitMatrix out = global_columns(problem, beta, group, c, lines);
-  const auto n = static_cast<Eigen::Index>(own.size());
+  const auto n = std::ssize(own);
   out.re.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
   out.im.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
   for (const auto& [function, parameter, value] : factors.channel_entries(beta, c)) {
-    const auto at = std::lower_bound(own.begin(), own.end(), parameter) - own.begin();
+    const auto at = std::ranges::lower_bound(own, parameter) - own.begin();
     out.re.col(at) += value * group.F.re.col(function).segment(lines.first, lines.count);
     out.im.col(at) += value * group.F.im.col(function).segment(lines.first, lines.count);
   }

@@ -32,9 +32,7 @@ class ModeResidue {
     while (size[leading_] < kLeadingComponent * size.maxCoeff()) ++leading_;
   }
 
-  Eigen::Index parameters() const {
-    return 2 + M_.size() * static_cast<Eigen::Index>(mode_.numerator.size());
-  }
+  Eigen::Index parameters() const { return 2 + M_.size() * std::ssize(mode_.numerator); }
 
   /// dM / da_q, q = 1, 2: through the pole and through 1 / a_2.
   Eigen::MatrixXcd denominator_slope(Eigen::Index q) const {
@@ -147,8 +145,7 @@ void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, Fi
     Eigen::Index first = 0;
     for (std::size_t i = 0; i < modes[m]; ++i) first += result.model.submodels[i].order();
     const Eigen::MatrixXd& C = covariances[m].sandwich;
-    const Eigen::Index numerators =
-        mode.numerator[0].size() * static_cast<Eigen::Index>(mode.numerator.size());
+    const Eigen::Index numerators = mode.numerator[0].size() * std::ssize(mode.numerator);
     std::vector<Eigen::Index> places = {first, first + 1};
     for (Eigen::Index b = C.rows() - numerators; b < C.rows(); ++b) places.push_back(b);
     mode.shape_std = mode_shape_deviation(mode, C(places, places));

@@ -156,7 +156,7 @@ SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, IndexR
 Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelation& correlation,
                                 Eigen::Index n, const CorrelatedColumns& inputs) {
   GramOfTiles gram(problem, correlation, n, inputs);
-  const auto channels = static_cast<Eigen::Index>(inputs.parameters.size()) * problem.n_outputs;
+  const auto channels = std::ssize(inputs.parameters) * problem.n_outputs;
   const Eigen::Index most =
       std::max<Eigen::Index>(8, kTileEntries / std::max<Eigen::Index>(1, n * channels));
   for (const IndexRange lines : ranges_of(problem.size(), most)) gram.add(lines);

@@ -256,7 +256,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
 
   // Each process has the equations of its own parts; nothing but S and K is summed, and the variances gathered.
   const Team& team = wanted.parts ? Team::one() : *problem.team;
-  const auto tiles = static_cast<Eigen::Index>(parts.size());
+  const auto tiles = std::ssize(parts);
   const TileShare own = team.share(tiles);
   const Eigen::Index globals = problem.globals();
   std::vector<Eigen::VectorXd> sums;
@@ -340,7 +340,7 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
   Eigen::MatrixXd X = Eigen::MatrixXd::Zero(equations.size(), globals);
   Eigen::MatrixXd R = X;
   for (Eigen::Index i = 0; i < globals; ++i) {
-    if (std::find(frozen.begin(), frozen.end(), i) != frozen.end()) continue;
+    if (std::ranges::find(frozen, i) != frozen.end()) continue;
     const Eigen::VectorXd unit = Eigen::VectorXd::Unit(equations.size(), i);
     const JointEquations::Solution column = equations.solve(unit, frozen, kColumnTolerance);
     X.col(i) = column.x;

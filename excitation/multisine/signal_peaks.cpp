@@ -33,7 +33,7 @@ class HalfLines {
 
   /// transfer . r at bin `i`
   std::complex<double> product(Index i, const Eigen::Ref<const Eigen::VectorXcd>& r) const {
-    const auto next = std::lower_bound(at_.begin(), at_.end(), i) - at_.begin();
+    const auto next = std::ranges::lower_bound(at_, i) - at_.begin();
     const auto count = std::ssize(at_);
     if (next == count) return known(count - 1, r);
     if (next == 0 || at(next) == i) return known(next, r);
@@ -93,7 +93,7 @@ struct SignalPredictor::Work {
     for (Index p = 0; p < spectrum.rows(); ++p) {
       const Eigen::VectorXd r = sampled.samples(spectrum.row(p).transpose());
       const std::span<double> input = twofold.input();
-      std::fill(input.begin(), input.end(), 0.0);
+      std::ranges::fill(input, 0.0);
       std::copy(r.data(), r.data() + N, input.begin());
       const auto forward = twofold.forward();
       for (Index i = 0; i < begun.cols(); ++i)

@@ -11,7 +11,7 @@ const char* word_at(std::span<const char* const> words, std::size_t index,
 
 std::optional<std::size_t> index_of_word(std::span<const char* const> words,
                                          std::string_view word) noexcept {
-  const auto found = std::find(words.begin(), words.end(), word);
+  const auto found = std::ranges::find(words, word);
   if (found == words.end()) return std::nullopt;
   return static_cast<std::size_t>(found - words.begin());
 }

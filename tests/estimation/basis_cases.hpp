@@ -95,7 +95,7 @@ inline SubmodelBasis evaluate(const Case& c, HoldModel hold, double delay_s) {
   const std::vector<double> a = c.a();
   SubmodelBasis out;
   evaluate_basis(HoldEquivalent(lines(hold), delay_s), c.shape(),
-                 Eigen::Map<const Eigen::VectorXd>(a.data(), static_cast<Eigen::Index>(a.size())),
+                 Eigen::Map<const Eigen::VectorXd>(a.data(), std::ssize(a)),
                  {.gradient = true, .delay = true}, out);
   return out;
 }

@@ -114,11 +114,11 @@ inline std::vector<Eigen::MatrixXcd> joint_jacobian(const DenseProblem& problem,
   std::vector<Eigen::Index> order;  // columns of instrument_rows: denominators, then numerators
   std::vector<Eigen::Index> numerators;
   for (std::size_t i = 0; i < model.submodels.size(); ++i) {
-    const auto n = static_cast<Eigen::Index>(model.submodels[i].denominator.size()) - 1;
+    const auto n = std::ssize(model.submodels[i].denominator) - 1;
     for (Eigen::Index p = first[i]; p < first[i + 1]; ++p)
       (p < first[i] + n ? order : numerators).push_back(p);
   }
-  const auto denominators = static_cast<Eigen::Index>(order.size());
+  const auto denominators = std::ssize(order);
   order.insert(order.end(), numerators.begin(), numerators.end());
   const Eigen::Index delays = delay == DelayModel::fixed ? 0
                               : delay == DelayModel::estimate

@@ -75,8 +75,7 @@ std::vector<std::string> design_table(const ExperimentConfig& config, const Expe
   const StageSpec& stage = config.stage.spec;
   const Eigen::VectorXd frequency_hz = plan.grid().frequency_hz();
   std::vector<std::string> lines;
-  const auto [least, most] =
-      std::minmax_element(prediction.crest_factor.begin(), prediction.crest_factor.end());
+  const auto [least, most] = std::ranges::minmax_element(prediction.crest_factor);
   lines.push_back(fmt::format("{} of {} + {} of {} s, {:.1f} min in total; log {:.1f} MB",
                               counted(plan.runs().size(), "run"), plan.spec().transient_periods,
                               counted(plan.spec().periods, "period"), plan.grid().period_s(),

@@ -37,7 +37,7 @@ Eigen::VectorXd default_lines(const AdditiveModel& model) {
 }
 
 Eigen::Index place_of(const std::string& name, const ChannelList& channels, const char* kind) {
-  const auto found = std::find(channels.names.begin(), channels.names.end(), name);
+  const auto found = std::ranges::find(channels.names, name);
   if (found == channels.names.end())
     fail_request("--driving-point: '{}' is not an {} of the model; use one of {}", name, kind,
                  fmt::join(channels.names, ", "));

@@ -23,7 +23,7 @@ void print_help(const CLI::App& app, const std::vector<std::string>& words) {
   std::string path;
   for (const std::string& word : words) {
     const std::vector<std::string> names = names_of(command_tree(*command).commands);
-    if (std::find(names.begin(), names.end(), word) == names.end())
+    if (std::ranges::find(names, word) == names.end())
       fail_request(
           "help: unknown command '{}'{}; {}", word, path.empty() ? "" : " of" + path,
           names.empty() ? fmt::format("write 'stageid help{}'", path) : suggest_key(word, names));

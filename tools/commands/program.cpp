@@ -175,7 +175,7 @@ class Program {
     const int at = command_at(argc, argv);
     if (console_.team->size() == 1 || at >= argc) return;
     constexpr std::array kDivided = {"frf", "modes", "fit", "validate", "help"};
-    if (std::find(kDivided.begin(), kDivided.end(), std::string_view(argv[at])) == kDivided.end())
+    if (std::ranges::find(kDivided, std::string_view(argv[at])) == kDivided.end())
       fail_request("{0}: cannot be divided between {1} processes; run 'stageid {0}' without mpirun",
                    argv[at], console_.team->size());
   }
@@ -183,7 +183,7 @@ class Program {
   void refuse_unknown_command(int argc, const char* const* argv) const {
     const std::vector<std::string> names = names_of(command_tree(app_).commands);
     const int first = command_at(argc, argv);
-    if (first >= argc || std::find(names.begin(), names.end(), argv[first]) != names.end()) return;
+    if (first >= argc || std::ranges::find(names, argv[first]) != names.end()) return;
     const std::string nearest = nearest_word(argv[first], names);
     fail_request("unknown command '{}'; {}", argv[first],
                  nearest.empty() ? "'stageid --help' lists them"
@@ -232,8 +232,8 @@ class Program {
                              : fmt::format("unknown subcommand '{}'", left_over.front()),
                          fmt::join(names_of(command.commands), ", "), path);
     if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !left_over.empty()) {
-      const auto flag = std::find_if(left_over.begin(), left_over.end(),
-                                     [](const std::string& word) { return word.starts_with('-'); });
+      const auto flag = std::ranges::find_if(
+          left_over, [](const std::string& word) { return word.starts_with('-'); });
       return fmt::format("unexpected argument '{}'; see 'stageid{} --help'",
                          flag == left_over.end() ? left_over.front() : *flag, path);
     }

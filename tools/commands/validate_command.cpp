@@ -77,7 +77,7 @@ struct ValidateFlags {
 void require_channels(const ValidateFlags& flags, const std::vector<std::string>& of_data,
                       const std::vector<std::string>& of_model, const char* kind) {
   for (const std::string& name : of_model)
-    if (std::find(of_data.begin(), of_data.end(), name) == of_data.end())
+    if (std::ranges::find(of_data, name) == of_data.end())
       fail_format(flags.data, "",
                   "has no {0} '{1}', which {2} has; its {0}s are {3}. Use data "
                   "and a model of the same stage",

@@ -54,7 +54,7 @@ class MapReader final : public ConfigVisitor {
   void finish() const {
     bool unknown = false;
     for (const YamlNode::Entry& entry : map_.entries) {
-      if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+      if (std::ranges::find(known_, entry.key) != known_.end()) continue;
       unknown = true;
       errors_.attempt([&] {
         document_.fail(entry.mark, fmt::format("unknown key '{}'; {}", entry.key,
@@ -103,7 +103,7 @@ class MapReader final : public ConfigVisitor {
              const char* help) override {
     read_list(key, values, count, presence, help, [&](const YamlNode& item) {
       values.push_back(parse_text(key, item));
-      if (std::count(values.begin(), values.end(), values.back()) > 1)
+      if (std::ranges::count(values, values.back()) > 1)
         document_.fail(item.mark,
                        fmt::format("{}: duplicate entry '{}'; keep one", key, values.back()));
     });
@@ -111,7 +111,7 @@ class MapReader final : public ConfigVisitor {
   void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
               Presence presence, const char* help) override {
     read(key, presence, help, [&](const YamlNode& node) {
-      const auto found = std::find(names.begin(), names.end(), node.text);
+      const auto found = std::ranges::find(names, node.text);
       if (node.kind != YamlNode::Kind::scalar || found == names.end()) wrong_word(key, node, names);
       index = static_cast<std::size_t>(found - names.begin());
     });
@@ -279,7 +279,7 @@ class MapReader final : public ConfigVisitor {
            (to_number(node).has_value() || std::isdigit(static_cast<unsigned char>(node.text[0])));
   }
   static bool is_word(const YamlNode& node, const FlexibleRule& rule) {
-    return std::find(rule.words.begin(), rule.words.end(), node.text) != rule.words.end();
+    return std::ranges::find(rule.words, node.text) != rule.words.end();
   }
   void read_item(const char* key, const YamlNode& item, const FlexibleRule& rule,
                  FlexibleValue& value) const {

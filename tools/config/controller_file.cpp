@@ -116,8 +116,8 @@ ControllerResponse response_of_transfer(const ControllerFile& f) {
         static_cast<Index>(f.linear.actuators.size()), static_cast<Index>(f.linear.sensors.size()));
     const std::complex<double> x = variable_of(f, hz);
     for (const LinearControllerKeys::Transfer& t : f.linear.transfer) {
-      const auto u = std::find(f.linear.actuators.begin(), f.linear.actuators.end(), t.actuator);
-      const auto y = std::find(f.linear.sensors.begin(), f.linear.sensors.end(), t.sensor);
+      const auto u = std::ranges::find(f.linear.actuators, t.actuator);
+      const auto y = std::ranges::find(f.linear.sensors, t.sensor);
       response(u - f.linear.actuators.begin(), y - f.linear.sensors.begin()) =
           -polynomial(t.numerator, x) / polynomial(t.denominator, x);
     }
@@ -136,7 +136,7 @@ NominalStage of_measured(const std::filesystem::path& file) {
   nominal.controller_error = kMeasuredError;
   nominal.controller = [frf](double hz) {
     const Eigen::VectorXd& f = frf->frequency_hz;
-    const Index above = std::clamp<Index>(std::lower_bound(f.begin(), f.end(), hz) - f.begin(),
+    const Index above = std::clamp<Index>(std::ranges::lower_bound(f, hz) - f.begin(),
                                           std::min<Index>(1, f.size() - 1), f.size() - 1);
     const Index below = std::max<Index>(0, above - 1);
     const double span = f[above] - f[below];

@@ -43,7 +43,7 @@ void describe_state_space(ConfigVisitor& v, LinearControllerKeys& keys) {
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+  return std::ranges::find(names, name) != names.end();
 }
 
 void describe_transfer(ConfigVisitor& v, LinearControllerKeys& keys) {
@@ -58,13 +58,11 @@ void describe_transfer(ConfigVisitor& v, LinearControllerKeys& keys) {
             fmt::format("actuator: '{}' is not in the list 'actuators'", t.actuator));
   v.require(contains(keys.sensors, t.sensor), "sensor",
             fmt::format("sensor: '{}' is not in the list 'sensors'", t.sensor));
-  v.require(
-      std::any_of(t.denominator.begin(), t.denominator.end(), [](double x) { return x != 0.0; }),
-      "denominator",
-      "denominator: all coefficients are zero; write at least one nonzero coefficient");
-  const bool twice = std::any_of(
-      keys.transfer.begin(), keys.transfer.end(),
-      [&](const auto& other) { return other.actuator == t.actuator && other.sensor == t.sensor; });
+  v.require(std::ranges::any_of(t.denominator, [](double x) { return x != 0.0; }), "denominator",
+            "denominator: all coefficients are zero; write at least one nonzero coefficient");
+  const bool twice = std::ranges::any_of(keys.transfer, [&](const auto& other) {
+    return other.actuator == t.actuator && other.sensor == t.sensor;
+  });
   v.require(!twice, "sensor",
             fmt::format("sensor: duplicate transfer function from '{}' to '{}'; write their sum",
                         t.sensor, t.actuator));

@@ -21,7 +21,7 @@ constexpr const char* kPeer = "peer";
 /// @param value a member of ChannelConfig, or a function of it
 template <typename Value>
 Eigen::VectorXd per_channel(const std::vector<ChannelConfig>& channels, Value value) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(channels.size()));
+  Eigen::VectorXd values(std::ssize(channels));
   std::ranges::transform(channels, values.data(), value);
   return values;
 }
@@ -50,7 +50,7 @@ int require_channel(const StageConfig& config, const std::vector<Channel>& chann
 Eigen::VectorXd shape_vector(const StageConfig& config, const std::vector<Channel>& channels,
                              const std::vector<std::pair<std::string, double>>& values,
                              const char* kind) {
-  Eigen::VectorXd shape = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(channels.size()));
+  Eigen::VectorXd shape = Eigen::VectorXd::Zero(std::ssize(channels));
   for (const auto& [name, value] : values)
     shape[require_channel(config, channels, name, kind, "in_plane_modes")] = value;
   return shape;
@@ -99,8 +99,8 @@ void take_controller(StageConfig& config, const StageFile& file,
   } else {
     controller.sample_rate_hz = info.sample_rate_hz;
     controller.by_peer = file.controller == kPeer;
-    controller.sensor_decoupling.resize(0, static_cast<Eigen::Index>(info.sensors.size()));
-    controller.actuator_decoupling.resize(static_cast<Eigen::Index>(info.actuators.size()), 0);
+    controller.sensor_decoupling.resize(0, std::ssize(info.sensors));
+    controller.actuator_decoupling.resize(std::ssize(info.actuators), 0);
     take_linear_controller(linear, info.actuators, info.sensors, controller);
   }
   controller.feed_forward_ramp_s = config.ramp_s;
@@ -198,7 +198,7 @@ std::vector<PlantMode> flexible_modes_seen(const StageInfo& info, const PlantSpe
   const auto seen = [](const Eigen::VectorXd& shape, const std::vector<Channel>& channels,
                        const std::vector<std::string>& names) {
     const double largest = shape.cwiseAbs().maxCoeff();
-    return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return std::ranges::any_of(names, [&](const std::string& name) {
       const int index = channel_index(channels, name);
       return index >= 0 && std::abs(shape[index]) > 1e-6 * largest;
     });

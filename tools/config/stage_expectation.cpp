@@ -42,7 +42,7 @@ Response padded(const Response& response, std::size_t rows, std::size_t columns)
 NominalStage with_channels_of(const LogInfo& info, NominalStage all) {
   const auto append = [](std::vector<std::string>& names, const std::vector<std::string>& more) {
     for (const std::string& name : more)
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+      if (std::ranges::find(names, name) == names.end()) names.push_back(name);
   };
   append(all.actuators, info.actuators.names);
   append(all.sensors, info.sensors.names);

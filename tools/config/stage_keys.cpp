@@ -81,9 +81,8 @@ void describe_number(ConfigVisitor& v, const ChannelConfig& c, double& value, Tw
 
 /// Adds one channel; a duplicate name is an error.
 void add_channel(ConfigVisitor& v, ChannelConfig channel, std::vector<ChannelConfig>& list) {
-  const bool twice = std::any_of(list.begin(), list.end(), [&](const ChannelConfig& other) {
-    return other.channel.name == channel.channel.name;
-  });
+  const bool twice = std::ranges::any_of(
+      list, [&](const ChannelConfig& other) { return other.channel.name == channel.channel.name; });
   v.require(
       !twice, "name",
       fmt::format("duplicate channel name '{}'; channel names must differ", channel.channel.name));
@@ -237,8 +236,8 @@ void describe_controller(ConfigVisitor& v, StageFile& f) {
   for (const ChannelConfig& actuator : f.actuators)
     f.linear.actuators.push_back(actuator.channel.name);
   describe_linear_controller(v, f.linear);
-  const bool of_axes = std::any_of(f.axes.begin(), f.axes.end(),
-                                   [](const AxisController& a) { return a.crossover_hz > 0.0; });
+  const bool of_axes =
+      std::ranges::any_of(f.axes, [](const AxisController& a) { return a.crossover_hz > 0.0; });
   v.require(int{of_axes} + int{f.linear.has_state_space} + int{!f.linear.transfer.empty()} <= 1,
             f.linear.has_state_space ? "state_space" : "transfer",
             "controller: write axes, state_space or transfer, not several of them");

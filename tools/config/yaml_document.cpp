@@ -47,9 +47,8 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchors_.find(anchor);
-    if (found == anchors_.end() || std::any_of(open_.begin(), open_.end(), [&](const Open& open) {
-          return open.node == found->second;
-        }))
+    if (found == anchors_.end() ||
+        std::ranges::any_of(open_, [&](const Open& open) { return open.node == found->second; }))
       document_.fail(place(mark), "this alias refers to itself; use an anchor defined above it");
     attach(found->second);
   }
@@ -157,8 +156,8 @@ class YamlTreeBuilder final : public YAML::EventHandler {
   }
   void merge(std::size_t map) {
     std::vector<YamlNode::Entry>& entries = document_.nodes_[map].entries;
-    const auto found = std::find_if(entries.begin(), entries.end(),
-                                    [](const YamlNode::Entry& entry) { return entry.key == "<<"; });
+    const auto found = std::ranges::find_if(
+        entries, [](const YamlNode::Entry& entry) { return entry.key == "<<"; });
     if (found == entries.end()) return;
     const YamlNode& base = document_.nodes_[found->value];
     if (base.kind != YamlNode::Kind::map)
@@ -173,8 +172,8 @@ class YamlTreeBuilder final : public YAML::EventHandler {
                       kMostMerged));
     entries.erase(found);
     for (const YamlNode::Entry& entry : inherited)
-      if (std::none_of(entries.begin(), entries.end(),
-                       [&](const YamlNode::Entry& own) { return own.key == entry.key; }))
+      if (std::ranges::none_of(entries,
+                               [&](const YamlNode::Entry& own) { return own.key == entry.key; }))
         entries.push_back(entry);
     refuse_too_many(mark, entries.size());
   }

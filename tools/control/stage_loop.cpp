@@ -19,7 +19,7 @@ std::vector<std::optional<Eigen::Index>> places_of(const std::vector<Channel>& c
                                                    const ChannelList& list) {
   std::vector<std::optional<Eigen::Index>> out;
   for (const Channel& channel : channels) {
-    const auto found = std::find(list.names.begin(), list.names.end(), channel.name);
+    const auto found = std::ranges::find(list.names, channel.name);
     out.push_back(found == list.names.end() ? std::nullopt
                                             : std::optional(found - list.names.begin()));
   }
@@ -106,7 +106,7 @@ class LoopBuilder {
                                   .transpose();
     spec.axes = axes;
     spec.sensor_decoupling = spec.sensor_decoupling(kept, Eigen::all).eval();
-    const auto n = static_cast<Eigen::Index>(kept.size());
+    const auto n = std::ssize(kept);
     spec.actuator_decoupling = Eigen::MatrixXd::Identity(n, n);
     return finish(names, T, n == 0 ? ControllerStateSpace{} : MotionController(spec).realization());
   }

@@ -77,7 +77,7 @@ void describe_fit_keys(ConfigVisitor& v, FitRequest& f) {
   using Modes = ModesRequest::Kind;
   if (modes.is_list) {
     f.modes = {Modes::given, 0, {}};
-    std::sort(modes.numbers.begin(), modes.numbers.end());
+    std::ranges::sort(modes.numbers);
     for (const double frequency_hz : modes.numbers) f.modes.given.push_back({frequency_hz});
   } else if (!modes.numbers.empty()) {
     f.modes = {Modes::count, static_cast<int>(std::min(modes.numbers.front(), 1e6)), {}};

@@ -47,8 +47,8 @@ std::vector<ModeCandidate> parse_frequencies(const std::string& text) {
     modes.push_back({*frequency_hz, *damping_ratio});
     rest.remove_prefix(std::min(one.size() + 1, rest.size()));
   }
-  std::stable_sort(modes.begin(), modes.end(),
-                   [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+  std::ranges::stable_sort(
+      modes, [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
   return modes;
 }
 

@@ -23,8 +23,7 @@ std::vector<std::string> listed_words(const std::string& help) {
   for (std::string part : CLI::detail::split(list, '|')) {
     std::smatch match;
     CLI::detail::trim(part);
-    if (std::regex_match(part, match, word) &&
-        std::find(words.begin(), words.end(), match[1]) == words.end())
+    if (std::regex_match(part, match, word) && std::ranges::find(words, match[1]) == words.end())
       words.push_back(match[1]);
   }
   return words;

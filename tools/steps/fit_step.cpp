@@ -117,14 +117,14 @@ Distortion distortion_of(const AdditiveModel& model) {
   const Json bands = list_in(parse_json<Json>(model.provenance_json), "distortion");
   const Eigen::Index channels = model.n_outputs() * model.n_inputs();
   Distortion out;
-  const auto count = static_cast<Eigen::Index>(bands.size());
+  const auto count = std::ssize(bands);
   out.band_hz.resize(count, 2);
   out.level.resize(channels, count);
   for (Eigen::Index b = 0; b < count; ++b) {
     const Json& band = bands[static_cast<std::size_t>(b)];
     const std::vector<double> edges = numbers_in(band, "band_hz");
     const std::vector<double> level = numbers_in(band, "level");
-    if (edges.size() != 2 || static_cast<Eigen::Index>(level.size()) != channels) return {};
+    if (edges.size() != 2 || std::ssize(level) != channels) return {};
     out.band_hz.row(b) << edges[0], edges[1];
     out.level.col(b) = Eigen::Map<const Eigen::VectorXd>(level.data(), channels);
   }

@@ -33,8 +33,7 @@ Finding finding_of(const Json& object) {
 }
 
 bool has(const std::vector<Finding>& findings, Cause cause) {
-  return std::any_of(findings.begin(), findings.end(),
-                     [&](const Finding& f) { return f.cause == cause; });
+  return std::ranges::any_of(findings, [&](const Finding& f) { return f.cause == cause; });
 }
 
 }  // namespace
@@ -73,10 +72,9 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
     for (Finding& finding : check_experiment_noise(frf, noisy))
       findings.push_back(std::move(finding));
   // It comes from the steps, and the response is that to them.
-  const bool only_limit_cycles =
-      std::all_of(findings.begin(), findings.end(), [](const Finding& finding) {
-        return finding.severity != Severity::fault || finding.cause == Cause::limit_cycle;
-      });
+  const bool only_limit_cycles = std::ranges::all_of(findings, [](const Finding& finding) {
+    return finding.severity != Severity::fault || finding.cause == Cause::limit_cycle;
+  });
   if (steps_known && only_limit_cycles)
     for (Finding& finding : findings)
       if (finding.cause == Cause::limit_cycle) finding.severity = Severity::doubt;
@@ -133,8 +131,8 @@ std::vector<Finding> keep_health(FrfEstimate& frf, std::vector<Finding> findings
   if (settled_so_far()) unsettled_bands = check_settling(frf);
   withdraw_linearity_test(frf, findings);
   for (Finding& finding : unsettled_bands) findings.push_back(std::move(finding));
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
+  std::ranges::stable_sort(
+      findings, [](const Finding& a, const Finding& b) { return rank_of(a) < rank_of(b); });
   Json provenance = parse_json_object<Json>(frf.provenance_json);
   provenance["health"] = health_json(findings);
   frf.provenance_json = json_line(provenance);

@@ -51,7 +51,7 @@ class FormatErrorList {
     const auto same = [&](const FormatError& other) {
       return std::string_view(other.what()) == error.what();
     };
-    if (std::none_of(errors_.begin(), errors_.end(), same)) errors_.push_back(error);
+    if (std::ranges::none_of(errors_, same)) errors_.push_back(error);
   }
   std::vector<FormatError> errors_;
 };

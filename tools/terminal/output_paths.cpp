@@ -45,7 +45,7 @@ void require_readable(const std::filesystem::path& file) {
 
 void require_ending(const std::filesystem::path& file, const std::string& what,
                     const std::vector<std::string>& endings) {
-  if (std::find(endings.begin(), endings.end(), file.extension().string()) != endings.end()) return;
+  if (std::ranges::find(endings, file.extension().string()) != endings.end()) return;
   fail_request("{}: {} is written as {}; use a name with that ending", file.string(), what,
                fmt::join(endings, ", "));
 }

@@ -20,8 +20,7 @@ report::LogBytes deviation_on_all(const FrfEstimate& frf, const Eigen::VectorXd&
   if (variance.size() == 0) return {};
   Eigen::MatrixXd deviation = Eigen::MatrixXd::Zero(variance.rows(), frf.lines());
   const auto first =
-      std::lower_bound(frf.frequency_hz.begin(), frf.frequency_hz.end(), frequency_hz[0]) -
-      frf.frequency_hz.begin();
+      std::ranges::lower_bound(frf.frequency_hz, frequency_hz[0]) - frf.frequency_hz.begin();
   deviation.middleCols(first, variance.cols()) =
       variance.unaryExpr([](double v) { return std::sqrt(v); });
   return report::encode_log_bytes(deviation);

@@ -196,7 +196,7 @@ void expect_gradient(const DenseProblem& problem, DelayModel delay) {
     } else if (delay == DelayModel::per_channel) {
       for (Eigen::Index d = 0; d < 4; ++d) moved.push_back(Eigen::VectorXd::Unit(5, d));
     }
-    ASSERT_EQ(e.size(), p + static_cast<Eigen::Index>(moved.size()));
+    ASSERT_EQ(e.size(), p + std::ssize(moved));
     for (const Eigen::VectorXd& direction : moved) {
       const auto [expected, error] =
           slope_of_cost(problem, 1e-4, [&](AdditiveModel& model, double h) {

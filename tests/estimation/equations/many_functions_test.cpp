@@ -67,7 +67,7 @@ TEST(HeldGlobals, HaveNoEquationsAndLeaveThoseOfTheOthers) {
   fit.held = {3, 10, 11};  // one of a mode, and both of another
   std::vector<Eigen::Index> others;
   for (Eigen::Index i = 0; i < fit.globals(); ++i)
-    if (std::find(fit.held.begin(), fit.held.end(), i) == fit.held.end()) others.push_back(i);
+    if (std::ranges::find(fit.held, i) == fit.held.end()) others.push_back(i);
   const std::vector<BasisGroup> groups = evaluate_groups(fit, beta, true);
   EXPECT_EQ(groups.at(0).D.re.cols(), 2 * (fit.globals() - 3));
   const ArrowSystem held(fit, beta, groups, FitMethod::gn);

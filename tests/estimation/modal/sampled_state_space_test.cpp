@@ -80,8 +80,7 @@ TEST(SampledStateSpace, AgreesWithScipy) {
   std::ofstream(directory / "model.json") << reference["model"].dump();
   const AdditiveModel model = read_model(directory / "model.json");
   const auto hz = reference["frequency_hz"].get<std::vector<double>>();
-  const Eigen::VectorXd lines =
-      Eigen::Map<const Eigen::VectorXd>(hz.data(), static_cast<Eigen::Index>(hz.size()));
+  const Eigen::VectorXd lines = Eigen::Map<const Eigen::VectorXd>(hz.data(), std::ssize(hz));
   Eigen::MatrixXcd expected(6, lines.size());
   for (Eigen::Index k = 0; k < lines.size(); ++k)
     for (Eigen::Index c = 0; c < 6; ++c) {

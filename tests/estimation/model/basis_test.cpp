@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -261,8 +262,7 @@ TEST(Basis, WhatIsNotAskedForIsEmptyAndChangesNothing) {
   const HoldEquivalent through(lines(HoldModel::exact), 1e-5);
   for (const Case& c : cases()) {
     const std::vector<double> a = c.a();
-    const Eigen::Map<const Eigen::VectorXd> coefficients(a.data(),
-                                                         static_cast<Eigen::Index>(a.size()));
+    const Eigen::Map<const Eigen::VectorXd> coefficients(a.data(), std::ssize(a));
     SubmodelBasis all;
     evaluate_basis(through, c.shape(), coefficients, {.gradient = true, .delay = true}, all);
     SubmodelBasis bare;
@@ -282,13 +282,11 @@ TEST(Basis, RootsAreThoseThatThePolynomialWasBuiltFrom) {
                  mode_poles(20.0, 0.1) + mode_poles(2000.0, 0.02) + real_pole(300.0), 0});
   for (const Case& c : all) {
     const std::vector<double> a = c.a();
-    std::vector<Complex> found =
-        roots(Eigen::Map<const Eigen::VectorXd>(a.data(), static_cast<Eigen::Index>(a.size())));
+    std::vector<Complex> found = roots(Eigen::Map<const Eigen::VectorXd>(a.data(), std::ssize(a)));
     ASSERT_EQ(found.size(), c.poles.size()) << c.name;
     for (const Complex pole : c.poles) {
-      const auto nearest = std::min_element(found.begin(), found.end(), [&](Complex x, Complex y) {
-        return std::abs(x - pole) < std::abs(y - pole);
-      });
+      const auto nearest = std::ranges::min_element(
+          found, [&](Complex x, Complex y) { return std::abs(x - pole) < std::abs(y - pole); });
       // A root moves by eps |lambda| times its condition, prod |lambda| / |lambda - mu| < 1e3 here
       // (the lightly damped pair counts 1, three decades of spread the rest).
       EXPECT_LT(std::abs(*nearest - pole), 1e3 * kEps * std::abs(pole)) << c.name;
@@ -301,7 +299,7 @@ TEST(Basis, NearlyEqualRealRootsDoNotCancel) {
   // The small root of 1e12-fold spread: -b + sqrt(b^2 - 4ac) would lose all digits.
   const Eigen::VectorXd a{{1.0 / 2e-3 + 1.0 / 2e9, 1.0 / (2e-3 * 2e9)}};
   std::vector<Complex> found = roots(a);
-  std::sort(found.begin(), found.end(), [](Complex x, Complex y) { return x.real() > y.real(); });
+  std::ranges::sort(found, std::greater<>(), [](Complex x) { return x.real(); });
   EXPECT_NEAR(found[0].real(), -2e-3, 1e-15);
   EXPECT_NEAR(found[1].real(), -2e9, 1e-3);
 }

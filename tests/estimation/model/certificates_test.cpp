@@ -25,7 +25,7 @@ constexpr double kEps = 0x1p-53;
 
 Eigen::VectorXd vector_of(const json& list) {
   const std::vector<double> all = test::numbers<double>(list);
-  return Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
+  return Eigen::Map<const Eigen::VectorXd>(all.data(), std::ssize(all));
 }
 
 void append(const Eigen::MatrixXcd& values, std::vector<Complex>& out) {

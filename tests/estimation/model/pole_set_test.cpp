@@ -53,7 +53,7 @@ TEST(PoleSet, ZerosAreWhereTheSumVanishes) {
 TEST(PoleSet, NothingBesideOneLeavesThePolesWhereTheyAre) {
   const Eigen::VectorXcd zeros = zeros_of_sum(kPoles, Eigen::VectorXd::Zero(5));
   for (const Complex p : {kPoles.pairs[0], kPoles.pairs[1], Complex(-4.0, 0.0)})
-    EXPECT_TRUE(std::any_of(zeros.begin(), zeros.end(), [&](Complex zero) {
+    EXPECT_TRUE(std::ranges::any_of(zeros, [&](Complex zero) {
       return std::abs(zero - p) < 1e-13;
     })) << p;
 }

@@ -27,10 +27,9 @@ TEST(Poles, ComeBackFromTheirDenominator) {
   for (const double f : {50.0, 210.0, 700.0, 900.0})
     for (const Complex pole : mode_poles(f, 0.01)) poles.push_back(pole);
   for (const Complex found : roots(denominator_of(poles))) {
-    const double nearest =
-        std::abs(*std::min_element(poles.begin(), poles.end(), [&](Complex l, Complex r) {
-          return std::abs(l - found) < std::abs(r - found);
-        }) - found);
+    const double nearest = std::abs(*std::ranges::min_element(poles, [&](Complex l, Complex r) {
+      return std::abs(l - found) < std::abs(r - found);
+    }) - found);
     EXPECT_LT(nearest, 1e-11 * std::abs(found));
   }
 }

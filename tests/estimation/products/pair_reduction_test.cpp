@@ -108,8 +108,7 @@ class ReductionTest : public testing::Test {
   void expect_sums(const Case& c, const std::vector<FractionColumn>& left,
                    const SplitMatrix& left_columns, const std::vector<FractionColumn>& right,
                    const SplitMatrix& right_columns, std::size_t least_reduced) {
-    const auto pairs =
-        all_pairs(static_cast<Eigen::Index>(left.size()), static_cast<Eigen::Index>(right.size()));
+    const auto pairs = all_pairs(std::ssize(left), std::ssize(right));
     const FractionColumns& fractions = c.group.fractions;
     const PairReduction reduction(fractions, left, right, pairs);
     EXPECT_GE(pairs.size() - reduction.direct().size(), least_reduced);
@@ -118,13 +117,11 @@ class ReductionTest : public testing::Test {
     const Eigen::MatrixXd& W = *c.fit.W;
     const Eigen::VectorXd size =
         fractions.first.re.col(0).cwiseAbs2() + fractions.first.im.col(0).cwiseAbs2();
-    Eigen::MatrixXd direct =
-        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(reduction.direct().size()), W.rows());
+    Eigen::MatrixXd direct = Eigen::MatrixXd::Zero(std::ssize(reduction.direct()), W.rows());
     add_pair_sums(W, left_columns, right_columns, reduction.direct(), 0, direct);
     const Eigen::MatrixXd sums =
         reduction.expand(W * size.asDiagonal() * fractions.base, direct, 2);
-    Eigen::MatrixXd wanted =
-        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pairs.size()), W.rows());
+    Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(std::ssize(pairs), W.rows());
     add_pair_sums(W, left_columns, right_columns, pairs, 0, wanted);
     expect_close(pairs, wanted, sums, W, left_columns, right_columns);
   }
@@ -164,16 +161,14 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
     SCOPED_TRACE(to_string(hold));
     const Case c(hold);
     const FractionColumns& fractions = c.group.fractions;
-    const auto pairs = all_pairs(static_cast<Eigen::Index>(fractions.F.size()),
-                                 static_cast<Eigen::Index>(fractions.Y.size()));
+    const auto pairs = all_pairs(std::ssize(fractions.F), std::ssize(fractions.Y));
     const PairReduction reduction(fractions, fractions.F, fractions.Y, pairs);
     EXPECT_GE(pairs.size() - reduction.direct().size(), 20U);
     const SplitMatrix& F = c.group.F;
     const Eigen::MatrixXd V_re = c.fit.G->real();
     const Eigen::MatrixXd V_im = c.fit.G->imag();
     const auto sums_of = [&](const std::vector<ColumnPair>& some) {
-      Eigen::MatrixXd sums =
-          Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(some.size()), V_re.rows());
+      Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(std::ssize(some), V_re.rows());
       add_pair_sums(V_re, V_im, F, c.Y, some, 0, sums);
       return sums;
     };

@@ -46,7 +46,7 @@ TEST_P(PoleRelocation, TooManyPolesAreStableAndHoldTheTrueOnes) {
   }
   for (std::size_t i = 1; i < 4; ++i) {
     const double f = problem.model.submodels[i].natural_frequency_hz();
-    EXPECT_TRUE(std::any_of(modes.begin(), modes.end(), [&](const ModeCandidate& mode) {
+    EXPECT_TRUE(std::ranges::any_of(modes, [&](const ModeCandidate& mode) {
       return std::abs(mode.frequency_hz - f) < 0.005 * f;
     })) << f;
   }

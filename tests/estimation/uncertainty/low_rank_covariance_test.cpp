@@ -28,7 +28,7 @@ Eigen::VectorXd quantities(const AdditiveModel& model, bool deviations) {
     const Eigen::MatrixXd& B = deviations ? s.numerator_std.at(0) : s.numerator[0];
     out.insert(out.end(), B.reshaped().begin(), B.reshaped().end());
   }
-  return Eigen::Map<const Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
+  return Eigen::Map<const Eigen::VectorXd>(out.data(), std::ssize(out));
 }
 
 struct Repeated {

@@ -52,7 +52,7 @@ void expect_slopes(const Submodel& mode) {
       Submodel s = mode;
       const Eigen::Index n = s.numerator[0].size();
       double& value =
-          p < 2 ? s.denominator[static_cast<std::size_t>(p) + 1]
+          p < 2 ? s.denominator[static_cast<std::size_t>(p + 1)]
                 : s.numerator[static_cast<std::size_t>((p - 2) / n)].reshaped()[(p - 2) % n];
       const double scale =
           p < 2 ? value : s.numerator[static_cast<std::size_t>((p - 2) / n)].norm();
@@ -122,7 +122,7 @@ Repeated repeat(const test::DenseProblem& problem, const FitOptions& options,
       value.insert(value.end(), quantities.begin(), quantities.end());
       deviation.insert(deviation.end(), deviations.begin(), deviations.end());
     }
-    const auto count = static_cast<Eigen::Index>(value.size());
+    const auto count = std::ssize(value);
     if (run == 0) known.setZero(count);
     if (run == 0) values.resize(count, kRuns);
     values.col(run) = Eigen::Map<const Eigen::VectorXd>(value.data(), count);
@@ -225,7 +225,7 @@ TEST(DenseCovariance, FollowsTheOrderOfTheSubmodels) {
   const FitOptions options = test::options_with(Weighting::noise_variance);
   FitResult fit = fit_additive_model(frf, problem.model, options);
   AdditiveModel reversed = problem.model;
-  std::reverse(reversed.submodels.begin(), reversed.submodels.end());
+  std::ranges::reverse(reversed.submodels);
   FitResult other = fit_additive_model(frf, reversed, options);
   std::vector<std::size_t> back(reversed.submodels.size());
   for (std::size_t i = 0; i < back.size(); ++i) back[i] = back.size() - 1 - i;

@@ -51,7 +51,7 @@ void expect_uncertainty(const FitResult& fit, const Eigen::MatrixXcd& J, const E
   Eigen::Index a = 0;
   Eigen::Index b = C.rows();
   for (const Submodel& s : fit.model.submodels)
-    b -= static_cast<Eigen::Index>(s.numerator.size()) * s.numerator[0].size();
+    b -= std::ssize(s.numerator) * s.numerator[0].size();
   for (const Submodel& s : fit.model.submodels) {
     // The inverse of a matrix of condition 1e5 after scaling, and 1e-9 of the differences.
     if (s.is_mode()) test::expect_mode_deviations(s, C.block<2, 2>(a, a), 1e-6);

@@ -22,7 +22,7 @@ MatrixXd companion() {
 }
 
 void expect_roots(Eigen::VectorXcd values) {
-  std::sort(values.begin(), values.end(), [](Complex a, Complex b) {
+  std::ranges::sort(values, [](Complex a, Complex b) {
     return a.real() + 0.1 * a.imag() < b.real() + 0.1 * b.imag();
   });
   const Complex roots[] = {{0.0, -2.0}, {0.0, 2.0}, 1.0, 2.0};

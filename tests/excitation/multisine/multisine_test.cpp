@@ -149,7 +149,7 @@ TEST(Multisine, FollowsTheSeedAlone) {
 
 TEST(Multisine, PhasesAreUniformByKolmogorovAndSmirnov) {
   Eigen::VectorXd phases = random_phase_multisine(odd_grid(), {.seed = 6}).phase_rad;
-  std::sort(phases.begin(), phases.end());
+  std::ranges::sort(phases);
   const auto n = static_cast<double>(phases.size());
   double distance = 0.0;
   for (Eigen::Index i = 0; i < phases.size(); ++i) {

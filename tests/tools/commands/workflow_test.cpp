@@ -345,9 +345,8 @@ TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
     const ProgramResult fit = run({"fit", compensate + ".h5", "-o", compensate + ".json",
                                    "--direct-term", "full", "--modes", "3", "--json"});
     const json modes = json::parse(fit.out)["modes"];
-    const auto flexible = std::find_if(modes.begin(), modes.end(), [](const json& mode) {
-      return mode["natural_frequency_hz"].get<double>() > 16.0;
-    });
+    const auto flexible = std::ranges::find_if(
+        modes, [](const json& mode) { return mode["natural_frequency_hz"].get<double>() > 16.0; });
     return (*flexible)["natural_frequency_hz"].get<double>();
   };
   const double measured = first_flexible_mode("none");

@@ -168,9 +168,8 @@ TEST(ConfigReader, KeepsAllThatIsWrong) {
     for (const char* place :
          {":1:11: period_s", ":2:1: unknown key 'sead'", ":3:11: band_hz", ":3:15: band_hz",
           ":4:16: rms_n", ":5:10: unknown key 'y_m'", ":5:25: x_m"})
-      EXPECT_TRUE(std::any_of(
-          all.begin(), all.end(),
-          [&](const std::string& text) { return text.find(place) != std::string::npos; }))
+      EXPECT_TRUE(std::ranges::any_of(
+          all, [&](const std::string& text) { return text.find(place) != std::string::npos; }))
           << place << testing::PrintToString(all);
   }
 }

@@ -118,7 +118,7 @@ TEST_F(ControllerViewTest, ATableHasOneRowPerLine) {
             "frequency_hz,real z,imaginary z,radius_95 z,real Ry,imaginary Ry,radius_95 Ry,real "
             "det(I + L),imaginary det(I + L),radius_95 det(I + L)");
   int rows = 0;
-  for (; std::getline(table, line); ++rows) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 9);
+  for (; std::getline(table, line); ++rows) EXPECT_EQ(std::ranges::count(line, ','), 9);
   EXPECT_EQ(rows, 197);
 }
 

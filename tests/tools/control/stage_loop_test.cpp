@@ -90,8 +90,8 @@ TEST(StageLoop, RefusesAModelWithoutSomeOfItsChannels) {
 
 TEST(StageLoop, OfMatricesIsOneLoopPerActuatorThatTheyDrive) {
   StageSpec stage = wafer_stage();
-  const auto n_u = static_cast<Eigen::Index>(stage.info.actuators.size());
-  const auto n_y = static_cast<Eigen::Index>(stage.info.sensors.size());
+  const auto n_u = std::ssize(stage.info.actuators);
+  const auto n_y = std::ssize(stage.info.sensors);
   stage.controller.axes.clear();
   stage.controller.sensor_decoupling.resize(0, n_y);
   stage.controller.actuator_decoupling.resize(n_u, 0);

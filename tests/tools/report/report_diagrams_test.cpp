@@ -84,7 +84,7 @@ TEST(ReportShapes, FindPlacesByName) {
 TEST(ReportShapes, ComeByFrequencyHoweverTheModelOrdersThem) {
   ReportData data = test::synthetic_report({.outputs = 2, .inputs = 3, .lines = 10, .modes = 4});
   const json rising = shapes_json(*data.model);
-  std::reverse(data.model->submodels.begin(), data.model->submodels.end());
+  std::ranges::reverse(data.model->submodels);
   EXPECT_EQ(shapes_json(*data.model), rising);
   for (std::size_t i = 1; i < 4; ++i)
     EXPECT_LT(rising["modes"][i - 1]["frequency_hz"].get<double>(),

@@ -80,7 +80,7 @@ TEST(ReportEncoding, FiveBytesKeepEachPartToTheStatedShareOfTheLarger) {
   values.emplace_back(-(1.0 - 1e-9), 0.0);
   values.emplace_back(0.0, 0.0);
   const Eigen::MatrixXcd matrix =
-      Eigen::Map<Eigen::RowVectorXcd>(values.data(), static_cast<Eigen::Index>(values.size()));
+      Eigen::Map<Eigen::RowVectorXcd>(values.data(), std::ssize(values));
   const auto decoded = unpacked_block16(encode_complex_block16(matrix).text);
   ASSERT_EQ(decoded.size(), values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {

@@ -83,8 +83,8 @@ TEST(DataHealth, WithoutAConfigurationTheWiringIsNotCheckedRatherThanFine) {
     EXPECT_NE(finding.remedy.find("--stage"), std::string::npos) << finding.remedy;
   }
   EXPECT_EQ(unchecked, 1);
-  EXPECT_TRUE(std::any_of(findings.begin(), findings.end(),
-                          [](const Finding& f) { return f.cause == Cause::unknown_stage; }));
+  EXPECT_TRUE(std::ranges::any_of(
+      findings, [](const Finding& f) { return f.cause == Cause::unknown_stage; }));
 }
 
 // The nearly constant record of another actuator would fit in its place, but its own would not fit in the other's.
