@@ -209,7 +209,7 @@ void design_command(CLI::App& app, Console& console) {
   frf->needs(watch);
   command
       .add_option_function<double>(
-          "--rms-nm", [&flags](double rms_nm) { flags.watch.rms_m = 1e-9 * rms_nm; },
+          "--rms-nm", [&rms_m = flags.watch.rms_m](double rms_nm) { rms_m = 1e-9 * rms_nm; },
           "with --watch: largest rms of a sensor in nm; omitted: the levels of the experiment")
       ->check(CLI::Range(1e-6, 1e9))
       ->needs(watch);
