@@ -463,8 +463,7 @@ class AutomaticFit {
     if (!is_better(trial)) return false;
     delay_denied_ = fmt::format(
         "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than {} "
-        "more "
-        "modes ({:.6g}), which were discarded; use --delay estimate",
+        "more modes ({:.6g}), which were discarded; use --delay estimate",
         trial.model.mean_delay_s(), options_.delay_s, trial.model.fit.cost,
         count_modes(best_.model) - count_modes(ungrown_->model), cost());
     say("{}", delay_denied_);
@@ -499,12 +498,14 @@ class AutomaticFit {
     return fit_additive_model(frf_, model, quick_);
   }
 
-  /// Whether the modes that `trial` has beside those of best_ are worth their parameters and are confirmed by more than
-  /// the best line of each: an outlier, too, is fitted by a mode, which is sharper than the lines.
+  /// Whether the modes that `trial` has beside those of best_ are worth their parameters, and none is fitted to one line,
+  /// as outliers are: it is not narrower than the lines, and other lines than the best one confirm it.
   bool is_worth_adding(const FitResult& trial) const {
     if (!is_better(trial)) return false;
     for (std::size_t i = best_.model.submodels.size(); i < trial.model.submodels.size(); ++i)
-      if (mode_verdict(frf_, ModeNumber::chosen, trial, i) == ModeVerdict::at_bound) return false;
+      if (trial.model.submodels[i].damping_ratio() < kBroad &&
+          mode_verdict(frf_, ModeNumber::chosen, trial, i) == ModeVerdict::at_bound)
+        return false;
     const Team& team = *quick_.workers().team;
     Eigen::VectorXd gain = squares_of_lines(frf_, best_.model, quick_.user_weights, team) -
                            squares_of_lines(frf_, trial.model, quick_.user_weights, team);
@@ -541,11 +542,11 @@ class AutomaticFit {
     }
     const Submodel& added = best_trial.model.submodels.back();
     if (selection_.exactly == 0 && !worth_it) {
-      say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, which "
+      say("no further mode: the best candidate, {:.6g} Hz, would lower the cost by {:.2g} %, "
           "{}",
           added.natural_frequency_hz(), 100.0 * (1.0 - best_trial.model.fit.cost / cost()),
-          is_better(best_trial) ? "one line causes, as an outlier does"
-                                : "does not justify its parameters (BIC)");
+          is_better(best_trial) ? "but only on one line, as an outlier does"
+                                : "which does not justify its parameters (BIC)");
       return false;
     }
     say("added {:.6g} Hz (damping {:.3g}): cost {:.6g} -> {:.6g}", added.natural_frequency_hz(),

@@ -30,8 +30,8 @@ struct FitEvidence {
   ModeNumber number = ModeNumber::chosen;
   std::vector<AlikeModes> alike = {};
   std::string low_ranks = {};  ///< residues need a higher rank than requested
-  std::string delay_denied =
-      {};  ///< a delay, which is not to be estimated, explains more than modes
+  /// A delay, which is not to be estimated, explains more than modes do.
+  std::string delay_denied = {};
   std::optional<FitReason> limit = {};  ///< the search was interrupted or reached its budget
   std::string late_channels = {};
   std::optional<FitReason> unexplained = {};  ///< by noise and known distortion

@@ -43,8 +43,10 @@ int place_of(const Problem& p) {
   // The residual is compared with them, so that they can be its cause.
   if (is_of_health(p)) return 7;
   if (p.cause == kNonlinear) return 8;
-  // A refit has shown that it is the cause. A narrower band avoids what any cause leaves.
-  const bool avoids = p.is(FitStatus::undetermined) || p.flags.starts_with("--band");
+  // A refit has shown that it is the cause. A narrower band avoids what any cause leaves, and a second numerator of every
+  // mode imitates much of it.
+  const bool avoids = p.is(FitStatus::undetermined) || p.flags.starts_with("--band") ||
+                      p.flags.starts_with("--damping general");
   if (!p.flags.empty() && !avoids) return 9;
   if (p.cause == kOneRealization) return 10;
   // Modes that the data do not determine also keep the iteration from its end.
