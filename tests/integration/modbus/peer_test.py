@@ -240,7 +240,7 @@ class ModbusTest(unittest.TestCase):
         node, port = self.bench.node()
         stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
         experiment = self.bench.experiment(stage, short=True)
-        experiment.write_text(experiment.read_text().replace('  periods: 1', '  periods: 1200'))
+        experiment.write_text(experiment.read_text().replace('  periods: 1', '  periods: 2000'))
 
         def samples(name, meanwhile=lambda run: None):
             run = self.bench.start_run(experiment, self.bench.work / f'{name}.slog', '--pace', 0)
