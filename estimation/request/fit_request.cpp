@@ -194,7 +194,7 @@ class FitDefaults {
     weigh_by_total_variance();
     warn("weighting: total_variance; " +
          (!nonlinear.empty() ? nonlinear
-          : frf.nonlinearity.settled_p_value.maxCoeff() == 0.0
+          : is_withdrawn(frf.nonlinearity)
               ? "realizations differ by more than their periods; the data health names the cause"
               : "realizations differ by more than their periods, because of a transient or a "
                 "drift: increase transient_periods or realizations"));

@@ -40,7 +40,7 @@ std::vector<Eigen::Index> rows_of_inputs(const FrfEstimate& frf, const HealthRec
 }
 
 /// (total variance - noise) / (variance by steps of size 1) of an output, mean over the record's lines and the inputs;
-/// negative if no line is known.
+/// infinite if no line is known.
 double excess_over_steps(const FrfEstimate& frf, const HealthRecord& record, Eigen::Index output,
                          const std::vector<Eigen::Index>& inputs) {
   const double of_line = 1.0 / (12.0 * record.info.period_samples * frf.realizations);
@@ -59,7 +59,7 @@ double excess_over_steps(const FrfEstimate& frf, const HealthRecord& record, Eig
       ++count;
     }
   }
-  return count > 0 ? sum / count : -1.0;
+  return count > 0 ? sum / count : HUGE_VAL;
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ enum class Cause : std::uint8_t {
   excitation_timing,  ///< the excitation was recorded whole samples late or early
   drift,              ///< the response changes during the measurement
   actuator_step,      ///< an actuator applies its recorded command in coarse steps
-  resolution,         ///< the converter of a sensor is coarse for its motion
+  resolution,         ///< a channel moves by few steps of its converter, or is dead
 };
 template <>
 inline constexpr std::array kWords<Cause> = {

@@ -35,6 +35,10 @@ std::string pair_name(const FrfEstimate& frf, Eigen::Index c) {
                      frf.inputs.name(c / frf.n_outputs()));
 }
 
+bool is_withdrawn(const NonlinearityTest& test) {
+  return test.settled_p_value.size() > 0 && test.settled_p_value.maxCoeff() == 0.0;
+}
+
 std::string nonlinearity_sentence(const FrfEstimate& frf) {
   const NonlinearityTest test = linearity_of(frf);
   if (!test.nonlinear()) return {};

@@ -15,4 +15,7 @@ std::string decibels(double ratio);
 /// "output <- input" of a channel (row of FrfEstimate::response).
 std::string pair_name(const FrfEstimate& frf, Eigen::Index channel);
 
+/// Whether a finding about the data explains why the realizations differ (withdraw_linearity_test()).
+bool is_withdrawn(const NonlinearityTest& test);
+
 }  // namespace stageid

@@ -49,7 +49,7 @@ std::size_t unsettled_bands(const NonlinearityTest& test) {
 }
 
 std::string unsettled_line(const NonlinearityTest& test) {
-  if (test.settled_p_value.maxCoeff() == 0.0)
+  if (is_withdrawn(test))
     return "linearity cannot be tested: the data health names what makes the realizations differ";
   return fmt::format(
       "linearity cannot be tested in {} of {} bands, because the records are not settled there: {}",

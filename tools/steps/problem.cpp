@@ -45,9 +45,9 @@ int place_of(const Problem& p) {
   if (p.cause == kNonlinear) return 8;
   // A refit has shown that it is the cause. A narrower band avoids what any cause leaves, and a second numerator of every
   // mode imitates much of it.
-  const bool avoids = p.is(FitStatus::undetermined) || p.flags.starts_with("--band") ||
-                      p.flags.starts_with("--damping general");
-  if (!p.flags.empty() && !avoids) return 9;
+  const bool fits_any_cause = p.is(FitStatus::undetermined) || p.flags.starts_with("--band") ||
+                              p.flags.starts_with("--damping general");
+  if (!p.flags.empty() && !fits_any_cause) return 9;
   if (p.cause == kOneRealization) return 10;
   // Modes that the data do not determine also keep the iteration from its end.
   return is_end_of_iteration(p) ? 13 : p.cause == kHeldBack ? 12 : 11;
