@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -22,7 +23,7 @@ constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
 constexpr double kTolerable = 3.0;      // standard deviations, of the expected shift
-constexpr double kAgreement = 0.5;      // of phases: half way between chance and certainty
+constexpr double kAgreement = 0.5;      // explained part: half way between chance and certainty
 constexpr double kSteady = 0.98;        // of consecutive periods: what rings longer is a drift
 
 /// Noise of one period on each line, and the power of the start relative to it.
@@ -35,15 +36,14 @@ struct Lines {
 Lines lines_of(const StartEvidence& e) {
   const Index K = e.frequency_hz.size();
   Lines lines{Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K), Eigen::VectorXd::Zero(K)};
-  double dof = 0.0;
   for (const RunStart& run : e.runs) {
-    lines.noise += run.noise_dof * run.noise;
+    lines.noise += run.noise;
     lines.start += run.start;
     lines.excess += run.start / (1.0 + 1.0 / run.periods);
-    dof += run.noise_dof;
   }
-  lines.noise = (lines.noise / dof).cwiseMax(std::numeric_limits<double>::min());
-  lines.excess = (lines.excess.array() / lines.noise.array()) / static_cast<double>(e.runs.size());
+  const double runs = static_cast<double>(e.runs.size());
+  lines.noise = (lines.noise / runs).cwiseMax(std::numeric_limits<double>::min());
+  lines.excess = (lines.excess.array() / lines.noise.array()) / runs;
   return lines;
 }
 
@@ -61,30 +61,36 @@ std::vector<Index> maxima(const Lines& lines) {
   return found;
 }
 
-/// Rayleigh's test of the phases of the runs, with weights.
-class Phases {
+/// Regression of W on B over the runs: W = c B + noise, where c is one number for all runs.
+class Regression {
  public:
-  void add(std::complex<double> x, double squared_weight) {
-    const double size = std::abs(x);
-    if (size > 0.0) resultant_ += std::sqrt(squared_weight) * x / size;
-    weights_ += std::sqrt(squared_weight);
-    squares_ += squared_weight;
+  /// @param product B* W  @param power |B|^2, both sums over lines and sensors
+  void add(std::complex<double> product, double power) {
+    if (!(power > 0.0)) return;
+    ++runs_;
+    products_ += product;
+    power_ += power;
+    squares_ += std::norm(product) / power;
   }
-  /// Mean cosine between the phases of two runs, weighted: 1 if they agree, 0 for random ones.
-  double agreement() const {
-    const double pairs = weights_ * weights_ - squares_;
-    return pairs > 0.0 ? (std::norm(resultant_) - squares_) / pairs : 1.0;
+  std::complex<double> slope() const { return products_ / power_; }
+  double power() const { return power_; }
+  /// Part of the component of W along B that the same c explains in all runs.
+  double explained() const {
+    return squares_ > 0.0 ? std::norm(products_) / (power_ * squares_) : 1.0;
   }
-  /// @param by_memory resultant over the root of the sum of squared weights that noise with a memory has
+  /// @param by_memory size of c that noise with a memory explains
   double p_value(double by_memory) const {
-    if (!(squares_ > 0.0)) return 1.0;
-    const double beyond = std::max(0.0, std::abs(resultant_) / std::sqrt(squares_) - by_memory);
-    return std::exp(-beyond * beyond);
+    if (runs_ < 2 || !(squares_ > 0.0)) return 1.0;
+    const double beyond = std::max(0.0, std::abs(slope()) - by_memory);
+    const double scatter =
+        std::max(squares_ * (1.0 - explained()), kPowerRounding * squares_) / (runs_ - 1);
+    return std::exp(log_tail_of_f(beyond * beyond * power_ / scatter, 1, runs_ - 1));
   }
 
  private:
-  std::complex<double> resultant_ = 0.0;
-  double weights_ = 0.0;
+  int runs_ = 0;
+  std::complex<double> products_ = 0.0;
+  double power_ = 0.0;
   double squares_ = 0.0;
 };
 
@@ -108,31 +114,27 @@ class Window {
         first_power_ += run.first[k] / lines.noise[k];
         last_power_ += run.last[k] / lines.noise[k];
       }
-      along_ += along;
-      start_ += start;
-      phases_.add(along, start);
-      bends_.add(bend, slope);
+      decay_.add(along, start);
+      curvature_.add(bend, slope);
     }
   }
 
   /// The smaller p-value of the two tests, corrected for two tests.
   double p_value() const {
-    const double by_memory =
-        kMemory * std::sqrt(static_cast<double>(evidence_.runs.size()) / excess_);
-    return std::min(1.0, 2.0 * std::min(phases_.p_value(by_memory), p_of_decay()));
+    return std::min(1.0, 2.0 * std::min(decay_.p_value(kMemory / excess_), p_of_decay()));
   }
 
   /// Whether the periods change along a straight line, as a drift does and a transient does not.
   bool straight() const {
-    return bends_.p_value(0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms;
+    return curvature_.p_value(0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms;
   }
   /// Whether the start decays by the same complex ratio in all runs, as every linear transient does.
-  bool linear() const { return phases_.agreement() > kAgreement; }
+  bool linear() const { return decay_.explained() > kAgreement; }
 
   /// Ratio q of the transient in consecutive periods.
   std::complex<double> ratio() const {
     const int P = evidence_.runs.front().periods;
-    const std::complex<double> c = along_ / start_;
+    const std::complex<double> c = decay_.slope();
     std::complex<double> best = 0.0;
     double least = std::numeric_limits<double>::infinity();
     const auto look = [&](std::complex<double> q) {
@@ -168,7 +170,7 @@ class Window {
     const double averaged = used ? P + 1.0 : P;
     // Power over noise is a mean over the sensors; the real part has half of the noise.
     return std::abs(left) *
-           std::sqrt(2.0 * static_cast<double>(evidence_.sensors) * averaged * start_);
+           std::sqrt(2.0 * static_cast<double>(evidence_.sensors) * averaged * decay_.power());
   }
 
   double frequency_hz() const { return evidence_.frequency_hz[peak_]; }
@@ -190,18 +192,29 @@ class Window {
   const StartEvidence& evidence_;
   Index peak_;
   double excess_;
-  std::complex<double> along_ = 0.0;
-  double start_ = 0.0;
   double first_power_ = 0.0;
   double last_power_ = 0.0;
-  Phases phases_;
-  Phases bends_;
+  Regression decay_;      // of W on B
+  Regression curvature_;  // of K on L
 };
 
-/// "71, 182 and 3 more Hz"
-std::string names_of(const std::vector<double>& frequencies_hz) {
+/// A window with a finding.
+struct Change {
+  double frequency_hz;
+  double shift;  // standard deviations
+  std::complex<double> ratio;
+
+  /// Periods after which the shift is no longer reported.
+  int periods_left() const {
+    return std::max(1, static_cast<int>(std::ceil(std::log(shift / kLargestShift) /
+                                                  -std::log(std::abs(ratio)))));
+  }
+};
+
+/// "182, 71 and 3 more Hz"
+std::string names_of(const std::vector<Change>& changes) {
   std::vector<std::string> names;
-  for (const double f : frequencies_hz) names.push_back(fmt::format("{:.4g}", f));
+  for (const Change& change : changes) names.push_back(fmt::format("{:.4g}", change.frequency_hz));
   return listed(names, kMostNamed) + " Hz";
 }
 
@@ -209,39 +222,31 @@ std::string names_of(const std::vector<double>& frequencies_hz) {
 
 std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
   if (evidence.runs.empty() || evidence.frequency_hz.size() == 0) return {};
+  const bool start_used = evidence.runs.front().start_used;
   const Lines lines = lines_of(evidence);
   const std::vector<Index> peaks = maxima(lines);
-  std::vector<double> frequencies;
-  double largest = 0.0;
-  double of_largest = 0.0;
+  std::vector<Change> ringing;
+  std::vector<Change> drifting;
   double settled = 0.0;  // the largest shift if the start is discarded
-  int more = 0;
   bool linear = false;
-  std::vector<double> drifting;
-  double least_p = 1.0;
+  double least_p = 1.0;  // of the drifts
   for (const Index peak : peaks) {
     const Window window(evidence, lines, peak);
     const double p = window.p_value() * static_cast<double>(peaks.size());
     if (p >= kFalseAlarms) continue;
     const std::complex<double> q = window.ratio();
+    const Change change{window.frequency_hz(), window.shift(q, start_used), q};
     if (window.straight() || std::abs(q) > kSteady) {
       least_p = std::min(least_p, p);
-      drifting.push_back(window.frequency_hz());
+      drifting.push_back(change);
       continue;
     }
-    const double shift = window.shift(q, evidence.runs.front().start_used);
     // A mode that rings at an end of the lines lies beside them and shifts no other.
     if (!window.linear() || (peak > 0 && peak + 1 < evidence.frequency_hz.size()))
       settled = std::max(settled, window.shift(q, false));
-    if (shift <= kLargestShift) continue;
-    frequencies.push_back(window.frequency_hz());
+    if (change.shift <= kLargestShift) continue;
+    ringing.push_back(change);
     linear = linear || window.linear();
-    more = std::max(more, static_cast<int>(
-                              std::ceil(std::log(shift / kLargestShift) / -std::log(std::abs(q)))));
-    if (shift > largest) {
-      largest = shift;
-      of_largest = std::abs(q);
-    }
   }
   std::vector<Finding> findings;
   if (!drifting.empty())
@@ -251,21 +256,24 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
                                     names_of(drifting)),
                         fmt::format("p = {:.1g}", least_p),
                         "let the stage warm up, or measure for a shorter time"});
-  if (frequencies.empty()) return findings;
-  const int needed = evidence.transient_periods + std::max(1, more);
+  if (ringing.empty()) return findings;
+  std::ranges::stable_sort(ringing, std::greater(), &Change::shift);
+  const Change& largest = ringing.front();
+  const int more = std::ranges::max(ringing, {}, &Change::periods_left).periods_left();
+  const int needed = evidence.transient_periods + more;
   // The bound is reached if all runs shift the mode alike. Their phases are random.
   const double expected = settled / std::sqrt(static_cast<double>(evidence.runs.size()));
   std::string figure = fmt::format(
       "shifts a mode by up to {:.2g} standard deviations; {:.2g} % remains after one more period",
-      largest, 100.0 * of_largest);
-  if (evidence.runs.front().start_used)
+      largest.shift, 100.0 * std::abs(largest.ratio));
+  if (start_used)
     figure += fmt::format("; {:.2g} standard deviations without the first one", settled);
   Finding finding{
       expected > kTolerable ? Severity::fault : Severity::doubt,
       Cause::unsettled,
       "",
       fmt::format("not settled: the transient of the start still rings at {} after {}",
-                  names_of(frequencies), counted(evidence.transient_periods, "period")),
+                  names_of(ringing), counted(evidence.transient_periods, "period")),
       figure,
       needed <= evidence.transient_periods + evidence.periods - 2
           ? fmt::format("--transient-periods {}, or --method lpm; then fit again", needed)
@@ -278,7 +286,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
     finding.what = fmt::format(
         "the loop oscillates at the start of the runs at {} and comes to rest, in each run in "
         "another way: a limit cycle, as coarse steps of the command or friction cause",
-        names_of(frequencies));
+        names_of(ringing));
     finding.remedy = kRemedyOfLimitCycle;
   }
   findings.push_back(std::move(finding));

@@ -18,18 +18,15 @@ void StartRecorder::take(const Eigen::Ref<const Eigen::MatrixXcd>& spectra) {
     return;
   }
   ++count_;
+  before_latest_ = std::move(latest_);
   latest_ = spectra;
   if (count_ == 1) {
     first_ = moment_ = spectra;
     rest_mean_.setZero(spectra.rows(), spectra.cols());
-    rest_scatter_.setZero(spectra.rows(), spectra.cols());
     return;
   }
   moment_ += count_ * spectra;
-  const double n = count_ - 1;
-  const Eigen::MatrixXcd deviation = spectra - rest_mean_;
-  rest_mean_ += deviation / n;
-  rest_scatter_ += (1.0 - 1.0 / n) * deviation.cwiseAbs2();
+  rest_mean_ += (spectra - rest_mean_) / (count_ - 1);
 }
 
 RunStart StartRecorder::finish() {
@@ -46,10 +43,8 @@ RunStart StartRecorder::finish() {
   const Eigen::MatrixXcd last = latest_ - inner;
   const Eigen::MatrixXcd L = moment_ - 0.5 * P * (start_ + P * mean);
   const Eigen::MatrixXcd K = start_ - first_ - 2.0 / P * W;
-  const double scale = (P - 1.0) / P;
-  run.noise_dof = count_ == 2 ? 1.0 : P - 2.0;
-  Eigen::MatrixXd noise = rest_scatter_ / run.noise_dof;
-  if (count_ == 2) noise = scale * W.cwiseAbs2();
+  // The last two periods contain least of the start.
+  const Eigen::MatrixXd noise = 0.5 * (latest_ - before_latest_).cwiseAbs2();
   // One scale per sensor makes the units comparable and keeps the colour over the lines.
   for (Eigen::Index c = 0; c < noise.rows(); ++c) {
     const Eigen::VectorXd of_sensor = noise.row(c);

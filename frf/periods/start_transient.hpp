@@ -14,14 +14,13 @@ namespace stageid {
 /// A drift adds D p to Z_p. B and W are then proportional too, but there is no curvature:
 ///   L = sum_p (p - P/2) Z_p (slope),  K = Z_0 - (1 + 2/P) Z_1 + 2/P mean(Z_2 ... Z_P) (zero for a straight line).
 struct RunStart {
-  Eigen::VectorXcd along;  ///< sum over the sensors of conj(B) W, per line
-  Eigen::VectorXcd bend;   ///< the same of conj(L) K
-  Eigen::VectorXd start;   ///< |B|^2
-  Eigen::VectorXd slope;   ///< |L|^2
-  Eigen::VectorXd first;   ///< |Z_1 - mean(Z_2 ... Z_{P-1})|^2
-  Eigen::VectorXd last;    ///< |Z_P - mean(Z_2 ... Z_{P-1})|^2
-  Eigen::VectorXd noise;   ///< of one period, from Z_2 ... Z_P; P = 2: from both periods
-  double noise_dof = 0.0;
+  Eigen::VectorXcd along;   ///< sum over the sensors of conj(B) W, per line
+  Eigen::VectorXcd bend;    ///< the same of conj(L) K
+  Eigen::VectorXd start;    ///< |B|^2
+  Eigen::VectorXd slope;    ///< |L|^2
+  Eigen::VectorXd first;    ///< |Z_1 - mean(Z_2 ... Z_{P-1})|^2
+  Eigen::VectorXd last;     ///< |Z_P - mean(Z_2 ... Z_{P-1})|^2
+  Eigen::VectorXd noise;    ///< of one period: |Z_P - Z_{P-1}|^2 / 2
   int periods = 0;          ///< P
   bool start_used = false;  ///< whether Z_0 is one of the used periods
 };
@@ -56,9 +55,9 @@ class StartRecorder {
   Eigen::MatrixXcd start_;
   Eigen::MatrixXcd first_;
   Eigen::MatrixXcd latest_;
+  Eigen::MatrixXcd before_latest_;
   Eigen::MatrixXcd moment_;     // sum of p Z_p
   Eigen::MatrixXcd rest_mean_;  // of Z_2 ...
-  Eigen::MatrixXd rest_scatter_;
 };
 
 }  // namespace stageid

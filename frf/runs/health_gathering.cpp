@@ -150,7 +150,7 @@ void carry(Parcel& parcel, SampleSlip& slip) {
 
 void carry(Parcel& parcel, RunStart& start) {
   parcel(start.along), parcel(start.bend), parcel(start.start), parcel(start.slope);
-  parcel(start.first), parcel(start.last), parcel(start.noise), parcel(start.noise_dof);
+  parcel(start.first), parcel(start.last), parcel(start.noise);
   parcel(start.periods), parcel(start.start_used);
 }
 
