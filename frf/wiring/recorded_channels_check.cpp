@@ -1,6 +1,7 @@
 #include "frf/wiring/recorded_channels_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -27,11 +28,19 @@ struct Line {
   double omega_rad_s = 0.0;
   bool known = true;   // whether the controller is known here
   Eigen::MatrixXcd F;  // -C, n_u x n_y
+  Eigen::MatrixXcd R;  // n_u x E
   Eigen::MatrixXcd Y;  // means, n_y x E
   Eigen::MatrixXcd U;
-  Eigen::MatrixXcd E;        // U - R - F Y
-  Eigen::VectorXd variance;  // of E
-  Eigen::VectorXd weight;    // n_u
+};
+
+/// Deviation of the misfit U - R - F Y on three neighbouring lines from a straight line. Where the record does not repeat,
+/// its two ends leave a misfit that is smooth over the lines; a wrong channel leaves one with random phases.
+struct Bend {
+  std::size_t first = 0;          // of its lines
+  std::array<double, 3> factors;  // of their values; the sum of squares is one
+  Eigen::MatrixXcd E;             // n_u x E
+  Eigen::VectorXd variance;       // of E
+  Eigen::VectorXd weight;         // n_u
 };
 
 struct Candidate {
@@ -82,10 +91,16 @@ class Search {
           frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
       lines_[k].F = lines_[k].known ? Eigen::MatrixXcd(nominal.controller(frequency_hz)(u, y))
                                     : Eigen::MatrixXcd::Zero(record.n_u(), record.n_y());
-      Eigen::MatrixXcd R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
+      lines_[k].R = Eigen::MatrixXcd::Zero(record.n_u(), record.experiments());
       for (std::size_t a = 0; a < excited.size(); ++a)
-        R.row(excited[a]) = record.lines[k].R.row(record.axes[a]);
-      R_.push_back(std::move(R));
+        lines_[k].R.row(excited[a]) = record.lines[k].R.row(record.axes[a]);
+    }
+    for (std::size_t k = 0; k + 2 < lines_.size(); k += 3) {
+      if (!lines_[k].known || !lines_[k + 1].known || !lines_[k + 2].known) continue;
+      const double whole = lines_[k + 2].omega_rad_s - lines_[k].omega_rad_s;
+      const double above = (lines_[k + 1].omega_rad_s - lines_[k].omega_rad_s) / whole;
+      const double size = std::sqrt(1.0 + above * above + (1.0 - above) * (1.0 - above));
+      bends_.push_back({k, {(above - 1.0) / size, 1.0 / size, -above / size}, {}, {}, {}});
     }
   }
 
@@ -116,17 +131,8 @@ class Search {
   /// Whether there is nothing to search for.
   bool holds() {
     refresh();
-    for (Index a = 0; a < record_.n_u(); ++a) {
-      double evidence = 0.0;
-      for (const Line& line : lines_) {
-        const auto E = static_cast<int>(line.E.cols());
-        evidence -= log_tail_of_f(line.weight[a] * line.E.row(a).squaredNorm() / E, E,
-                                  std::max(1, record_.scatter_dof()));
-      }
-      if (tail_of_evidence(evidence, std::ssize(lines_)) <
-          kSignificance / static_cast<double>(record_.n_u()))
-        return false;
-    }
+    for (Index a = 0; a < record_.n_u(); ++a)
+      if (exceeds(a, [a](const Bend& bend) { return 1.0 / bend.weight[a]; })) return false;
     return true;
   }
 
@@ -145,29 +151,42 @@ class Search {
 
  private:
   void refresh() {
-    total_ = 0.0;
     for (std::size_t k = 0; k < lines_.size(); ++k) {
-      Line& line = lines_[k];
       const Eigen::MatrixXcd& Z = record_.lines[k].Z;
-      const Eigen::MatrixXcd controlled = line.F * Z.topRows(record_.n_y());
-      line.Y = record_.mean(Z.topRows(record_.n_y()));
-      line.U = record_.mean(Z.bottomRows(record_.n_u()));
-      line.E = line.U - R_[k] - line.F * line.Y;
-      line.variance = record_.variance_of_mean(Z.bottomRows(record_.n_u()) - controlled);
-      const auto squares = [&](const Eigen::MatrixXcd& X) {
-        return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
-      };
-      line.weight = (line.variance + epsilon_ * epsilon_ * squares(line.F * line.Y) +
-                     kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(R_[k])))
-                        .cwiseMax(1e-300)
-                        .cwiseInverse();
-      if (!line.known) {  // no evidence on this line
-        line.E.setZero();
-        line.variance.setZero();
-        line.weight.setZero();
-      }
-      total_ += (line.weight.asDiagonal() * line.E.cwiseAbs2()).sum();
+      lines_[k].Y = record_.mean(Z.topRows(record_.n_y()));
+      lines_[k].U = record_.mean(Z.bottomRows(record_.n_u()));
     }
+    total_ = 0.0;
+    for (Bend& bend : bends_) {
+      bend.E = bent(bend, [](const Line& line) {
+        return Eigen::MatrixXcd(line.U - line.R - line.F * line.Y);
+      });
+      bend.variance = record_.variance_of_mean(bent(bend, [this](const Line& line) {
+        const Eigen::MatrixXcd& Z =
+            record_.lines[static_cast<std::size_t>(&line - lines_.data())].Z;
+        return Eigen::MatrixXcd(Z.bottomRows(record_.n_u()) - line.F * Z.topRows(record_.n_y()));
+      }));
+      Eigen::VectorXd others = Eigen::VectorXd::Constant(record_.n_u(), 1e-300);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Line& line = lines_[bend.first + i];
+        const auto squares = [&](const Eigen::MatrixXcd& X) {
+          return Eigen::VectorXd(X.rowwise().squaredNorm() / static_cast<double>(X.cols()));
+        };
+        others += bend.factors[i] * bend.factors[i] *
+                  (epsilon_ * epsilon_ * squares(line.F * line.Y) +
+                   kFeedbackRounding * kFeedbackRounding * (squares(line.U) + squares(line.R)));
+      }
+      bend.weight = (bend.variance + others).cwiseInverse();
+      total_ += (bend.weight.asDiagonal() * bend.E.cwiseAbs2()).sum();
+    }
+  }
+
+  /// The deviation of any signal, a function of a line, from a straight line.
+  template <typename Signal>
+  Eigen::MatrixXcd bent(const Bend& bend, const Signal& signal) const {
+    Eigen::MatrixXcd sum = bend.factors[0] * signal(lines_[bend.first]);
+    for (std::size_t i = 1; i < 3; ++i) sum += bend.factors[i] * signal(lines_[bend.first + i]);
+    return sum;
   }
 
   std::optional<Candidate> best() const {
@@ -180,16 +199,15 @@ class Search {
   }
 
   double row_cost(Index row) const {
-    return sum_over_lines(
-        [row](const Line& line) { return line.weight[row] * line.E.row(row).squaredNorm(); });
+    return sum_over_bends(
+        [row](const Bend& bend) { return bend.weight[row] * bend.E.row(row).squaredNorm(); });
   }
 
   /// The same for all sensors: whether C y is r - u up to a factor.
   bool sensors_follow() const {
     const auto controlled = [](const Line& line) { return Eigen::MatrixXcd(line.F * line.Y); };
-    return proportional(0, record_.n_u(), controlled, [&](const Line& line) {
-      return Eigen::MatrixXcd(controlled(line) + line.E);
-    });
+    return proportional(0, record_.n_u(), controlled,
+                        [](const Line& line) { return Eigen::MatrixXcd(line.U - line.R); });
   }
 
   /// Whether u of these actuators is r - C y up to a factor. Otherwise an actuator with other motion would be explained
@@ -197,7 +215,7 @@ class Search {
   bool commands_follow(Index first, Index rows) const {
     return proportional(
         first, rows, [](const Line& line) { return line.U; },
-        [](const Line& line) { return Eigen::MatrixXcd(line.U - line.E); });
+        [](const Line& line) { return Eigen::MatrixXcd(line.R + line.F * line.Y); });
   }
 
   /// Whether two signals of these actuators, functions of a line, are equal up to a factor.
@@ -206,10 +224,10 @@ class Search {
     double along = 0.0;
     double of_one = 0.0;
     double of_other = 0.0;
-    for (const Line& line : lines_) {
-      const Eigen::MatrixXcd A = one(line).middleRows(first, rows);
-      const Eigen::MatrixXcd B = other(line).middleRows(first, rows);
-      const auto w = line.weight.segment(first, rows);
+    for (const Bend& bend : bends_) {
+      const Eigen::MatrixXcd A = bent(bend, one).middleRows(first, rows);
+      const Eigen::MatrixXcd B = bent(bend, other).middleRows(first, rows);
+      const auto w = bend.weight.segment(first, rows);
       along += (w.asDiagonal() * A.conjugate().cwiseProduct(B).real()).sum();
       of_one += (w.asDiagonal() * A.cwiseAbs2()).sum();
       of_other += (w.asDiagonal() * B.cwiseAbs2()).sum();
@@ -223,10 +241,10 @@ class Search {
                      const Direction& direction) {
     double along = 0.0;
     double length = 0.0;
-    for (const Line& line : lines_) {
-      const Eigen::MatrixXcd X = direction(line);
-      const auto w = line.weight.segment(first, rows);
-      along += (w.asDiagonal() * X.cwiseProduct(line.E.middleRows(first, rows).conjugate()).real())
+    for (const Bend& bend : bends_) {
+      const Eigen::MatrixXcd X = bent(bend, direction);
+      const auto w = bend.weight.segment(first, rows);
+      along += (w.asDiagonal() * X.cwiseProduct(bend.E.middleRows(first, rows).conjugate()).real())
                    .sum();
       length += (w.asDiagonal() * X.cwiseAbs2()).sum();
     }
@@ -258,11 +276,15 @@ class Search {
     for (double samples = -kLargestSkew; samples <= kLargestSkew; samples += kSkewStep) {
       const double skew_s = samples / record_.info.sample_rate_hz;
       double length = 0.0;
-      const double after = sum_over_lines([&](const Line& line) {
-        const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
-        length +=
-            line.weight[a] * line.omega_rad_s * line.omega_rad_s * line.U.row(a).squaredNorm();
-        return line.weight[a] * (line.E.row(a) + turn * line.U.row(a)).squaredNorm();
+      const double after = sum_over_bends([&](const Bend& bend) {
+        length += bend.weight[a] * bent(bend, [a](const Line& line) {
+                                     return Eigen::MatrixXcd(line.omega_rad_s * line.U.row(a));
+                                   }).squaredNorm();
+        const Eigen::MatrixXcd turned = bent(bend, [a, skew_s](const Line& line) {
+          const std::complex<double> turn = std::polar(1.0, line.omega_rad_s * skew_s) - 1.0;
+          return Eigen::MatrixXcd(turn * line.U.row(a));
+        });
+        return bend.weight[a] * (bend.E.row(a) + turned).squaredNorm();
       });
       if (after > (1.0 - kLeastChangeShare) * cost || !(length > 0.0)) continue;
       ChannelError error{ChannelError::Kind::skew, false, a};
@@ -273,11 +295,12 @@ class Search {
   }
 
   template <typename Term>
-  double sum_over_lines(const Term& term) const {
+  double sum_over_bends(const Term& term) const {
     double sum = 0.0;
-    for (const Line& line : lines_) sum += term(line);
+    for (const Bend& bend : bends_) sum += term(bend);
     return sum;
   }
+
   /// A skew of s acts along j omega s times the direction of a gain. @param a -1: all channels of the kind
   template <typename Direction>
   void try_gain_and_skew(bool of_sensors, Index a, bool follows, double cost, Index first,
@@ -301,10 +324,12 @@ class Search {
       });
       for (Index t = 0; t < s; ++t)
         try_swap({ChannelError::Kind::swap, true, t, s}, total_,
-                 sum_over_lines([&](const Line& line) {
-                   const Eigen::MatrixXcd changed =
-                       line.E - (line.F.col(s) - line.F.col(t)) * (line.Y.row(t) - line.Y.row(s));
-                   return (line.weight.asDiagonal() * changed.cwiseAbs2()).sum();
+                 sum_over_bends([&](const Bend& bend) {
+                   const Eigen::MatrixXcd exchanged = bent(bend, [s, t](const Line& line) {
+                     return Eigen::MatrixXcd((line.F.col(s) - line.F.col(t)) *
+                                             (line.Y.row(t) - line.Y.row(s)));
+                   });
+                   return (bend.weight.asDiagonal() * (bend.E - exchanged).cwiseAbs2()).sum();
                  }));
     }
   }
@@ -321,14 +346,16 @@ class Search {
       try_whole_skews(a, cost);
       for (Index b = 0; b < a; ++b) {
         const double cost_b = row_cost(b);
-        const auto exchanged = [](Index row, Index with) {
-          return [row, with](const Line& line) {
-            return line.weight[row] *
-                   (line.E.row(row) + line.U.row(with) - line.U.row(row)).squaredNorm();
-          };
+        const auto exchanged = [this](Index row, Index with) {
+          return sum_over_bends([this, row, with](const Bend& bend) {
+            const Eigen::MatrixXcd change = bent(bend, [row, with](const Line& line) {
+              return Eigen::MatrixXcd(line.U.row(with) - line.U.row(row));
+            });
+            return bend.weight[row] * (bend.E.row(row) + change).squaredNorm();
+          });
         };
-        const double after_a = sum_over_lines(exchanged(a, b));
-        const double after_b = sum_over_lines(exchanged(b, a));
+        const double after_a = exchanged(a, b);
+        const double after_b = exchanged(b, a);
         // Both rows must improve, or one must be explained completely while the other hardly gets worse (three exchanged
         // channels are corrected one by one).
         const bool both = after_a < 0.5 * cost && after_b < 0.5 * cost_b;
@@ -345,10 +372,11 @@ class Search {
     Index driven = 0;
     for (Index a = 0; a < record_.n_u(); ++a) {
       double misfit = 0.0;
+      for (const Bend& bend : bends_) misfit += bend.E.row(a).squaredNorm();
+      misfit *= 3.0;
       double controlled = 0.0;
       double moved = 0.0;
       for (const Line& line : lines_) {
-        misfit += line.E.row(a).squaredNorm();
         controlled += (line.F.row(a) * line.Y).squaredNorm();
         moved += line.U.row(a).squaredNorm();
       }
@@ -365,23 +393,29 @@ class Search {
   }
 
   bool significant(Index row) const {
-    if (!noise_known_) return true;
+    return !noise_known_ || exceeds(row, [row](const Bend& bend) { return bend.variance[row]; });
+  }
+
+  /// Whether the misfit of an actuator is more than chance. @param noise_of its variance, of a bend
+  template <typename Noise>
+  bool exceeds(Index row, const Noise& noise_of) const {
     double evidence = 0.0;
-    for (const Line& line : lines_) {
-      const double mean_square = line.E.row(row).squaredNorm() / static_cast<double>(line.E.cols());
-      if (line.variance[row] > 0.0)
-        evidence -= log_tail_of_f(mean_square / line.variance[row], static_cast<int>(line.E.cols()),
-                                  record_.scatter_dof());
+    for (const Bend& bend : bends_) {
+      const auto E = static_cast<int>(bend.E.cols());
+      const double mean_square = bend.E.row(row).squaredNorm() / E;
+      const double noise = noise_of(bend);
+      if (noise > 0.0)
+        evidence -= log_tail_of_f(mean_square / noise, E, std::max(1, record_.scatter_dof()));
       else if (mean_square > 0.0)
         evidence += 1e3;
     }
-    return tail_of_evidence(evidence, std::ssize(lines_)) <
+    return tail_of_evidence(evidence, std::ssize(bends_)) <
            kSignificance / static_cast<double>(record_.n_u());
   }
 
   HealthRecord& record_;
-  std::vector<Eigen::MatrixXcd> R_;
   std::vector<Line> lines_;
+  std::vector<Bend> bends_;  // of lines 0 to 2, 3 to 5, ...
   bool noise_known_;
   double epsilon_;  // relative error of the model of the controller, of C y
   double total_ = 0.0;

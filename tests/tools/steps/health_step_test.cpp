@@ -198,6 +198,29 @@ TEST(DataHealth, ActuatorsThatMoveUnexcitedAreNoFaultOfTheWiring) {
   EXPECT_EQ(findings.back().severity, Severity::unchecked);
 }
 
+// Forces move the stage slowly. The ends of a period differ, and with them the states of the controller.
+TEST(DataHealth, AStageThatForcesMoveHasNoUnrecordedExcitation) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+    for (const int periods : {1, 2, 3}) {
+      test::FaultyLogRequest request = request_of(seed);
+      request.stage.simulation.force_noise_n = 0.3;
+      request.axes = 2;
+      request.period_s = 0.25;
+      request.periods = periods;
+      const MemoryLog log = test::simulate_faulty_log(request, {});
+      const auto findings =
+          check_health(read_health_record({&log}, {}),
+                       nominal_stage(request.configured, request.configured.plant));
+      EXPECT_TRUE(std::ranges::none_of(findings,
+                                       [](const Finding& f) {
+                                         return f.cause == Cause::unrecorded ||
+                                                f.cause == Cause::controller;
+                                       }))
+          << seed << " " << periods << "\n"
+          << told(findings);
+    }
+}
+
 // Where the excitation of an axis does not arrive, the response is not determined, and what it leaves is not noise.
 TEST(DataHealth, AMissingExcitationIsNoLimitCycle) {
   test::LoopExperiment x{.axes = 2, .realizations = 2, .periods = 3};

@@ -15,6 +15,7 @@ namespace test_interrupt {
 
 /// Ends by the signal; a file is being written, and the function for the end writes another one.
 [[noreturn]] void end_while_writing(const test::TemporaryDirectory& directory) {
+  std::signal(SIGINT, SIG_DFL);  // a shell ignores it for what it starts in the background
   catch_signals();
   const OutputFile unfinished(directory / "unfinished");
   const CleanedUpAtInterrupt clean_up([&] { write_text_file(directory / "farewell", "end"); });
