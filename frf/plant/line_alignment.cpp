@@ -73,17 +73,23 @@ std::optional<PlantChange> find_plant_change(const FrfEstimate& frf,
   bands.push_back({0, frf.lines()});
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index n_c = frf.response.rows();
+  // Part of the scatter of the realizations that is not noise. It does not depend on the phases.
+  const Eigen::ArrayXXd beyond =
+      (frf.total_variance.array() > frf.noise_variance.array())
+          .select(1.0 - frf.noise_variance.array() / frf.total_variance.array(), 0.0);
   // Entries of G, then the rows of G.
   Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(n_c + n_y, frf.lines());
-  steps.topRows(n_c) = cosine;
-  for (Eigen::Index c = 0; c < n_c; ++c) steps.row(n_c + c % n_y) += cosine.row(c);
+  for (Eigen::Index k = 1; k < frf.lines(); ++k)
+    steps.col(k).head(n_c) = cosine.col(k).array() * beyond.col(k).min(beyond.col(k - 1));
+  for (Eigen::Index c = 0; c < n_c; ++c) steps.row(n_c + c % n_y) += steps.row(c);
   const auto tests = static_cast<double>(steps.rows() * std::ssize(bands));
   double least_p = 1.0;
   IndexRange clearest;
   for (const IndexRange& band : bands)
     for (Eigen::Index row = 0; row < steps.rows(); ++row) {
       const auto of_band = steps.row(row).segment(band.first, band.count());
-      const double t = of_band.sum() / of_band.norm();
+      const double size = of_band.norm();
+      const double t = size > 0.0 ? of_band.sum() / size : 0.0;
       const double p = tests * std::exp(-0.5 * std::max(0.0, t) * t);
       if (!(p < least_p)) continue;
       least_p = p;

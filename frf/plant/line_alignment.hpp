@@ -43,7 +43,8 @@ class AlignmentAverage {
 /// octave or in the whole band, they turn less from line to line than chance explains, in one entry of G or in all of
 /// one output together. A mode, a mass or a gain that changes does so on all lines near it; a distortion has another
 /// phase on every line. If one experiment of n with all axes changed, a share 1 / n of the difference is smooth.
-/// With s_k the sum of cosines on line k, whose sign is random if the plant did not change,
+/// With s_k the sum of cosines on line k, whose sign is random if the plant did not change, each weighted by the part of
+/// the realizations' scatter that is not noise,
 ///   P(sum s_k / sqrt(sum s_k^2) > t) <= exp(-t^2 / 2),
 /// however the entries depend on each other. A change needs kSignificance over all these tests.
 /// @param frf finished, on the same lines; `cosine`: AlignmentAverage::cosine_of_responses()

@@ -8,6 +8,7 @@
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/logs/told_findings.hpp"
+#include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid {
@@ -65,6 +66,38 @@ TEST(PlantChange, NoiseAndDistortionAreNone) {
         const HealthRecord record = estimate_plant_frf_and_health({&log}).health;
         EXPECT_FALSE(record.differences.plant) << seed << " " << realizations << " " << cubic;
       }
+}
+
+/// Differences of two realizations: noise, and on the lines from 5 to 44 of 200, which belong to several octaves, 100
+/// times as much with neighbours that agree or not.
+FrfEstimate differing(std::uint64_t seed, bool alike, Eigen::MatrixXd& cosine) {
+  test::RandomNumbers random(seed);
+  FrfEstimate frf;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(200, 1.0, 200.0);
+  frf.inputs.names = {"a1"};
+  frf.outputs.names = {"s1"};
+  frf.response = Eigen::MatrixXcd::Ones(1, 200);
+  frf.noise_variance = Eigen::MatrixXd::Ones(1, 200);
+  frf.total_variance.resize(1, 200);
+  cosine.resize(1, 200);
+  for (Eigen::Index k = 0; k < 200; ++k) {
+    const bool differs = k >= 5 && k < 45;
+    frf.total_variance(0, k) = (differs ? 1e4 : 1.0) * -std::log(random.uniform(1e-9, 1.0));
+    cosine(0, k) = differs && alike ? 0.9 : std::cos(random.uniform(0.0, 6.283185307));
+  }
+  return frf;
+}
+
+TEST(PlantChange, OfAFewLinesAcrossOctavesIsFoundAndChanceIsNot) {
+  int by_chance = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Eigen::MatrixXd cosine;
+    const FrfEstimate changed = differing(seed, true, cosine);
+    EXPECT_TRUE(find_plant_change(changed, cosine)) << seed;
+    const FrfEstimate distorted = differing(seed, false, cosine);
+    if (find_plant_change(distorted, cosine)) ++by_chance;
+  }
+  EXPECT_EQ(by_chance, 0);
 }
 
 }  // namespace test_line_alignment
