@@ -158,9 +158,9 @@ void Examination::find_drowned(const std::vector<Index>& sensors) {
   // Forces act within the loop: u = r - C y holds in every period. A setpoint enters u beside it.
   if (nominal_ && nominal_->controller && hidden && why_no_nominal(true).empty() &&
       unexplained_motion(record_, *nominal_) < kUnexplained)
-    find(Severity::fault, Cause::limit_cycle, names,
-         "the stage moves by more than the excitation moves it: its loop oscillates, as coarse "
-         "steps of the command or friction cause, or forces disturb it",
+    find(Severity::fault, Cause::incoherent, names,
+         "noise hides the response: of the sensors, of forces on the stage, or of a loop that "
+         "oscillates, as coarse steps of the command or friction cause",
          figure, kRemedyOfLimitCycle);
   else
     find(Severity::fault, Cause::incoherent, names,

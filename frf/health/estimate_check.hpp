@@ -43,7 +43,9 @@ std::vector<Finding> check_interpolation(const FrfEstimate& frf);
 /// Checks whether the noise of an experiment differs from that of the others
 /// (FrfEstimate::experiment_noise_ratio). At most one finding; none if the experiments were pooled.
 /// @param runs the differing runs, if known
+/// @param start_known whether the log has StartEvidence; without it, a transient cannot be told from a limit cycle
 std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
-                                            const std::vector<NoisyRun>& runs = {});
+                                            const std::vector<NoisyRun>& runs = {},
+                                            bool start_known = true);
 
 }  // namespace stageid

@@ -61,6 +61,7 @@ std::vector<Finding> examine_log(const LogReader& log, const std::filesystem::pa
 std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
                              const std::optional<NominalStage>& nominal) {
   const std::vector<NoisyRun> noisy = record.noisy_runs;
+  const bool start_known = !record.start.runs.empty();
   const bool steps_known = record.steps.size() >= frf.inputs.size();
   std::vector<Finding> coarse = check_sensor_steps(frf, record);
   std::vector<Finding> findings = check_health(std::move(record), nominal);
@@ -69,15 +70,17 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
   // of excitation.
   if (!has(findings, Cause::drift) && !has(findings, Cause::unsettled) &&
       !has(findings, Cause::excitation))
-    for (Finding& finding : check_experiment_noise(frf, noisy))
+    for (Finding& finding : check_experiment_noise(frf, noisy, start_known))
       findings.push_back(std::move(finding));
   // It comes from the steps, and the response is that to them.
-  const bool only_limit_cycles = std::ranges::all_of(findings, [](const Finding& finding) {
-    return finding.severity != Severity::fault || finding.cause == Cause::limit_cycle;
-  });
-  if (steps_known && only_limit_cycles)
+  const auto comes_from_steps = [](const Finding& finding) {
+    return finding.cause == Cause::limit_cycle || finding.cause == Cause::incoherent;
+  };
+  if (steps_known && std::ranges::all_of(findings, [&](const Finding& finding) {
+        return finding.severity != Severity::fault || comes_from_steps(finding);
+      }))
     for (Finding& finding : findings)
-      if (finding.cause == Cause::limit_cycle) finding.severity = Severity::doubt;
+      if (comes_from_steps(finding)) finding.severity = Severity::doubt;
   return findings;
 }
 
