@@ -59,10 +59,11 @@ class Iteration {
 
   IterationResult run() {
     if (begin()) {
-      while (go_on()) {
+      while (go_on() || passes_jump()) {
       }
       result_.end_cost = cost_;
     }
+    bounds_.drop_delays(result_.frozen);
     return std::move(result_);
   }
 
@@ -106,6 +107,12 @@ class Iteration {
       return result_.end_here(FitStatus::iteration_limit,
                               fmt::format("stopped after {} iterations", result_.iterations));
     return options_.method == FitMethod::sk ? fixed_point_step() : descent_step();
+  }
+
+  /// Whether the iteration goes on from the other side of a jump, see PoleBounds, because the cost is lower there.
+  bool passes_jump() {
+    const std::optional<Eigen::VectorXd> step = bounds_.step_over_jump(problem_, beta_);
+    return options_.method != FitMethod::sk && step && lowers_cost(*step);
   }
 
   void take(Trial&& trial) {
@@ -189,6 +196,11 @@ class Iteration {
     return result_.end_without_step();
   }
 
+  bool attempt_step(const Eigen::VectorXd& step) {
+    return bounds_.try_to_jump(problem_, beta_, step,
+                               [this](const Eigen::VectorXd& part) { return lowers_cost(part); });
+  }
+
   /// Accepts the step if it lowers the cost.
   bool lowers_cost(const Eigen::VectorXd& step) {
     step_size_ = relative_step(problem_, beta_, step);
@@ -206,13 +218,13 @@ class Iteration {
   bool attempt_learned() {
     if (damping_.is_off() || result_.iterations < kSlow) return false;
     const std::optional<Eigen::VectorXd> step = curvature_.step(result_.frozen);
-    return step && lowers_cost(*step);
+    return step && attempt_step(*step);
   }
 
   /// Accepts the first step that lowers the cost.
   bool attempt(const auto& system, int tries = Damping::kTries) {
     return damping_.descend(
-        [&](double damping) { return lowers_cost(system.solve_globals(damping, result_.frozen)); },
+        [&](double damping) { return attempt_step(system.solve_globals(damping, result_.frozen)); },
         tries);
   }
 

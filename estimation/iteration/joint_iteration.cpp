@@ -35,6 +35,7 @@ class JointIteration {
     while (iterate_once()) {
     }
     result_.end_cost = cost_;
+    bounds_.drop_delays(result_.frozen);
     return std::move(result_);
   }
 
@@ -57,10 +58,12 @@ class JointIteration {
       return result_.end_here(FitStatus::iteration_limit,
                               fmt::format("stopped after {} iterations", result_.iterations));
     const auto lowers_cost = [&](double damping) {
-      return take(
+      return bounds_.try_to_jump(
+          problem_, beta_,
           damping == 0.0
               ? step
-              : equations.solve(equations.gradient(), result_.frozen, kStepTolerance, damping).x);
+              : equations.solve(equations.gradient(), result_.frozen, kStepTolerance, damping).x,
+          [this](const Eigen::VectorXd& part) { return take(part); });
     };
     if (damping_.descend(lowers_cost)) return true;
     if (cost_ < kNothingLeft * signal_cost_)

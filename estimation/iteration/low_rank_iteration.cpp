@@ -31,6 +31,7 @@ class LowRankIteration {
       result_.end_here(FitStatus::iteration_limit,
                        fmt::format("stopped after {} iterations", result_.iterations));
     result_.message.insert(0, "residues of given rank: ");
+    bounds_.drop_delays(result_.frozen);
     return std::move(result_);
   }
 
@@ -87,7 +88,7 @@ class LowRankIteration {
         result_.deviations < options_.deviation_tolerance)
       return result_.end_here(FitStatus::gradient_small, "converged");
     if (damping_.descend(
-            [&](double damping) { return take(solve(N_, g_, damping, result_.frozen)); }))
+            [&](double damping) { return attempt(solve(N_, g_, damping, result_.frozen)); }))
       return true;
     return result_.end_without_step();
   }
@@ -104,6 +105,11 @@ class LowRankIteration {
     factors.step(
         solve(N, factors.reduced_gradient(beta, system), 0.0, indices(0, problem_.globals())));
     factors.write_numerators(beta);
+  }
+
+  bool attempt(const Eigen::VectorXd& step) {
+    return bounds_.try_to_jump(problem_, beta_, step,
+                               [this](const Eigen::VectorXd& part) { return take(part); });
   }
 
   /// @returns false if the step does not lower the cost

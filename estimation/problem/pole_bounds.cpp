@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimation/model/hold_integral.hpp"
 #include "estimation/model/poles.hpp"
 
 namespace stageid {
@@ -19,6 +20,7 @@ constexpr double kBelowLines = 0.25;        // lower: resembles the rigid body
 constexpr double kFarBelowLines = 1.0 / 300.0;
 constexpr double kAboveLines = 10.0;
 constexpr double kNearlyNyquist = 3.1;  // rad per sample
+constexpr double kBesideJump = 1e-9;    // samples
 constexpr double kAtBound = 1.0 + 1e-9;
 constexpr double kPoleAtBound = 1.0 + 1e-6;  // after conversion to coefficients and back
 
@@ -27,6 +29,14 @@ double slowest(const Eigen::VectorXd& a) {
   double least = std::numeric_limits<double>::infinity();
   for (const Complex pole : roots(a)) least = std::min(least, std::abs(pole));
   return least;
+}
+
+double delay_in_samples(const FitProblem& problem, const FitParameters& beta,
+                        Eigen::Index channel) {
+  const SplitDelay split = split_delay(beta.input_delay_s[channel / problem.n_outputs] +
+                                           beta.output_delay_s[channel % problem.n_outputs],
+                                       problem.lines.sample_period_s);
+  return split.whole + split.fraction;
 }
 
 }  // namespace
@@ -113,6 +123,7 @@ bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) con
 std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
                                               const Eigen::VectorXd& descent) const {
   std::vector<Eigen::Index> out = held_;
+  out.insert(out.end(), held_delays_.begin(), held_delays_.end());
   Eigen::Index p = 0;
   for (std::size_t i = 0; i < beta.a.size(); ++i) {
     const Eigen::VectorXd& a = beta.a[i];
@@ -133,6 +144,48 @@ std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
     p += a.size();
   }
   return out;
+}
+
+std::vector<Eigen::Index> PoleBounds::stop_at_jump(const FitProblem& problem,
+                                                   const FitParameters& here,
+                                                   Eigen::VectorXd& step) const {
+  if (problem.lines.hold != HoldModel::exact || problem.delays() == 0) return {};
+  const FitParameters beyond = stepped(problem, here, step.head(problem.globals()));
+  double part = 1.0;  // of the step
+  std::vector<Eigen::Index> passed;
+  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
+    const double from = delay_in_samples(problem, here, c);
+    const double to = delay_in_samples(problem, beyond, c);
+    const double jump = to > from ? std::ceil(from) : std::floor(from);
+    if (std::abs(to - from) <= std::abs(jump - from)) continue;
+    const double here_on =
+        std::max(0.0, (std::abs(jump - from) - kBesideJump) / std::abs(to - from));
+    if (here_on > part) continue;
+    if (here_on < part) passed.clear();
+    part = here_on;
+    for (const Eigen::Index p : delay_parameters(problem, c))
+      if (std::ranges::find(passed, p) == passed.end()) passed.push_back(p);
+  }
+  step.segment(problem.denominators(), problem.delays()) *= part;
+  return passed;
+}
+
+std::optional<Eigen::VectorXd> PoleBounds::step_over_jump(const FitProblem& problem,
+                                                          const FitParameters& here) const {
+  if (problem.lines.hold != HoldModel::exact || problem.delay != DelayModel::estimate)
+    return std::nullopt;
+  const double samples = delay_in_samples(problem, here, 0);
+  const double whole = std::round(samples);
+  const double there = samples > whole ? whole : whole + kBesideJump;
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(problem.globals());
+  step[problem.denominators()] = (there - samples) * problem.lines.sample_period_s;
+  return step;
+}
+
+void PoleBounds::drop_delays(std::vector<Eigen::Index>& frozen) const {
+  std::erase_if(frozen, [this](Eigen::Index p) {
+    return std::ranges::find(held_delays_, p) != held_delays_.end();
+  });
 }
 
 bool PoleBounds::at_bound(std::size_t i, const Eigen::VectorXd& a) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "estimation/problem/fit_problem.hpp"
@@ -28,10 +29,34 @@ class PoleBounds {
   std::vector<Eigen::Index> leaning(const FitParameters& beta,
                                     const Eigen::VectorXd& descent) const;
 
+  /// A direct term answers to a held input at once, so the response jumps where a delay passes a whole number of samples.
+  /// Tries a step, and if it fails, the same with delays that stop beside the first jump, where they are held from then
+  /// on.
+  /// @param step of the globals, then of others; @param lowers_cost of a step, which it takes in that case
+  template <typename LowersCost>
+  bool try_to_jump(const FitProblem& problem, const FitParameters& here, Eigen::VectorXd step,
+                   const LowersCost& lowers_cost) {
+    if (lowers_cost(step)) return true;
+    const std::vector<Eigen::Index> stopped = stop_at_jump(problem, here, step);
+    if (stopped.empty() || !lowers_cost(step)) return false;
+    held_delays_.insert(held_delays_.end(), stopped.begin(), stopped.end());
+    return true;
+  }
+
+  /// The step of the globals to the other side of the nearest jump, if there is one delay for all channels.
+  std::optional<Eigen::VectorXd> step_over_jump(const FitProblem& problem,
+                                                const FitParameters& here) const;
+
+  /// Without the delays held at a jump, whose deviations are those of free parameters.
+  void drop_delays(std::vector<Eigen::Index>& frozen) const;
+
   /// True if a pole of submodel `i` is at a bound.
   bool at_bound(std::size_t i, const Eigen::VectorXd& a) const;
 
  private:
+  /// @returns the delays of the channels that would have passed the first jump
+  std::vector<Eigen::Index> stop_at_jump(const FitProblem& problem, const FitParameters& here,
+                                         Eigen::VectorXd& step) const;
   void stabilize_mode(std::size_t i, const Eigen::VectorXd& before, Eigen::VectorXd& a) const;
   bool stabilize_poles(std::size_t i, Eigen::VectorXd& a) const;
   std::complex<double> contained(std::size_t i, std::complex<double> pole) const;
@@ -41,6 +66,7 @@ class PoleBounds {
   double highest_rad_s_ = 0.0;
   double highest_real_rad_s_ = 0.0;
   std::vector<Eigen::Index> held_;
+  std::vector<Eigen::Index> held_delays_;
 };
 
 }  // namespace stageid

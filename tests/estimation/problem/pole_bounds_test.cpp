@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "estimation/search/fit_additive_model.hpp"
+#include "tests/estimation/covariance_stage.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 
@@ -50,6 +53,51 @@ TEST(PoleBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
   EXPECT_NEAR(fit.model.submodels[1].natural_frequency_hz(), kLowestLineHz / 4.0, 1e-6);
   EXPECT_FALSE(fit.model.submodels[1].natural_frequency_std_hz);
   EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);
+}
+
+/// Of 20 noisy measurements of a stage with two samples of delay and a direct term, the fits from this delay that are
+/// trustworthy and find the delay.
+int found_from(double delay_s, const FitOptions& given) {
+  test::RandomNumbers random(5);
+  test::DenseProblem problem =
+      test::stage_2x3(HoldModel::exact, random, {{310.0, 0.02}, {900.0, 0.015}});
+  problem.model.hold = HoldModel::exact;
+  problem.model.input_delay_s.setConstant(2e-4);
+  problem.model.submodels.push_back(test::empty_submodel(problem.model, 0, {}, 1));
+  problem.frequency_hz = Eigen::VectorXd::LinSpaced(180, 40.0, 1500.0);
+  const double size =
+      0.1 *
+      test::reference_response(problem.model, problem.frequency_hz, problem.hold).cwiseAbs().mean();
+  for (double& value : problem.model.submodels.back().numerator[0].reshaped())
+    value = size * random.normal();
+  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  const Eigen::MatrixXd variance =
+      Eigen::MatrixXd::Constant(problem.channels(), 180, 1e-4 * size * size);
+  FitOptions options = given;
+  options.delay = DelayModel::estimate;
+  options.delay_s = delay_s;
+  int found = 0;
+  for (int run = 0; run < 20; ++run) {
+    const FitResult fit = fit_additive_model(test::noisy_frf(random, problem, variance),
+                                             test::moved(problem.model, 1.001, 1.0), options);
+    const double error_s = fit.model.input_delays_s()[0] - 2e-4;
+    if (fit.trustworthy() && fit.model.input_delay_std_s.size() > 0 &&
+        std::abs(error_s) < 5.0 * fit.model.input_delay_std_s[0])
+      ++found;
+  }
+  return found;
+}
+
+// A direct term answers one sample later as soon as the delay exceeds a whole number of samples.
+TEST(PoleBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
+  FitOptions options;
+  options.hold = HoldModel::exact;
+  options.weighting = Weighting::noise_variance;
+  options.threads = 1;
+  for (const double delay_s : {1.9e-4, 1.999e-4, 2.001e-4, 2.1e-4})
+    EXPECT_EQ(found_from(delay_s, options), 20) << delay_s;
+  options.residue_rank = 2;
+  EXPECT_EQ(found_from(1.9e-4, options), 20);
 }
 
 }  // namespace test_pole_bounds
