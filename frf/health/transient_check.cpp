@@ -22,7 +22,8 @@ constexpr double kFalseAlarms = 0.005;  // probability per log
 constexpr Index kReach = 2;             // lines on either side of a maximum
 constexpr double kMemory = 0.6;         // see the header
 constexpr double kLargestShift = 0.5;   // deviations
-constexpr double kTolerable = 3.0;      // standard deviations, of the expected shift
+constexpr double kTolerable = 7.0;      // of the expected shift: 3 of a pole, see the header
+constexpr double kNamed = 0.1;          // of the largest shift: smaller ones are its tails
 constexpr double kAgreement = 0.5;      // explained part: half way between chance and certainty
 constexpr double kSteady = 0.98;        // of consecutive periods: what rings longer is a drift
 
@@ -211,8 +212,9 @@ struct Change {
   }
 };
 
-/// "182, 71 and 3 more Hz"
-std::string names_of(const std::vector<Change>& changes) {
+/// "182, 71 and 3 more Hz": the largest first.
+std::string names_of(std::vector<Change> changes) {
+  std::ranges::stable_sort(changes, std::greater(), &Change::shift);
   std::vector<std::string> names;
   for (const Change& change : changes) names.push_back(fmt::format("{:.4g}", change.frequency_hz));
   return listed(names, kMostNamed) + " Hz";
@@ -257,10 +259,9 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
                         fmt::format("p = {:.1g}", least_p),
                         "let the stage warm up, or measure for a shorter time"});
   if (ringing.empty()) return findings;
-  std::ranges::stable_sort(ringing, std::greater(), &Change::shift);
-  const Change& largest = ringing.front();
-  const int more = std::ranges::max(ringing, {}, &Change::periods_left).periods_left();
-  const int needed = evidence.transient_periods + more;
+  const Change& largest = std::ranges::max(ringing, {}, &Change::shift);
+  const int needed = evidence.transient_periods +
+                     std::ranges::max(ringing, {}, &Change::periods_left).periods_left();
   // The bound is reached if all runs shift the mode alike. Their phases are random.
   const double expected = settled / std::sqrt(static_cast<double>(evidence.runs.size()));
   std::string figure = fmt::format(
