@@ -25,6 +25,24 @@ double smallest_step(const Eigen::VectorXd& samples) {
   return step;
 }
 
+/// The same for numbers written with few decimal digits, whose step depends on the value: the rms of the step.
+double step_of_digits(const Eigen::VectorXd& samples) {
+  constexpr int kFewDigits = 7;  // float32 has more
+  constexpr double kExact = 1e-9;
+  for (int digits = 1; digits <= kFewDigits; ++digits) {
+    double squares = 0.0;
+    const bool rounded = std::ranges::all_of(samples, [&](double sample) {
+      if (sample == 0.0) return true;
+      const double step = std::pow(10.0, std::floor(std::log10(std::abs(sample))) + 1 - digits);
+      squares += step * step;
+      const double steps = sample / step;
+      return std::abs(steps - std::round(steps)) <= kExact * std::abs(steps);
+    });
+    if (rounded) return std::sqrt(squares / static_cast<double>(samples.size()));
+  }
+  return 0.0;
+}
+
 Eigen::VectorXcd channel_spectrum(const Eigen::VectorXd& samples, RealDft& dft) {
   return Eigen::Map<const Eigen::VectorXcd>(dft.forward(samples).data(), dft.half_size()) /
          static_cast<double>(dft.length());
@@ -52,8 +70,8 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
   std::vector<Eigen::Index> only(static_cast<std::size_t>(last) + 1, kNone);
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     if (!(largest[c] > kSmallestChannel * largest.maxCoeff())) continue;
-    const double rounding =
-        smallest_step(period.col(c)) / std::sqrt(12.0 * static_cast<double>(period.rows()));
+    const double step = std::max(smallest_step(period.col(c)), step_of_digits(period.col(c)));
+    const double rounding = step / std::sqrt(12.0 * static_cast<double>(period.rows()));
     const double threshold =
         std::max(kSmallestLine * largest[c],
                  std::min(kRoundingMargin * rounding, kRoundingAtMost * largest[c]));

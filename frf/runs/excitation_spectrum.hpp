@@ -23,8 +23,8 @@ struct ExcitationSpectrum {
 /// The spectrum of one period (samples x channels) on its excited lines.
 ///
 /// A line counts as excited if it is above 1e-6 of the channel's largest, which rounding (also to float32) does not
-/// reach. It must also be above the rounding of integer samples, white with variance step^2 / (12 N) per line;
-/// the step is the smallest distance between the values.
+/// reach. It must also be above the rounding of integer samples or of up to seven decimal digits, white with variance
+/// step^2 / (12 N) per line; the step is the smallest distance between the values, or that of the last digit.
 /// @pre period.rows() == dft.length()
 ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& dft);
 

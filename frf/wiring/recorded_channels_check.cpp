@@ -63,6 +63,18 @@ bool merge(const ChannelError& error, std::vector<ChannelError>& errors) {
   return false;
 }
 
+bool matters(const ChannelError& error) {
+  switch (error.kind) {
+    case ChannelError::Kind::gain:
+      return std::abs(error.value - 1.0) >= kLeastGainChange;
+    case ChannelError::Kind::skew:
+      return std::abs(error.value) >= kLeastSkewChange_s;
+    case ChannelError::Kind::swap:
+      break;
+  }
+  return true;
+}
+
 /// Whether the same exchange was applied already. Weights depend on the record, so costs before and after an error
 /// are not comparable exactly, and an exchange and its inverse could alternate forever.
 bool exchanged_before(const ChannelError& error, const std::vector<ChannelError>& errors) {
@@ -117,6 +129,8 @@ class Search {
       if (!merge(chosen->error, check.errors)) check.errors.push_back(chosen->error);
       refresh();
     }
+    // Two changes of a channel may cancel each other.
+    std::erase_if(check.errors, [](const ChannelError& error) { return !matters(error); });
     check.misfits = misfits();
     // Then another controller, or a setpoint, is the cause.
     if (!check.misfits.empty() && check.misfits.front().of_all) {
@@ -256,12 +270,13 @@ class Search {
       // The true signal is (1 + d) times the recorded one.
       error.value = 1.0 / (1.0 + d);
       error.deviation = noise_known_ ? deviation * error.value * error.value : 0.0;
-      if (!std::isfinite(error.value) || std::abs(error.value - 1.0) < kLeastGainChange) return;
+      if (!std::isfinite(error.value)) return;
     } else {
       error.value = d;
       error.deviation = deviation;
-      if (!noise_known_ || std::abs(d) < kLeastSkewChange_s) return;
+      if (!noise_known_) return;
     }
+    if (!matters(error)) return;
     candidates_.push_back({error, along * d, along * d / cost});
   }
 

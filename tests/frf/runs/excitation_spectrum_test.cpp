@@ -1,8 +1,10 @@
 #include "frf/runs/excitation_spectrum.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "tests/support/stages/closed_loop.hpp"
 
@@ -72,6 +74,19 @@ TEST(ExcitationSpectrum, TheRoundingOfIntegerSamplesIsNoExcitation) {
     const Eigen::MatrixXd coded = (exact / step).array().round().matrix() * step;
     EXPECT_EQ(excitation_spectrum(coded, dft).lines, lines) << full_scale;
   }
+}
+
+TEST(ExcitationSpectrum, TheRoundingOfDecimalDigitsIsNoExcitation) {
+  const std::vector<int> lines = odd_lines(799);
+  RealDft dft(kPeriod);
+  const Eigen::MatrixXd exact = multisine(lines, Eigen::VectorXd::Ones(400));
+  for (const int digits : {3, 4, 5, 6, 7})
+    for (const double unit : {1.0, 1e-3}) {
+      const Eigen::MatrixXd written = exact.unaryExpr([digits](double value) {
+        return std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr);
+      });
+      EXPECT_EQ(excitation_spectrum(unit * written, dft).lines, lines) << digits;
+    }
 }
 
 TEST(ExcitationSpectrum, ABinarySequenceExcitesItsLinesThoughItsStepIsLarge) {
