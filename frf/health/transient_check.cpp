@@ -79,10 +79,10 @@ class Regression {
   double explained() const {
     return squares_ > 0.0 ? std::norm(products_) / (power_ * squares_) : 1.0;
   }
-  /// @param by_memory size of c that noise with a memory explains
-  double p_value(double by_memory) const {
+  /// Whether c differs from `expected`. @param by_memory size that noise with a memory explains
+  double p_value(double expected, double by_memory) const {
     if (runs_ < 2 || !(squares_ > 0.0)) return 1.0;
-    const double beyond = std::max(0.0, std::abs(slope()) - by_memory);
+    const double beyond = std::max(0.0, std::abs(slope() - expected) - by_memory);
     const double scatter =
         std::max(squares_ * (1.0 - explained()), kPowerRounding * squares_) / (runs_ - 1);
     return std::exp(log_tail_of_f(beyond * beyond * power_ / scatter, 1, runs_ - 1));
@@ -104,30 +104,37 @@ class Window {
     const Index last = std::min(lines.noise.size() - 1, peak + kReach);
     for (const RunStart& run : e.runs) {
       std::complex<double> along = 0.0;
-      std::complex<double> bend = 0.0;
+      std::complex<double> ending = 0.0;
       double start = 0.0;
-      double slope = 0.0;
       for (Index k = first; k <= last; ++k) {
         along += run.along[k] / lines.noise[k];
-        bend += run.bend[k] / lines.noise[k];
+        ending += run.ending[k] / lines.noise[k];
         start += run.start[k] / lines.noise[k];
-        slope += run.slope[k] / lines.noise[k];
         first_power_ += run.first[k] / lines.noise[k];
         last_power_ += run.last[k] / lines.noise[k];
       }
       decay_.add(along, start);
-      curvature_.add(bend, slope);
+      ending_.add(ending, start);
     }
   }
 
   /// The smaller p-value of the two tests, corrected for two tests.
   double p_value() const {
-    return std::min(1.0, 2.0 * std::min(decay_.p_value(kMemory / excess_), p_of_decay()));
+    return std::min(1.0, 2.0 * std::min(decay_.p_value(0.0, kMemory / excess_), p_of_decay()));
   }
 
-  /// Whether the periods change along a straight line, as a drift does and a transient does not.
-  bool straight() const {
-    return curvature_.p_value(0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms;
+  /// Whether the used periods change along a straight line, as with a drift, rather than as a transient of this ratio. Of
+  /// two periods, this shows only in the period before them.
+  bool straight(std::complex<double> q) const {
+    const double P = evidence_.runs.front().periods;
+    if (decay_.p_value(P / (P + 1.0), 0.0) >= kFalseAlarms && p_of_decay() >= kFalseAlarms)
+      return true;
+    if (P < 3) return false;
+    const std::complex<double> ringing =
+        (std::pow(q, P - 1.0) - std::pow(q, P)) /
+        (1.0 - mean_of_powers(q, 1, evidence_.runs.front().periods));
+    const std::complex<double> drifting = 2.0 / P * decay_.slope();
+    return std::abs(ending_.slope() - drifting) < std::abs(ending_.slope() - ringing);
   }
   /// Whether the start decays by the same complex ratio in all runs, as every linear transient does.
   bool linear() const { return decay_.explained() > kAgreement; }
@@ -195,8 +202,8 @@ class Window {
   double excess_;
   double first_power_ = 0.0;
   double last_power_ = 0.0;
-  Regression decay_;      // of W on B
-  Regression curvature_;  // of K on L
+  Regression decay_;   // of W on B
+  Regression ending_;  // of V on B
 };
 
 /// A window with a finding.
@@ -238,7 +245,7 @@ std::vector<Finding> check_start_transient(const StartEvidence& evidence) {
     if (p >= kFalseAlarms) continue;
     const std::complex<double> q = window.ratio();
     const Change change{window.frequency_hz(), window.shift(q, start_used), q};
-    if (window.straight() || std::abs(q) > kSteady) {
+    if (window.straight(q) || std::abs(q) > kSteady) {
       least_p = std::min(least_p, p);
       drifting.push_back(change);
       continue;

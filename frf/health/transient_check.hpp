@@ -23,9 +23,9 @@ namespace stageid {
 /// degree of freedom per run on either side, because lines and sensors share their noise. False alarms in at most one
 /// of two hundred logs (Bonferroni over maxima and tests).
 ///
-/// A drift changes the periods along a straight line, which test 1 detects as well. The curvature K is the slope L
-/// (RunStart) times one number for a transient, and noise for a drift. If neither their regression nor test 2 shows a
-/// decay, or if less than 2 % decays in a period, the finding is a drift.
+/// A drift changes the periods along a straight line, which test 1 detects as well: alone, it has W = P/(P+1) B. Beside a
+/// start that rings, W has any ratio to B, but V is 2/P of W, where a transient leaves less. The nearer of the two is
+/// taken. If less than 2 % decays in a period, the finding is a drift, too.
 ///
 /// Where test 2 finds a decay but one c explains less than half of W along B, the motion is not that of a linear system: a limit
 /// cycle that comes to rest.

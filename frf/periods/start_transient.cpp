@@ -21,11 +21,10 @@ void StartRecorder::take(const Eigen::Ref<const Eigen::MatrixXcd>& spectra) {
   before_latest_ = std::move(latest_);
   latest_ = spectra;
   if (count_ == 1) {
-    first_ = moment_ = spectra;
+    first_ = spectra;
     rest_mean_.setZero(spectra.rows(), spectra.cols());
     return;
   }
-  moment_ += count_ * spectra;
   rest_mean_ += (spectra - rest_mean_) / (count_ - 1);
 }
 
@@ -41,10 +40,9 @@ RunStart StartRecorder::finish() {
   const Eigen::MatrixXcd inner = ((P - 1.0) * rest_mean_ - latest_) / std::max(1.0, P - 2.0);
   const Eigen::MatrixXcd first = first_ - inner;
   const Eigen::MatrixXcd last = latest_ - inner;
-  const Eigen::MatrixXcd L = moment_ - 0.5 * P * (start_ + P * mean);
-  const Eigen::MatrixXcd K = start_ - first_ - 2.0 / P * W;
+  const Eigen::MatrixXcd V = before_latest_ - latest_;
   // The last two periods contain least of the start.
-  const Eigen::MatrixXd noise = 0.5 * (latest_ - before_latest_).cwiseAbs2();
+  const Eigen::MatrixXd noise = 0.5 * V.cwiseAbs2();
   // One scale per sensor makes the units comparable and keeps the colour over the lines.
   for (Eigen::Index c = 0; c < noise.rows(); ++c) {
     const Eigen::VectorXd of_sensor = noise.row(c);
@@ -53,14 +51,12 @@ RunStart StartRecorder::finish() {
     const double level = std::max(order_statistic(values, 0.5), kPowerRounding * power);
     const double weight = level > 0.0 ? 1.0 / level : 0.0;
     if (c == 0) {
-      run.along = run.bend = Eigen::VectorXcd::Zero(noise.cols());
-      run.start = run.slope = run.first = run.last = run.noise =
-          Eigen::VectorXd::Zero(noise.cols());
+      run.along = run.ending = Eigen::VectorXcd::Zero(noise.cols());
+      run.start = run.first = run.last = run.noise = Eigen::VectorXd::Zero(noise.cols());
     }
     run.along += weight * B.row(c).conjugate().cwiseProduct(W.row(c)).transpose();
-    run.bend += weight * L.row(c).conjugate().cwiseProduct(K.row(c)).transpose();
+    run.ending += weight * B.row(c).conjugate().cwiseProduct(V.row(c)).transpose();
     run.start += weight * B.row(c).cwiseAbs2().transpose();
-    run.slope += weight * L.row(c).cwiseAbs2().transpose();
     run.first += weight * first.row(c).cwiseAbs2().transpose();
     run.last += weight * last.row(c).cwiseAbs2().transpose();
     // Rounding errors count as noise, so that it is not zero.

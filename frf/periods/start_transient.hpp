@@ -11,13 +11,11 @@ namespace stageid {
 /// A ringing mode adds A q^p to Z_p, q = e^{pole x period}, so W is B times one complex number in all runs.
 /// For noise the phase is random. The sensors are summed, each over its noise.
 ///
-/// A drift adds D p to Z_p. B and W are then proportional too, but there is no curvature:
-///   L = sum_p (p - P/2) Z_p (slope),  K = Z_0 - (1 + 2/P) Z_1 + 2/P mean(Z_2 ... Z_P) (zero for a straight line).
+/// A drift adds D p to Z_p. W and V = Z_{P-1} - Z_P are then multiples of D, and B, if no start rings beside it.
 struct RunStart {
   Eigen::VectorXcd along;   ///< sum over the sensors of conj(B) W, per line
-  Eigen::VectorXcd bend;    ///< the same of conj(L) K
+  Eigen::VectorXcd ending;  ///< the same of conj(B) V
   Eigen::VectorXd start;    ///< |B|^2
-  Eigen::VectorXd slope;    ///< |L|^2
   Eigen::VectorXd first;    ///< |Z_1 - mean(Z_2 ... Z_{P-1})|^2
   Eigen::VectorXd last;     ///< |Z_P - mean(Z_2 ... Z_{P-1})|^2
   Eigen::VectorXd noise;    ///< of one period: |Z_P - Z_{P-1}|^2 / 2
@@ -56,7 +54,6 @@ class StartRecorder {
   Eigen::MatrixXcd first_;
   Eigen::MatrixXcd latest_;
   Eigen::MatrixXcd before_latest_;
-  Eigen::MatrixXcd moment_;     // sum of p Z_p
   Eigen::MatrixXcd rest_mean_;  // of Z_2 ...
 };
 

@@ -149,7 +149,7 @@ void carry(Parcel& parcel, SampleSlip& slip) {
 }
 
 void carry(Parcel& parcel, RunStart& start) {
-  parcel(start.along), parcel(start.bend), parcel(start.start), parcel(start.slope);
+  parcel(start.along), parcel(start.ending), parcel(start.start);
   parcel(start.first), parcel(start.last), parcel(start.noise);
   parcel(start.periods), parcel(start.start_used);
 }
