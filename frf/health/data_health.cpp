@@ -67,6 +67,8 @@ void Examination::check_cycles() {
 }
 
 void Examination::check_samples() {
+  for (const ActuatorStep& step : record_.steps)
+    if (step.rounding == Rounding::limited) spoilt_.push_back(record_.n_y() + step.actuator);
   const double limit = std::log(kSignificance / (2.0 * static_cast<double>(record_.scan.size())));
   const auto run_samples =
       static_cast<double>(record_.periods.empty() ? 1

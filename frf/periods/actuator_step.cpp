@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace stageid {
@@ -15,6 +16,8 @@ double ActuatorStep::applied(double command) const noexcept {
       return step * std::floor(steps);
     case Rounding::to_zero:
       return step * std::trunc(steps);
+    case Rounding::limited:
+      return std::clamp(command, -step, step);
   }
   return command;
 }
@@ -30,11 +33,16 @@ std::vector<Finding> to_findings(const std::vector<ActuatorStep>& steps,
       findings.back().channel += " " + name;
       continue;
     }
+    const bool limited = s.rounding == Rounding::limited;
     findings.push_back(
-        {Severity::doubt, Cause::actuator_step, name,
-         "applies its command in steps, as a coarse converter does; the response is that to the "
-         "steps, not to the recorded command",
-         figure, "use a finer converter, or record what it applies"});
+        {Severity::doubt, limited ? Cause::saturated : Cause::actuator_step, name,
+         limited ? "applies its command up to a limit only, as a saturated amplifier does; the "
+                   "response is that to what it applied, not to the recorded command"
+                 : "applies its command in steps, as a coarse converter does; the response is that "
+                   "to the steps, not to the recorded command",
+         figure,
+         limited ? "lower the level, or raise the actuator's limit"
+                 : "use a finer converter, or record what it applies"});
   }
   return findings;
 }

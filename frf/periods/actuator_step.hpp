@@ -11,19 +11,19 @@
 
 namespace stageid {
 
-enum class Rounding : std::uint8_t { nearest, down, to_zero };
+enum class Rounding : std::uint8_t { nearest, down, to_zero, limited };
 template <>
 inline constexpr std::array kWords<Rounding> = {"rounded to the nearest", "rounded down",
-                                                "rounded towards zero"};
+                                                "rounded towards zero", "limited"};
 
-/// An actuator that applies the commands of the log in steps, because a coarse converter stands between recorder and
-/// amplifier.
+/// An actuator that applies the commands of the log in steps, or only up to a limit, because a coarse converter or a
+/// saturated amplifier stands behind the recorder.
 struct ActuatorStep {
   Eigen::Index actuator = 0;  ///< index in the log
-  double step = 0.0;          ///< in the actuator's unit
+  double step = 0.0;          ///< in the actuator's unit; the limit, if limited
   Rounding rounding = Rounding::nearest;
 
-  /// The multiple of the step that is applied for a command.
+  /// What is applied for a command.
   double applied(double command) const noexcept;
 };
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -396,10 +397,32 @@ bool is_suspicious(const FrfEstimate& frf) {
   return false;
 }
 
-/// Whether the realizations scatter clearly less, as if the steps were really there: on average over lines and channels.
-bool scatters_less(const FrfEstimate& with_steps, const FrfEstimate& without) {
+/// By how much the realizations scatter less or more, as they do if the steps are really there or not: on average over lines
+/// and channels.
+double scatter_ratio(const FrfEstimate& with_steps, const FrfEstimate& without) {
   const Eigen::ArrayXXd ratio = with_steps.total_variance.array() / without.total_variance.array();
-  return ratio.isFinite().all() && std::exp(ratio.max(kRounding).log().mean()) < kClearlyLess;
+  return ratio.isFinite().all() ? std::exp(ratio.max(kRounding).log().mean()) : HUGE_VAL;
+}
+
+/// Moves limits, equal ones together, to where the realizations scatter least: the search finds them within a few percent.
+void refine_limits(const std::vector<const LogReader*>& logs, const FrfOptions& options,
+                   EarlierEstimate& earlier, FrfEstimate& frf) {
+  std::set<double> limits;
+  for (const ActuatorStep& step : earlier.steps)
+    if (step.rounding == Rounding::limited) limits.insert(step.step);
+  for (double limit : limits)
+    for (double part = 0.04; part > 5e-4; part *= 0.5)
+      for (const double factor : {1.0 - part, 1.0 + part}) {
+        EarlierEstimate next = earlier;
+        for (ActuatorStep& step : next.steps)
+          if (step.rounding == Rounding::limited && step.step == limit) step.step *= factor;
+        FrfEstimate other = estimate_once(logs, options, next, false).frf;
+        if (!(scatter_ratio(other, frf) < 1.0)) continue;
+        earlier = std::move(next);
+        frf = std::move(other);
+        limit *= factor;
+        break;
+      }
 }
 
 /// The periods that were dropped, and those of which samples were replaced. Both are dropped if steps are undone.
@@ -426,10 +449,11 @@ std::vector<ActuatorStep> steps_of(const std::vector<const LogReader*>& logs, Fr
     EarlierEstimate next = earlier;
     next.steps.insert(next.steps.end(), found.begin(), found.end());
     FrfEstimate better = estimate_once(logs, options, next, false).frf;
-    if (!scatters_less(better, frf)) break;
+    if (!(scatter_ratio(better, frf) < kClearlyLess)) break;
     earlier = std::move(next);
     frf = std::move(better);
   }
+  refine_limits(logs, options, earlier, frf);
   std::ranges::sort(earlier.steps, {}, &ActuatorStep::actuator);
   return earlier.steps;
 }

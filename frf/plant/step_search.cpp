@@ -38,6 +38,9 @@ constexpr int kRefinement = 20;         // steps from one point of the spectrum 
 constexpr Index kFirstPoint = kFewestSteps * kPadding;
 constexpr Index kPoints = kMostSteps * kPadding - kFirstPoint;
 
+constexpr double kSmallestLimit = 0.05;  // of the largest command
+constexpr double kLimitRatio = 0.95;     // of one tried limit to the next
+
 constexpr Rounding kRoundings[] = {Rounding::nearest, Rounding::down, Rounding::to_zero};
 
 /// Matched residuals of one actuator, by its command.
@@ -156,6 +159,21 @@ std::vector<ActuatorStep> refined(double position, const Members& members) {
   return steps;
 }
 
+/// The limit that explains the residuals of these actuators best.
+ActuatorStep best_limit(const Members& members) {
+  ActuatorStep best{0, members.front()->largest, Rounding::limited};
+  double most = 0.0;
+  const double largest = members.front()->largest;
+  for (double limit = kLimitRatio * largest; limit > kSmallestLimit * largest;
+       limit *= kLimitRatio) {
+    const double now = explained({0, limit, Rounding::limited}, members);
+    if (now <= most) continue;
+    most = now;
+    best.step = limit;
+  }
+  return best;
+}
+
 Eigen::MatrixXd spectra_of(const Members& members) {
   RealDft dft(kPadding * static_cast<int>(kBins));
   Eigen::MatrixXd spectra(kPoints, static_cast<Index>(members.size()));
@@ -224,6 +242,7 @@ class StepSearch {
   void collect(const UsedRun& run, RunWorkspace& w, std::vector<CommandHistogram>& own);
   Eigen::MatrixXcd residual(RunWorkspace& w) const;
   void find(Members members, std::vector<ActuatorStep>& found) const;
+  void find_limits(const Members& members, std::vector<ActuatorStep>& found) const;
 
   const LogInfo& info_;
   int workers_;
@@ -380,6 +399,24 @@ void StepSearch::find(Members members, std::vector<ActuatorStep>& found) const {
   }
 }
 
+/// Adds the limits of `members`, all of one unit, where they explain more than steps: a common one, unless an actuator
+/// clearly has another one. The corners of a limited command are periodic in no step.
+void StepSearch::find_limits(const Members& members, std::vector<ActuatorStep>& found) const {
+  const ActuatorStep common = best_limit(members);
+  for (const Tested* t : members) {
+    ActuatorStep limit = best_limit({t});
+    if (explained(limit, {t}) < explained(common, {t}) + kOwnCertainty) limit = common;
+    limit.actuator = t->actuator;
+    const auto step = std::ranges::find(found, t->actuator, &ActuatorStep::actuator);
+    const double by_step = step == found.end() ? kOwnCertainty : explained(*step, {t});
+    if (explained(limit, {t}) < by_step) continue;
+    if (step == found.end())
+      found.push_back(limit);
+    else
+      *step = limit;
+  }
+}
+
 std::vector<ActuatorStep> StepSearch::find() {
   std::vector<ActuatorStep> found;
   if (lines_.size() < static_cast<std::size_t>(kNeighbours) || tested_.empty()) return found;
@@ -394,7 +431,8 @@ std::vector<ActuatorStep> StepSearch::find() {
     Members members;
     for (const Tested& t : tested_)
       if (unit(t.actuator) == one) members.push_back(&t);
-    find(std::move(members), found);
+    find(members, found);
+    find_limits(members, found);
   }
   return found;
 }

@@ -9,7 +9,7 @@
 
 namespace stageid {
 
-/// Finds actuators that apply their recorded commands u in steps.
+/// Finds actuators that apply their recorded commands u in steps, or up to a limit.
 ///
 /// The error of a converter is a function of u, and periodic in u with the step. It is part of the residual
 /// E = Y - G U, here on excited and detection lines. Matched to the response of actuator j and back in time,
@@ -19,6 +19,10 @@ namespace stageid {
 /// at one period per step. Actuators of one unit are tested together, because they often have the same converter: the
 /// sum of their spectra has a gamma distribution. Only experiments that excite an actuator are used for it, and at most
 /// four periods of each run. Steps below 1/4096 of the largest command are not found.
+///
+/// A limit of the applied command makes a function of u without a period. It is taken where it explains more of H_j than
+/// steps, and found within a few percent. So may a smooth nonlinearity of the plant: the caller compares the scatter of
+/// the realizations.
 ///
 /// Steps of an earlier estimate of the runs are applied, and looked for in the actuators without one.
 ///

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -135,6 +136,47 @@ TEST(StepSearch, TheResponseIsThatOfThePlant) {
   }
   // 2 degrees of freedom: the expectation of F(2, 4) is 2.
   EXPECT_LT(sum / kLogs, 3.0);
+}
+
+/// Both amplifiers saturate, at these multiples of the rms command.
+MemoryLog limited_log(double first, double second, std::uint64_t seed) {
+  const double rms = command_rms();
+  SampledPlant plant = linear_plant();
+  plant.applied = [=](Eigen::Index i, double u) {
+    const double limit = rms * (i == 0 ? first : second);
+    return std::clamp(u, -limit, limit);
+  };
+  return test::simulate_sampled_log(plant, experiment(seed), 1e-3 * rms);
+}
+
+// From commands that are cut most of the time to those that are cut at their peaks.
+TEST(StepSearch, FindsTheLimitsOfSaturatedActuators) {
+  const double rms = command_rms();
+  double sum = 0.0;
+  for (const auto& [first, second] : {std::pair{0.7, 0.7}, {1.5, 1.5}, {2.5, 2.5}, {1.0, 1.8}})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const MemoryLog log = limited_log(first, second, seed);
+      const FrfAndHealth both = estimate_plant_frf_and_health({&log});
+      const std::vector<ActuatorStep>& found = both.health.steps;
+      SCOPED_TRACE(testing::Message() << first << ", " << second << ", seed " << seed);
+      ASSERT_EQ(found.size(), 2U);
+      for (const ActuatorStep& one : found) EXPECT_EQ(one.rounding, Rounding::limited);
+      EXPECT_NEAR(found[0].step / rms, first, 0.01 * first);
+      EXPECT_NEAR(found[1].step / rms, second, 0.01 * second);
+      sum += misfit(both.frf, linear_plant());
+    }
+  EXPECT_LT(sum / 12.0, 3.0);  // see TheResponseIsThatOfThePlant
+}
+
+// A spring that stiffens and a limit make smooth functions of the command, but only a limit explains the scatter.
+TEST(StepSearch, ANonlinearPlantHasNoLimits) {
+  const double rms = command_rms();
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+    for (const double cubic : {1e-3, 1e-2, 1e-1}) {
+      const MemoryLog log = test::simulate_sampled_log(linear_plant(), experiment(seed), 1e-3 * rms,
+                                                       cubic / (rms * rms));
+      EXPECT_TRUE(estimate_plant_frf_and_health({&log}).health.steps.empty()) << seed << cubic;
+    }
 }
 
 TEST(StepSearch, FindsNothingWithoutSteps) {
