@@ -7,12 +7,10 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <initializer_list>
 #include <span>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "excitation/threads/team.hpp"
 #include "tools/program_main.hpp"

@@ -4,7 +4,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/fail.hpp"

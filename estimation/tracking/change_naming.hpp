@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <deque>
-#include <vector>
 
 #include "estimation/tracking/change_scores.hpp"
 #include "estimation/tracking/stage_change.hpp"

@@ -3,9 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
-#include <utility>
 
 namespace stageid {
 

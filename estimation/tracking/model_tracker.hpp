@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "estimation/modal/period_spectra.hpp"

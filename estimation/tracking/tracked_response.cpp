@@ -1,7 +1,6 @@
 #include "estimation/tracking/tracked_response.hpp"
 
 #include <complex>
-#include <map>
 #include <numbers>
 #include <utility>
 

@@ -9,7 +9,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>

@@ -16,7 +16,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <memory>
 
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/loop/measurement_loop.hpp"

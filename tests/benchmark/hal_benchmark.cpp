@@ -1,7 +1,6 @@
 // One cycle of the wafer stage on one core: the cost of hal per sample of the measurement loop.
 #include <benchmark/benchmark.h>
 
-#include <memory>
 #include <vector>
 
 #include "hal/simulator/modal_plant.hpp"

@@ -23,7 +23,6 @@
 #include <exception>
 #include <fstream>
 #include <map>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>

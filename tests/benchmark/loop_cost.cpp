@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <memory>
 #include <string>
 
 #include "acquisition/loop/run_experiment.hpp"

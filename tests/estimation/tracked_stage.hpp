@@ -6,7 +6,6 @@
 #include <complex>
 #include <cstdint>
 #include <numbers>
-#include <utility>
 
 #include "estimation/tracking/model_tracker.hpp"
 #include "tests/support/models/model_reference.hpp"

@@ -3,9 +3,7 @@
 #include <libpq-fe.h>
 
 #include <array>
-#include <charconv>
 #include <cstdlib>
-#include <optional>
 
 #include "acquisition/files/fail.hpp"
 #include "tools/database/database.hpp"

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "estimation/uncertainty/dense_covariance.hpp"
-#include "frf/file/frf_file.hpp"
 #include "tools/control/controller_view.hpp"
 #include "tools/exchange/model/model_hdf5.hpp"
 

@@ -7,9 +7,7 @@
 #include <cmath>
 #include <complex>
 #include <cstring>
-#include <fstream>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <thread>
 

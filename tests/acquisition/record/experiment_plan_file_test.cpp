@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
-#include <complex>
 #include <cstring>
 #include <fstream>
 #include <functional>

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <complex>
-#include <numbers>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"

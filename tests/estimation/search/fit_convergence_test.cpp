@@ -7,7 +7,6 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"

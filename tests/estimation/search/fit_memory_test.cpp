@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/support/process/heap_peak.hpp"

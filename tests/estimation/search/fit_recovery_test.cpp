@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/model_fit_problem.hpp"

@@ -4,9 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
-#include "estimation/model/model_structure.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"

@@ -3,11 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <vector>
 
 #include "tests/support/process/random_numbers.hpp"
 

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <set>
 #include <stdexcept>
-#include <string>
 
 #include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/line_spectrum.hpp"

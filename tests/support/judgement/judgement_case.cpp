@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -17,7 +16,6 @@
 #include "estimation/modal/validation.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/response/distortion_variance.hpp"
-#include "hal/simulator/rigid_body.hpp"
 #include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/run_program.hpp"
 #include "tests/support/process/temporary_directory.hpp"

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "estimation/problem/fit_problem.hpp"
 #include "tests/support/models/model_dense_step.hpp"
 

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>

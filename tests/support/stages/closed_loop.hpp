@@ -8,8 +8,6 @@
 #include <functional>
 #include <numbers>
 #include <random>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "excitation/multisine/dft.hpp"

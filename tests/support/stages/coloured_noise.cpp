@@ -1,7 +1,6 @@
 #include "tests/support/stages/coloured_noise.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>

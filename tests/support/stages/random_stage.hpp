@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "estimation/model/additive_model.hpp"
 #include "frf/response/frf_estimate.hpp"

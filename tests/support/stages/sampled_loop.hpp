@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"

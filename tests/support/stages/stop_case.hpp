@@ -5,8 +5,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <span>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "tests/support/stages/simulated_spec.hpp"
 
 namespace stageid::test {

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "acquisition/record/experiment_plan_file.hpp"
 #include "frf/file/frf_file.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/experiment/config_plan.hpp"

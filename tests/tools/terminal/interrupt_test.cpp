@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
 
 #include "acquisition/files/output_file.hpp"
 #include "tests/support/process/temporary_directory.hpp"

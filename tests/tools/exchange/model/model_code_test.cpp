@@ -7,8 +7,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iomanip>
-#include <sstream>
 #include <stdexcept>
 
 #include "acquisition/files/input_files.hpp"
