@@ -27,15 +27,7 @@ LogThread::LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*>
       observers_(std::move(observers)),
       last_write_ns_(monotonic_ns()),
       last_synchronize_ns_(last_write_ns_) {
-  thread_ = std::thread([this] { run(); });
-}
-
-LogThread::~LogThread() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  thread_.join();
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void LogThread::begin_run(LogRun run, Eigen::MatrixXd excitation) {
@@ -66,28 +58,25 @@ std::string LogThread::error() const {
   return error_;
 }
 
-void LogThread::run() noexcept {
+void LogThread::run(const std::stop_token& stop) noexcept {
   // A real-time priority of the loop's caller must not be inherited for writing to a disk.
   const sched_param normal{};
   static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
   while (true) {
-    bool stop = false;
-    {
-      const std::lock_guard lock(mutex_);
-      stop = stop_;  // read first, so that everything queued before it is still written
-    }
-    if (work()) continue;
+    // Read first, so that everything queued before it is still written.
+    const bool stopping = stop.stop_requested();
+    if (work(stopping)) continue;
     {
       const std::lock_guard lock(mutex_);
       written_.notify_all();
     }
-    if (stop && ring_.popped() == ring_.pushed()) return;
+    if (stopping && ring_.popped() == ring_.pushed()) return;
     std::this_thread::sleep_for(kPause);
   }
 }
 
 /// Writes one block or executes one command. @returns false if there is nothing to do
-bool LogThread::work() {
+bool LogThread::work(bool stop) {
   std::optional<Command> next;
   std::uint64_t limit = ring_.pushed();
   {
@@ -114,7 +103,7 @@ bool LogThread::work() {
   bool all = now - last_write_ns_ > kLongestDelay_ns;
   {
     const std::lock_guard lock(mutex_);
-    all |= stop_ || !commands_.empty();
+    all |= stop || !commands_.empty();
   }
   return write_rows(limit - ring_.popped(), all);
 }

@@ -7,6 +7,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,11 +27,8 @@ namespace stageid {
 /// log has failed.
 class LogThread {
  public:
+  /// The destructor waits until everything that is queued is written.
   LogThread(RunWriter& log, SampleRing& ring, std::vector<RunObserver*> observers = {});
-  /// Writes everything that is queued, then ends.
-  ~LogThread();
-  LogThread(const LogThread&) = delete;
-  LogThread& operator=(const LogThread&) = delete;
 
   // Called between runs, by the producer's thread; they take a lock. Nothing of a run is written before it is
   // confirmed.
@@ -57,8 +55,8 @@ class LogThread {
   };
 
   void queue(Command command);
-  void run() noexcept;
-  bool work();
+  void run(const std::stop_token& stop) noexcept;
+  bool work(bool stop);
   bool write_rows(std::uint64_t available, bool all);
   void execute(const Command& command);
   template <typename Action>
@@ -67,17 +65,16 @@ class LogThread {
   RunWriter& log_;
   SampleRing& ring_;
   std::vector<RunObserver*> observers_;
-  mutable std::mutex mutex_;  // guards the four members below
+  mutable std::mutex mutex_;  // guards the three members below
   std::condition_variable written_;
   std::deque<Command> commands_;
   std::string error_;
-  bool stop_ = false;
   std::atomic<bool> unconfirmed_ = false;  // the last command begins a run that may not start
   std::atomic<bool> failed_ = false;
   std::atomic<int> complete_runs_ = 0;
   std::int64_t last_write_ns_ = 0;
   std::int64_t last_synchronize_ns_ = 0;
-  std::thread thread_;  // last: it uses all other members
+  std::jthread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

@@ -14,21 +14,16 @@ constexpr std::chrono::microseconds kPause{500};
 
 }  // namespace
 
-SideThread::SideThread() : thread_([this] { run(); }) {}
-
-SideThread::~SideThread() {
-  stop_.store(true, std::memory_order_relaxed);
-  thread_.join();
-}
+SideThread::SideThread() : thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void SideThread::rethrow() {
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
-void SideThread::run() noexcept {
+void SideThread::run(const std::stop_token& stop) noexcept {
   const sched_param normal{};
   static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
-  while (!stop_.load(std::memory_order_relaxed)) {
+  while (!stop.stop_requested()) {
     const Call call = call_.load(std::memory_order_acquire);
     if (call == nullptr) {
       std::this_thread::sleep_for(kPause);

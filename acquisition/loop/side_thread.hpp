@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <exception>
+#include <stop_token>
 #include <thread>
 
 namespace stageid {
@@ -11,9 +12,6 @@ namespace stageid {
 class SideThread {
  public:
   SideThread();
-  ~SideThread();
-  SideThread(const SideThread&) = delete;
-  SideThread& operator=(const SideThread&) = delete;
 
   /// Begins a job, which must live until done().
   template <typename Job>
@@ -27,13 +25,12 @@ class SideThread {
 
  private:
   using Call = void (*)(void*);
-  void run() noexcept;
+  void run(const std::stop_token& stop) noexcept;
 
   std::atomic<Call> call_ = nullptr;
-  std::atomic<bool> stop_ = false;
   void* context_ = nullptr;
   std::exception_ptr failure_;
-  std::thread thread_;  // last: it uses all other members
+  std::jthread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

@@ -56,16 +56,7 @@ ModbusSupervisor::ModbusSupervisor(const ModbusAddress& address, const ModbusTim
                                    const ModbusSupervisorOptions& options)
     : link_(address, timing), options_(options), trouble_("not connected yet") {
   check(options);
-  thread_ = std::thread([this] { run(); });
-}
-
-ModbusSupervisor::~ModbusSupervisor() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 PlantSnapshot ModbusSupervisor::snapshot() const {
@@ -98,10 +89,10 @@ SupervisorReply ModbusSupervisor::request(SupervisorCommand command) {
   return {false, trouble_.empty() ? "the command was not answered" : trouble_};
 }
 
-void ModbusSupervisor::run() {
+void ModbusSupervisor::run(const std::stop_token& stop) {
   double backoff_s = options_.backoff_first_s;
   std::unique_lock lock(mutex_);
-  while (!stop_) {
+  while (!stop.stop_requested()) {
     lock.unlock();
     const bool good = connect() && poll();
     lock.lock();
@@ -109,7 +100,7 @@ void ModbusSupervisor::run() {
     const double pause_s = good ? options_.poll_period_s : backoff_s;
     backoff_s =
         good ? options_.backoff_first_s : std::min(2.0 * backoff_s, options_.backoff_longest_s);
-    changed_.wait_for(lock, Seconds(pause_s), [&] { return stop_ || (good && wanted_ && !sent_); });
+    changed_.wait_for(lock, stop, Seconds(pause_s), [&] { return good && wanted_ && !sent_; });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -33,16 +34,13 @@ class ModbusSupervisor final : public Supervisor {
   /// @throws std::invalid_argument if an address, a time or the poll period is invalid.
   ModbusSupervisor(const ModbusAddress& address, const ModbusTiming& timing,
                    const ModbusSupervisorOptions& options = {});
-  ~ModbusSupervisor() override;
-  ModbusSupervisor(const ModbusSupervisor&) = delete;
-  ModbusSupervisor& operator=(const ModbusSupervisor&) = delete;
 
   PlantSnapshot snapshot() const override;
   SupervisorReply request(SupervisorCommand command) override;
   std::string trouble() const override;
 
  private:
-  void run();
+  void run(const std::stop_token& stop);
   bool connect();
   bool poll();
   LinkStatus transact(std::span<std::uint16_t> status);
@@ -57,14 +55,13 @@ class ModbusSupervisor final : public Supervisor {
 
   std::mutex request_mutex_;  // one request at a time
   mutable std::mutex mutex_;  // guards all members below
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   PlantSnapshot snapshot_;
   std::string trouble_;
   std::optional<SupervisorCommand> wanted_;
   bool sent_ = false;  // wanted_ has its sequence number
   std::optional<SupervisorReply> reply_;
-  bool stop_ = false;
-  std::thread thread_;  // last: it uses all other members
+  std::jthread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

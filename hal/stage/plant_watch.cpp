@@ -86,16 +86,11 @@ PlantWatch::PlantWatch(Supervisor& supervisor, const PlantConditions& conditions
     supervisor_.request(SupervisorCommand::disable);
     throw StageError(trouble);
   }
-  thread_ = std::thread([this] { watch(); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
 PlantWatch::~PlantWatch() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
+  thread_ = {};  // stops it and waits for it
   supervisor_.request(SupervisorCommand::disable);
 }
 
@@ -114,10 +109,12 @@ std::string PlantWatch::wait_until_good(bool enabled) {
   }
 }
 
-void PlantWatch::watch() {
+void PlantWatch::watch(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, Seconds(conditions_.stale_s / kLooksAWindow),
-                            [this] { return stop_; })) {
+  const auto never = [] { return false; };
+  while (true) {
+    changed_.wait_for(lock, stop, Seconds(conditions_.stale_s / kLooksAWindow), never);
+    if (stop.stop_requested()) return;
     lock.unlock();
     std::string trouble = trouble_of(supervisor_, conditions_, true);
     lock.lock();

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -43,8 +44,6 @@ class PlantWatch {
   PlantWatch(Supervisor& supervisor, const PlantConditions& conditions, bool reset_fault = false);
   /// Disables the plant.
   ~PlantWatch();
-  PlantWatch(const PlantWatch&) = delete;
-  PlantWatch& operator=(const PlantWatch&) = delete;
 
   const std::atomic<bool>& tripped() const noexcept { return tripped_; }
   /// The reason for tripping; empty unless tripped().
@@ -52,16 +51,15 @@ class PlantWatch {
 
  private:
   std::string wait_until_good(bool enabled);
-  void watch();
+  void watch(const std::stop_token& stop);
 
   Supervisor& supervisor_;
   PlantConditions conditions_;
   std::atomic<bool> tripped_ = false;
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   std::string reason_;
-  bool stop_ = false;
-  std::thread thread_;  // last: it uses all other members
+  std::jthread thread_;  // last: it uses all other members
 };
 
 }  // namespace stageid

@@ -50,19 +50,7 @@ LiveResponse::LiveResponse(std::filesystem::path log, FrfOptions options, Latest
     : log_(std::move(log)), options_(std::move(options)), response_(response) {
   options_.threads = 1;
   options_.realizations.clear();
-  options_.progress = [this](double, double) {
-    if (stop_) throw Interrupted();
-  };
-  thread_ = std::thread([this] { run(); });
-}
-
-LiveResponse::~LiveResponse() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-    changed_.notify_all();
-  }
-  thread_.join();
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void LiveResponse::end_run(const LogRun& run) noexcept {
@@ -98,12 +86,13 @@ void LiveResponse::set_status(std::string status) {
   status_ = std::move(status);
 }
 
-void LiveResponse::run() {
+void LiveResponse::run(const std::stop_token& stop) {
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest);
+  options_.progress = [&stop](double, double) {
+    if (stop.stop_requested()) throw Interrupted();
+  };
   std::unique_lock lock(mutex_);
-  while (true) {
-    changed_.wait(lock, [this] { return stop_ || due(); });
-    if (stop_) return;
+  while (changed_.wait(lock, stop, [this] { return due(); }) && !stop.stop_requested()) {
     const int asked = asked_;
     lock.unlock();
     try {

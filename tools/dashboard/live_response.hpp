@@ -1,10 +1,10 @@
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -32,9 +32,6 @@ class LiveResponse final : public RunObserver {
  public:
   /// Publishes to `response`: {"realizations", "content", "blocks"} in the format of the report page.
   LiveResponse(std::filesystem::path log, FrfOptions options, LatestText& response);
-  ~LiveResponse() override;
-  LiveResponse(const LiveResponse&) = delete;
-  LiveResponse& operator=(const LiveResponse&) = delete;
 
   void begin_run(const LogRun&) noexcept override {}
   void rows(std::span<const double>, std::size_t) noexcept override {}
@@ -50,7 +47,7 @@ class LiveResponse final : public RunObserver {
   std::optional<LiveAccuracy> accuracy() const;
 
  private:
-  void run();
+  void run(const std::stop_token& stop);
   void update();
   void set_status(std::string status);
   bool due() const { return watched_ && asked_ != done_; }
@@ -59,15 +56,14 @@ class LiveResponse final : public RunObserver {
   FrfOptions options_;
   LatestText& response_;
   mutable std::mutex mutex_;  // of all below except the last two
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   bool watched_ = false;
   int asked_ = 1;  ///< completed runs so far, plus one for those present at the start
   int done_ = 0;
   std::string status_ = "waiting for the first complete realization";
   std::optional<LiveAccuracy> accuracy_;
-  std::atomic<bool> stop_ = false;
   int realizations_ = 0;  // shown; only used by the thread itself
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace stageid

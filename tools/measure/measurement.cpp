@@ -4,7 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <stop_token>
 #include <thread>
 #include <utility>
 
@@ -190,32 +190,29 @@ class LiveWatch {
  public:
   /// Starts to follow the log. @param watch must outlive *this
   LiveWatch(StageWatch& watch, std::filesystem::path log)
-      : thread_([this, &watch, log = std::move(log)] {
+      : thread_([this, &watch, log = std::move(log)](const std::stop_token& stop) {
           constexpr int kLowest = 19;
           ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest);
           try {
-            watch.run(log, true, [this](double) { return !stop_ && !interrupt_flag(); });
+            watch.run(log, true,
+                      [&](double) { return !stop.stop_requested() && !interrupt_flag(); });
             failure_ = watch.doubt();
           } catch (const std::exception& error) {  // errors must not affect the measurement
             failure_ = error.what();
           }
         }) {}
-  ~LiveWatch() { finish(false); }
-  LiveWatch(const LiveWatch&) = delete;
-  LiveWatch& operator=(const LiveWatch&) = delete;
 
   /// To be called when nothing more is written. Returns when all of a closed log was watched, or after an interrupt.
   /// @returns why the watch failed; empty if it did not
   std::string finish(bool log_is_closed) {
-    if (!log_is_closed) stop_ = true;
+    if (!log_is_closed) thread_.request_stop();
     if (thread_.joinable()) thread_.join();
     return failure_;
   }
 
  private:
-  std::atomic<bool> stop_ = false;
   std::string failure_;
-  std::thread thread_;  // last: it uses all other members
+  std::jthread thread_;  // last: it uses all other members
 };
 
 /// Waits for the watch to reach the end of the log. Its failures are warnings.
