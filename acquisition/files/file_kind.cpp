@@ -86,7 +86,7 @@ std::string head_of(const std::filesystem::path& file, std::size_t bytes) {
   std::string head(bytes, '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(stream.gcount()));
+  head.resize(stream.gcount());
   return head;
 }
 

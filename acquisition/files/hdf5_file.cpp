@@ -161,7 +161,7 @@ void Hdf5File::check_chunk(const std::string& dataset, hid_t id) const {
   const Hdf5Handle type(H5Dget_type(id), H5Tclose);
   std::vector<hsize_t> chunk(H5S_MAX_RANK);
   const int rank = H5Pget_chunk(properties.get(), H5S_MAX_RANK, chunk.data());
-  chunk.resize(static_cast<std::size_t>(std::clamp(rank, 0, H5S_MAX_RANK)));
+  chunk.resize(std::clamp(rank, 0, H5S_MAX_RANK));
   hdf5::plausible_count(path_, dataset, chunk, H5Tget_size(type.get()),
                         H5Pget_nfilters(properties.get()) > 0);
 }

@@ -67,7 +67,7 @@ void check_global_heaps(const std::filesystem::path& file) {
   const auto file_bytes = static_cast<std::uint64_t>(end);
   std::string window;
   const auto check_from = [&](std::uint64_t offset, std::uint64_t bytes) {
-    window.resize(static_cast<std::size_t>(bytes));
+    window.resize(bytes);
     stream.seekg(static_cast<std::streamoff>(offset));
     stream.read(window.data(), static_cast<std::streamsize>(bytes));
     if (!stream) fail_file(file, "cannot be read");

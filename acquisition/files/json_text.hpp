@@ -29,7 +29,7 @@ class JsonBounds {
       keys_.resize(static_cast<std::size_t>(depth) + 1);
       keys_.push_back(0);
     }
-    if (event == Event::key && ++keys_[static_cast<std::size_t>(depth)] > kMostKeys)
+    if (event == Event::key && ++keys_[depth] > kMostKeys)
       throw JsonTooLarge("more than 4000 keys in one object");
     return true;
   }

@@ -204,8 +204,7 @@ void convert_run_to_csv(const LogReader& reader, std::size_t run, CsvFile& csv,
       csv.text(head);
       csv.number(static_cast<double>(row) / info.sample_rate_hz);
       csv.text(fmt::format(",{}", samples.marked[r]));
-      write_cells(csv, excitation.row(static_cast<Eigen::Index>(
-                           row % static_cast<std::uint64_t>(info.period_samples))));
+      write_cells(csv, excitation.row(row % static_cast<std::uint64_t>(info.period_samples)));
       write_cells(csv, samples.actuators.row(r));
       write_cells(csv, samples.sensors.row(r));
       csv.end_line();

@@ -177,7 +177,7 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
                                      columns, out.data() + done, static_cast<std::size_t>(rows)));
   }
   for (std::size_t c = 0; c < dataset.scaling.scale.size(); ++c) {
-    auto column = out.col(static_cast<Eigen::Index>(c)).array();
+    auto column = out.col(c).array();
     column = dataset.scaling.scale[c] * column + dataset.scaling.offset[c];
   }
 }
@@ -263,9 +263,8 @@ void Hdf5LogReader::check_repetition(const LogRun& run, const Dataset& dataset,
     fail_format(path_, dataset.name,
                 "is not periodic: row {} of '{}' differs from the first period by {:.3g} (peak "
                 "{:.3g}); check period_samples ({})",
-                first + static_cast<std::uint64_t>(row),
-                info_.excitation.names[static_cast<std::size_t>(column)], largest, peak,
-                info_.period_samples);
+                first + static_cast<std::uint64_t>(row), info_.excitation.names[column], largest,
+                peak, info_.period_samples);
   }
 }
 
@@ -275,7 +274,7 @@ void Hdf5LogReader::read_marked(const std::string& dataset, std::uint64_t first,
     out.marked.setZero();
     return;
   }
-  std::vector<double> values(static_cast<std::size_t>(out.marked.size()));
+  std::vector<double> values(out.marked.size());
   {
     const std::lock_guard lock(hdf5_mutex());
     file_->read_rows(dataset, first, values.size(), values.data());

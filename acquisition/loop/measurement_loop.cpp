@@ -74,7 +74,7 @@ PreparedExcitation MeasurementLoop::prepare(const LoopExcitation& excitation) co
   PreparedExcitation out;
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
-    const int actuator = excitation.actuators[static_cast<std::size_t>(c)];
+    const int actuator = excitation.actuators[c];
     if (actuator < 0 || static_cast<std::size_t>(actuator) >= u_.size())
       fail_request("loop: unknown actuator number {}", actuator);
     if (period.col(c).isZero(0.0)) continue;

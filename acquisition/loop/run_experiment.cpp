@@ -118,7 +118,7 @@ class Experiment {
     while (const std::optional<LoopEvent> event = loop_.events().pop()) {
       if (event->kind == LoopEvent::Kind::state) node_state_ = static_cast<NodeState>(event->code);
       if (options_.events == nullptr) continue;
-      const RunId run = runs_[static_cast<std::size_t>(event->run)];
+      const RunId run = runs_[event->run];
       const bool state = event->kind == LoopEvent::Kind::state;
       const std::string code = state ? to_string(static_cast<NodeState>(event->code))
                                      : to_string(static_cast<StopReason>(event->code));
@@ -390,7 +390,7 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
   info.actuators = channel_list(stage.actuators);
   info.sensors = channel_list(stage.sensors);
   for (const int index : excited_actuators(plan.spec(), stage)) {
-    const Channel& actuator = stage.actuators[static_cast<std::size_t>(index)];
+    const Channel& actuator = stage.actuators[index];
     info.excitation.names.push_back(actuator.name);
     info.excitation.units.push_back(actuator.unit);
   }

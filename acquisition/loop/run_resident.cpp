@@ -136,7 +136,7 @@ class ResidentExperiment {
     waveforms.samples.setZero(excitation.rows(),
                               static_cast<Eigen::Index>(stage_.info().actuators.size()));
     for (Eigen::Index axis = 0; axis < excitation.cols(); ++axis)
-      waveforms.samples.col(actuators_[static_cast<std::size_t>(axis)]) = excitation.col(axis);
+      waveforms.samples.col(actuators_[axis]) = excitation.col(axis);
     return waveforms;
   }
 

@@ -78,14 +78,14 @@ class Predictor {
     const Eigen::MatrixXd r = plan_.excitation(run);
     for (Eigen::Index axis = 0; axis < r.cols(); ++axis)
       if (r.col(axis).squaredNorm() > 0.0) {
-        double& largest = result_.crest_factor[static_cast<std::size_t>(axis)];
+        double& largest = result_.crest_factor[axis];
         largest = std::max(largest, crest_factor(r.col(axis)));
       }
     const Eigen::MatrixXcd R = plan_.spectrum(run);
     const Eigen::VectorXd& feed_forward = stage_.controller.feed_forward_n;
     for (std::size_t i = 0; i < result_.actuators.size(); ++i) {
       Eigen::VectorXd u = period(loop_.to_u, R, static_cast<Eigen::Index>(i));
-      if (feed_forward.size() > 0) u.array() += feed_forward[static_cast<Eigen::Index>(i)];
+      if (feed_forward.size() > 0) u.array() += feed_forward[i];
       ChannelPrediction& channel = result_.actuators[i];
       add_period(channel, u);
       double step = std::abs(u[0] - u[u.size() - 1]);
@@ -104,7 +104,7 @@ class Predictor {
     Eigen::VectorXcd half = Eigen::VectorXcd::Zero(dft_.half_size());
     const std::vector<int>& lines = plan_.grid().lines();
     for (std::size_t k = 0; k < lines.size(); ++k)
-      half[lines[k]] = transfer[k].row(channel) * R.col(static_cast<Eigen::Index>(k));
+      half[lines[k]] = transfer[k].row(channel) * R.col(k);
     return dft_.inverse(half);
   }
 

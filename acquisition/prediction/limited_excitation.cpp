@@ -26,7 +26,7 @@ std::vector<Index> actuators_of(const ExperimentSpec& experiment, const StageInf
                                 const PlantPrior& prior) {
   const std::vector<int> excited = excited_actuators(experiment, stage);
   for (std::size_t axis = 0; axis < excited.size(); ++axis)
-    if (!prior.actuator_known[static_cast<std::size_t>(excited[axis])])
+    if (!prior.actuator_known[excited[axis]])
       fail_request("prior: does not contain the axis '{}'; measure a pilot with all axes",
                    experiment.axes[axis].channel);
   return {excited.begin(), excited.end()};
@@ -39,7 +39,7 @@ std::vector<Index> outputs_of(const std::vector<std::string>& names, const Stage
     if (names.empty() && prior.sensor_known[i]) indices.push_back(static_cast<Index>(i));
   for (const std::string& name : names) {
     const int index = channel_index(stage.sensors, name);
-    if (index < 0 || !prior.sensor_known[static_cast<std::size_t>(index)])
+    if (index < 0 || !prior.sensor_known[index])
       fail_request("prior: does not contain the output '{}'; measure a pilot with all outputs",
                    name);
     indices.push_back(index);
@@ -71,8 +71,7 @@ class LoopTransfers {
     below_u.assign(stage.info.actuators.size(), MatrixXcd(n, below));
     below_y.assign(stage.info.sensors.size(), MatrixXcd(n, below));
     for (Index b = 0; b < below; ++b)
-      add_transfers(b, prior.below_band[static_cast<std::size_t>(b)],
-                    controller.response(below_hz[b]), below_u, below_y);
+      add_transfers(b, prior.below_band[b], controller.response(below_hz[b]), below_u, below_y);
   }
 
   std::vector<MatrixXcd> to_u, to_y;        ///< per channel: axes x lines
@@ -87,15 +86,13 @@ class LoopTransfers {
     const MatrixXcd S_all = inverse(MatrixXcd::Identity(K.rows(), K.rows()) - K * G);
     MatrixXcd S = S_all(Eigen::all, axes_);
     const MatrixXcd Y = G * S;
-    for (Index i = 0; i < S.rows(); ++i)
-      u[static_cast<std::size_t>(i)].col(column) = S.row(i).transpose();
-    for (Index i = 0; i < Y.rows(); ++i)
-      y[static_cast<std::size_t>(i)].col(column) = Y.row(i).transpose();
+    for (Index i = 0; i < S.rows(); ++i) u[i].col(column) = S.row(i).transpose();
+    for (Index i = 0; i < Y.rows(); ++i) y[i].col(column) = Y.row(i).transpose();
     return S;
   }
 
   void add_line(Index k, const MatrixXcd& K) {
-    const MatrixXcd& G = prior_.response[static_cast<std::size_t>(k)];
+    const MatrixXcd& G = prior_.response[k];
     const MatrixXcd S = add_transfers(k, G, K, to_u, to_y);
     const MatrixXcd from_axes = inverse(S(axes_, Eigen::all));
     double relative = 0.0;
@@ -137,11 +134,11 @@ class LoopTransfers {
 };
 
 double limit_of(const Eigen::VectorXd& limits, std::size_t i) {
-  return limits.size() == 0 ? kUnlimited : limits[static_cast<Index>(i)];
+  return limits.size() == 0 ? kUnlimited : limits[i];
 }
 
 double reserve_of(const Eigen::VectorXd& mean_square, std::size_t i) {
-  return kDeviations * std::sqrt(mean_square[static_cast<Index>(i)]);
+  return kDeviations * std::sqrt(mean_square[i]);
 }
 
 void add(BoundedLoop& loop, BoundedSignal signal, std::string unit) {
@@ -157,7 +154,7 @@ void add_actuator(BoundedLoop& loop, const LoopTransfers& transfers, const Stage
       .name = channel.name, .transfer = transfers.to_u[i], .below_band = transfers.below_u[i]};
   BoundedSignal slew = u;
   const Eigen::VectorXd& feed_forward = stage.controller.feed_forward_n;
-  const double bias = feed_forward.size() > 0 ? feed_forward[static_cast<Index>(i)] : 0.0;
+  const double bias = feed_forward.size() > 0 ? feed_forward[i] : 0.0;
   u.peak_limit = limit_of(stage.limits.actuator_n, i) - std::abs(bias);
   const double rms = limit_of(stage.limits.thermal_rms_n, i);
   if (!(u.peak_limit > 0.0) || !(rms > std::abs(bias)))

@@ -142,8 +142,7 @@ std::vector<ExcitationAxis> read_axes(const Hdf5File& file, const FrequencyGrid&
                                  : MatrixXd::Constant(count, grid.size(), kNaN);
   std::vector<ExcitationAxis> axes;
   for (Index p = 0; p < count; ++p) {
-    const auto i = static_cast<std::size_t>(p);
-    axes.push_back({channels[i], levels[i], {}, {}});
+    axes.push_back({channels[p], levels[p], {}, {}});
     if (!phase_rad.row(p).array().isNaN().all())
       axes.back().phase_rad = phase_rad.row(p).transpose();
     if (!shape.row(p).isZero(0.0)) axes.back().shape = shape.row(p).transpose();

@@ -14,8 +14,8 @@ struct ChannelList {
   std::vector<std::string> names;
   std::vector<std::string> units;  ///< as many as names
   std::size_t size() const noexcept { return names.size(); }
-  const std::string& name(std::ptrdiff_t i) const { return names[static_cast<std::size_t>(i)]; }
-  const std::string& unit(std::ptrdiff_t i) const { return units[static_cast<std::size_t>(i)]; }
+  const std::string& name(std::ptrdiff_t i) const { return names[i]; }
+  const std::string& unit(std::ptrdiff_t i) const { return units[i]; }
   friend bool operator==(const ChannelList&, const ChannelList&) = default;
 };
 

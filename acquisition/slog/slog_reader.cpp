@@ -127,7 +127,7 @@ void SlogReader::read_block(const SlogRunIndex& run, const SlogBlock& block,
     for (std::size_t r = 0; r < count; ++r) {
       std::uint64_t status = 0;
       std::memcpy(&status, rows + r * words + words - 1, sizeof status);
-      target.out.marked[static_cast<Eigen::Index>(to + r)] = mark_of(unpack_status(status));
+      target.out.marked[to + r] = mark_of(unpack_status(status));
     }
     if (!finite) {
       if (!payload_intact(source_, block)) break;  // damage has priority, because it is the cause

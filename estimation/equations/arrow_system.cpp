@@ -64,7 +64,7 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
                          const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
                          ChannelEquationsUse use)
     : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
-  if (keeps()) channels_.resize(static_cast<std::size_t>(part.count));
+  if (keeps()) channels_.resize(part.count);
   const Eigen::Index first_tile = part.first / kTileChannels;
   const Eigen::Index tiles = channel_tiles(part.first + part.count) - first_tile;
   const Team& team = keeps() ? Team::one() : *problem.team;
@@ -72,16 +72,15 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   const Eigen::Index first = std::max(part.first, (first_tile + own.first) * kTileChannels);
   const Eigen::Index end =
       std::min(part.first + part.count, (first_tile + own.first + own.count) * kTileChannels);
-  std::vector<GlobalSums> sums(static_cast<std::size_t>(own.count), GlobalSums(problem.globals()));
+  std::vector<GlobalSums> sums(own.count, GlobalSums(problem.globals()));
   for (const BasisGroup& group : groups) {
     const std::vector<TileRange> blocks =
         member_blocks(group, {first, end - first}, problem.size());
     if (blocks.empty()) continue;
     const GroupProducts products(shared_, group);
     for (const TileRange& block : blocks) {
-      const Eigen::Index tile =
-          group.channels[static_cast<std::size_t>(block.first_member)] / kTileChannels;
-      GlobalSums& out = sums[static_cast<std::size_t>(tile - first_tile - own.first)];
+      const Eigen::Index tile = group.channels[block.first_member] / kTileChannels;
+      GlobalSums& out = sums[tile - first_tile - own.first];
       if (out.irregular() == 0.0) add_block(products, block, out);
     }
   }
@@ -106,12 +105,11 @@ void ArrowSystem::add_block(const GroupProducts& products, const TileRange& bloc
   std::vector<Channel> channels;
   for (Eigen::Index first = 0; first < block.members && out.irregular() == 0.0; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, block.members - first);
-    channels.resize(static_cast<std::size_t>(count));
+    channels.resize(count);
     for (Eigen::Index i = 0; i < count; ++i) {
-      Channel& channel = channels[static_cast<std::size_t>(i)];
+      Channel& channel = channels[i];
       set_channel(sums, B, first + i, channel);
-      if (problem_.delays() > 0)
-        add_delays(sums, B, first + i, members[static_cast<std::size_t>(first + i)], channel, out);
+      if (problem_.delays() > 0) add_delays(sums, B, first + i, members[first + i], channel, out);
     }
     add_channels(members.data() + first, channels, out);
   }
@@ -121,7 +119,7 @@ void ArrowSystem::add_channels(const Eigen::Index* places, std::vector<Channel>&
                                GlobalSums& out) {
   if (use_ != ChannelEquationsUse::only_kept) eliminate(channels, out);
   for (std::size_t i = 0; keeps() && i < channels.size(); ++i)
-    channels_[static_cast<std::size_t>(places[i] - range_.first)] = std::move(channels[i]);
+    channels_[places[i] - range_.first] = std::move(channels[i]);
 }
 
 void ArrowSystem::add_denominators(const LineSums& sums, GlobalSums& out) const {
@@ -131,8 +129,8 @@ void ArrowSystem::add_denominators(const LineSums& sums, GlobalSums& out) const 
   const auto n_d = std::ssize(shared_.columns);
   for (Eigen::Index d = 0; d < n_d; ++d)
     for (Eigen::Index o = 0; o < n_d; ++o) {
-      const Eigen::Index p = shared_.columns[static_cast<std::size_t>(d)].parameter;
-      const Eigen::Index q = shared_.columns[static_cast<std::size_t>(o)].parameter;
+      const Eigen::Index p = shared_.columns[d].parameter;
+      const Eigen::Index q = shared_.columns[o].parameter;
       M(p, q) += d >= o ? sums.DD(d, o) : sums.DD(o, d);
     }
   e.head(n_a) += sums.ZE;
@@ -152,7 +150,7 @@ void ArrowSystem::set_channel(const LineSums& sums, const Eigen::MatrixXd& B, Ei
   channel.ab.setZero(problem_.globals(), n_f);
   const auto FD = sums.FD.col(member).reshaped(n_d, n_f);
   for (Eigen::Index d = 0; d < n_d; ++d) {
-    const auto [function, parameter] = shared_.columns[static_cast<std::size_t>(d)];
+    const auto [function, parameter] = shared_.columns[d];
     channel.ab.row(parameter) += B(member, function) * FD.row(d);
   }
   if (shared_.method == FitMethod::sk)
@@ -189,12 +187,12 @@ void ArrowSystem::eliminate(std::vector<Channel>& channels, GlobalSums& out) con
   std::vector<char> solved(channels.size());
   const int threads = problem_.functions() < kWorthThreads ? 1 : problem_.threads;
   for_each_task(threads, static_cast<int>(channels.size()), [&](int i) {
-    Channel& channel = channels[static_cast<std::size_t>(i)];
+    Channel& channel = channels[i];
     Eigen::MatrixXd rhs(channel.ba.rows(), channel.ba.cols() + 1);
     rhs << channel.ba, channel.e;
     Eigen::MatrixXd solution;
     if (!solve_scaled(channel.bb, rhs, solution)) return;
-    solved[static_cast<std::size_t>(i)] = 1;
+    solved[i] = 1;
     channel.Z = solution.leftCols(channel.ba.cols());
     channel.x = solution.rightCols(1);
   });
@@ -245,7 +243,7 @@ Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side, double dam
   if (globals == 0) return x;
   x.head(globals) = solve_schur(schur_e, damping, frozen);
   for (std::size_t c = 0; c < channels_.size(); ++c)
-    B.row(static_cast<Eigen::Index>(c)) -= (channels_[c].Z * x.head(globals)).transpose();
+    B.row(c) -= (channels_[c].Z * x.head(globals)).transpose();
   return x;
 }
 

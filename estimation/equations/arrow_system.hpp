@@ -58,9 +58,7 @@ class ArrowSystem {
     Eigen::VectorXd x;   ///< bb^-1 e
   };
   /// @pre the channel is stored
-  const Channel& channel(Eigen::Index c) const {
-    return channels_[static_cast<std::size_t>(c - range_.first)];
-  }
+  const Channel& channel(Eigen::Index c) const { return channels_[c - range_.first]; }
   const Eigen::MatrixXd& M_globals() const noexcept { return M_; }
   const Eigen::VectorXd& e_globals() const noexcept { return e_; }
   const Eigen::MatrixXd& schur() const noexcept { return schur_; }

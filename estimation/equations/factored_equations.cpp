@@ -58,10 +58,9 @@ FactoredEquations::FactoredEquations(const FitProblem& problem, const FitParamet
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
   const Eigen::Index globals = problem.globals();
   add_work(problem, static_cast<double>(problem.channels()), problem.functions() + globals);
-  const Eigen::MatrixXd whole =
-      stacked_triangle(problem.channels(), {problem.threads, problem.team}, [&](Eigen::Index c) {
-        return triangle_of_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c);
-      });
+  const Eigen::MatrixXd whole = stacked_triangle(
+      problem.channels(), {problem.threads, problem.team},
+      [&](Eigen::Index c) { return triangle_of_channel(problem, beta, *group_of[c], c); });
   R_ = whole.topLeftCorner(globals, globals);
   r_ = whole.col(globals).head(globals);
   schur_ = R_.transpose() * R_;
@@ -96,7 +95,7 @@ bool factored_numerators(const FitProblem& problem, const BasisGroup& group, con
   Eigen::VectorXd of_channel = Eigen::VectorXd::Zero(block.members);
   std::atomic<bool> regular = true;
   for_each_task(problem.threads, static_cast<int>(block.members), [&](int member) {
-    const Eigen::Index c = group.channels[static_cast<std::size_t>(block.first_member + member)];
+    const Eigen::Index c = group.channels[block.first_member + member];
     const Eigen::VectorXd root = problem.weights(c).cwiseSqrt();
     if (!(root.maxCoeff() > 0.0)) return;
     Eigen::MatrixXd A(2 * problem.size(), problem.functions());

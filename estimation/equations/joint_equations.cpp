@@ -72,9 +72,8 @@ Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, Index
     im.leftCols(n_f) = group.F.im.middleRows(first, lines);
     for (std::size_t d = 0; d < columns_.size(); ++d) {
       const auto [function, parameter] = columns_[d];
-      const auto column = static_cast<Eigen::Index>(d);
-      re.col(n_f + function) += v[parameter] * group.D.re.col(column).segment(first, lines);
-      im.col(n_f + function) += v[parameter] * group.D.im.col(column).segment(first, lines);
+      re.col(n_f + function) += v[parameter] * group.D.re.col(d).segment(first, lines);
+      im.col(n_f + function) += v[parameter] * group.D.im.col(d).segment(first, lines);
     }
     Eigen::MatrixXcd part(coefficients.rows(), lines);
     part.real() = coefficients * re.transpose();
@@ -105,15 +104,14 @@ void JointEquations::add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first,
     const Eigen::MatrixXd of_group =
         re * group.F.re.middleRows(first, lines) + im * group.F.im.middleRows(first, lines);
     for (std::size_t r = 0; r < group.channels.size(); ++r)
-      e_b.row(group.channels[r]) += of_group.row(static_cast<Eigen::Index>(r));
+      e_b.row(group.channels[r]) += of_group.row(r);
     const Eigen::MatrixXd B = beta_.B(group.channels, Eigen::all);
     const Eigen::MatrixXd BX_re = re.transpose() * B;
     const Eigen::MatrixXd BX_im = im.transpose() * B;
     for (std::size_t d = 0; d < columns_.size(); ++d) {
       const auto [function, parameter] = columns_[d];
-      const auto column = static_cast<Eigen::Index>(d);
-      sum[parameter] += group.D.re.col(column).segment(first, lines).dot(BX_re.col(function)) +
-                        group.D.im.col(column).segment(first, lines).dot(BX_im.col(function));
+      sum[parameter] += group.D.re.col(d).segment(first, lines).dot(BX_re.col(function)) +
+                        group.D.im.col(d).segment(first, lines).dot(BX_im.col(function));
     }
   }
   if (problem_.delays() == 0) return;

@@ -79,7 +79,7 @@ NumeratorSums gram_sums(const FitProblem& problem, const BasisGroup& group,
 
 std::vector<ScaledNormalEquations> normal_equations(const Eigen::MatrixXd& FF, Eigen::Index n_f) {
   std::vector<ScaledNormalEquations> out;
-  out.reserve(static_cast<std::size_t>(FF.cols()));
+  out.reserve(FF.cols());
   for (Eigen::Index c = 0; c < FF.cols(); ++c) out.emplace_back(from_triangle(FF.col(c), n_f));
   return out;
 }
@@ -99,7 +99,7 @@ Digits solve_by_sums(const FitProblem& problem, const BasisGroup& group, const P
   const auto solve = [&](const Eigen::MatrixXd& right_sides) {
     Eigen::MatrixXd out(block.members, problem.functions());
     for (Eigen::Index r = 0; r < block.members; ++r)
-      out.row(r) = factors[static_cast<std::size_t>(r)].solve(right_sides.col(r)).transpose();
+      out.row(r) = factors[r].solve(right_sides.col(r)).transpose();
     return out;
   };
   B = solve(gram.FE);
@@ -154,8 +154,7 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
   visit_blocks(problem, groups, [&](const auto& group, const auto& pairs, const auto& block) {
     const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
     for_each_task(problem.threads, static_cast<int>(FF.cols()), [&](int r) {
-      visit(group.channels[static_cast<std::size_t>(block.first_member + r)],
-            from_triangle(FF.col(r), problem.functions()));
+      visit(group.channels[block.first_member + r], from_triangle(FF.col(r), problem.functions()));
     });
   });
 }
@@ -169,14 +168,12 @@ std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
   const Eigen::Index tiles = channel_tiles(problem.channels());
   const TileShare own = problem.team->share(tiles);
   enum : Eigen::Index { kSquares, kTried, kByFactors, kFailed, kNumbers };
-  std::vector<Eigen::VectorXd> parts(static_cast<std::size_t>(own.count),
-                                     Eigen::VectorXd::Zero(kNumbers));
+  std::vector<Eigen::VectorXd> parts(own.count, Eigen::VectorXd::Zero(kNumbers));
   Eigen::MatrixXd of_block;
   Eigen::MatrixXd by_factors;
   const auto solve = [&](const auto& group, const auto& pairs, const auto& block) {
-    const Eigen::Index tile =
-        group.channels[static_cast<std::size_t>(block.first_member)] / kTileChannels;
-    Eigen::VectorXd& part = parts[static_cast<std::size_t>(tile - own.first)];
+    const Eigen::Index tile = group.channels[block.first_member] / kTileChannels;
+    Eigen::VectorXd& part = parts[tile - own.first];
     if (part[kFailed] > 0.0) return;
     double squares = 0.0;
     const Digits digits = solve_by_sums(problem, group, pairs, block, of_block, squares);
@@ -196,7 +193,7 @@ std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
     }
     part[kSquares] += squares;
     for (Eigen::Index r = 0; r < block.members; ++r)
-      B.row(group.channels[static_cast<std::size_t>(block.first_member + r)]) = of_block.row(r);
+      B.row(group.channels[block.first_member + r]) = of_block.row(r);
   };
   visit_blocks(problem, groups, solve);
   const Eigen::VectorXd sum = problem.team->sum(tiles, kNumbers, parts);

@@ -90,18 +90,18 @@ void ResidueForm::project(const Eigen::VectorXd& a, const Eigen::MatrixXd& B,
   }
   weighted_low_rank(L, weight, rank_, phi_, psi_);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXcd> qr(psi_.transpose());
-  free_input_.assign(static_cast<std::size_t>(n_u_), 0);
+  free_input_.assign(n_u_, 0);
   Eigen::MatrixXcd held(rank_, rank_);
   for (Eigen::Index r = 0; r < rank_; ++r) {
     const Eigen::Index input = qr.colsPermutation().indices()[r];
     held.row(r) = psi_.row(input);
-    free_input_[static_cast<std::size_t>(input)] = -1 - r;
+    free_input_[input] = -1 - r;
   }
   psi_ = psi_ * inverse(held);
   phi_ = phi_ * held.transpose();
   Eigen::Index place = 0;
   for (Eigen::Index u = 0; u < n_u_; ++u) {
-    Eigen::Index& free = free_input_[static_cast<std::size_t>(u)];
+    Eigen::Index& free = free_input_[u];
     if (free < 0) {
       psi_.row(u).setZero();
       psi_(u, -1 - free) = 1.0;
@@ -125,7 +125,7 @@ Eigen::MatrixXd ResidueForm::numerators(const Eigen::VectorXd& a) const {
 /// Parameters in the order phi (output fastest), the free rows of psi (input fastest); complex ones
 /// as real part, imaginary part.
 Eigen::Index ResidueForm::psi_parameter(Eigen::Index input, Eigen::Index column) const {
-  const Eigen::Index place = free_input_[static_cast<std::size_t>(input)];
+  const Eigen::Index place = free_input_[input];
   return place < 0 ? -1 : n_y_ * rank_ + place + (n_u_ - rank_) * column;
 }
 

@@ -160,13 +160,13 @@ std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
   const FractionGram products(poles, x_, unit_circle_);
   const Team& team = channel_tiles(H_.rows()) > 1 ? *workers_.team : Team::one();
   const TileShare own = team.share(kShares);
-  std::vector<Eigen::VectorXd> shares(static_cast<std::size_t>(own.count));
+  std::vector<Eigen::VectorXd> shares(own.count);
   for_each_task(workers_.threads, static_cast<int>(own.count), [&](int task) {
     Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);
     for (Eigen::Index c = own.first + task; c < H_.rows(); c += kShares)
       S += remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
                               H_.row(c).transpose(), phi, own_, products);
-    shares[static_cast<std::size_t>(task)] = S.reshaped();
+    shares[task] = S.reshaped();
   });
   const Eigen::MatrixXd S = team.sum(kShares, (n + 1) * (n + 1), shares).reshaped(n + 1, n + 1);
   const Eigen::VectorXd scale = inverse_root(S.diagonal());

@@ -33,19 +33,19 @@ Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A) {
 
 Eigen::MatrixXd stacked_triangle(Eigen::Index count, const Workers& workers,
                                  const std::function<Eigen::MatrixXd(Eigen::Index)>& factor) {
-  std::vector<Eigen::MatrixXd> shares(static_cast<std::size_t>(std::min(kShares, count)));
+  std::vector<Eigen::MatrixXd> shares(std::min(kShares, count));
   const Team& divided = channel_tiles(count) > 1 ? *workers.team : Team::one();
   const TileShare own = divided.share(std::ssize(shares));
   for_each_task(workers.threads, static_cast<int>(own.count), [&](int task) {
     const Eigen::Index share = own.first + task;
-    Eigen::MatrixXd& R = shares[static_cast<std::size_t>(share)];
+    Eigen::MatrixXd& R = shares[share];
     R = factor(share);
     for (Eigen::Index i = share + kShares; i < count; i += kShares) append(R, factor(i));
   });
   for (int owner = 0; owner < divided.size(); ++owner) {
     const TileShare of_owner = divided.share(std::ssize(shares), owner);
     for (Eigen::Index i = of_owner.first; i < of_owner.first + of_owner.count; ++i)
-      broadcast(divided, owner, shares[static_cast<std::size_t>(i)]);
+      broadcast(divided, owner, shares[i]);
   }
   while (shares.size() > 1) {
     const std::size_t pairs = shares.size() / 2;

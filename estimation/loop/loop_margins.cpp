@@ -164,7 +164,7 @@ class MarginSearch {
     Eigen::Index least = 0;
     Eigen::VectorXd size(grid_hz_.size());
     for (Eigen::Index i = 0; i < size.size(); ++i)
-      size[i] = std::abs(curve(points_[static_cast<std::size_t>(i)], k) + offset);
+      size[i] = std::abs(curve(points_[i], k) + offset);
     size.minCoeff(&least);
     const double frequency_hz =
         boost::math::tools::brent_find_minima(

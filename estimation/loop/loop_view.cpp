@@ -17,8 +17,7 @@ void fill_radii(const ResponseGradient& gradient, const std::vector<LoopPoint>& 
   const Eigen::Index curves = view.loop.rows() + 1;
   Eigen::MatrixXd parts(gradient.parameters(), 2 * curves * count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    const Eigen::MatrixXcd g =
-        gradient.of(first + k, points[static_cast<std::size_t>(first + k)].weights);
+    const Eigen::MatrixXcd g = gradient.of(first + k, points[first + k].weights);
     parts.middleCols(2 * curves * k, curves) = g.real();
     parts.middleCols(2 * curves * k + curves, curves) = g.imag();
   }
@@ -45,8 +44,8 @@ LoopView loop_view(const AdditiveModel& model, const LoopController& controller,
   out.loop.resize(controller.actuators.cols(), N);
   out.determinant.resize(N);
   for (Eigen::Index k = 0; k < N; ++k) {
-    out.loop.col(k) = points[static_cast<std::size_t>(k)].loop;
-    out.determinant[k] = points[static_cast<std::size_t>(k)].determinant;
+    out.loop.col(k) = points[k].loop;
+    out.determinant[k] = points[k].determinant;
   }
   out.poles = loop_poles(model, controller);
   if (out.poles.stable()) out.margins = loop_margins(model, controller, covariance);

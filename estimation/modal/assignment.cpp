@@ -68,7 +68,7 @@ class Augmentation {
 
 std::vector<std::optional<Eigen::Index>> least_cost_pairs(const Eigen::MatrixXd& cost,
                                                           double limit) {
-  std::vector<std::optional<Eigen::Index>> column_of(static_cast<std::size_t>(cost.rows()));
+  std::vector<std::optional<Eigen::Index>> column_of(cost.rows());
   if (cost.size() == 0) return column_of;
   // Pairs at the limit mean "unpaired", so every row can be paired; rows are the shorter side.
   const bool turned = cost.rows() > cost.cols();
@@ -77,9 +77,9 @@ std::vector<std::optional<Eigen::Index>> least_cost_pairs(const Eigen::MatrixXd&
   Augmentation pairs(limited);
   for (Eigen::Index row = 1; row <= limited.rows(); ++row) pairs.add(row);
   for (Eigen::Index c = 0; c < limited.cols(); ++c) {
-    const Eigen::Index r = pairs.row_of[static_cast<std::size_t>(c + 1)] - 1;
+    const Eigen::Index r = pairs.row_of[c + 1] - 1;
     if (r < 0 || limited(r, c) >= limit) continue;
-    column_of[static_cast<std::size_t>(turned ? c : r)] = turned ? r : c;
+    column_of[turned ? c : r] = turned ? r : c;
   }
   return column_of;
 }

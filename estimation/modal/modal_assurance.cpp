@@ -19,8 +19,7 @@ struct Candidate {
 Eigen::MatrixXcd as_columns(const std::vector<ModeShape>& modes,
                             Eigen::VectorXcd ModeShape::*shape) {
   Eigen::MatrixXcd out(modes.empty() ? 0 : (modes[0].*shape).size(), std::ssize(modes));
-  for (std::size_t m = 0; m < modes.size(); ++m)
-    out.col(static_cast<Eigen::Index>(m)) = modes[m].*shape;
+  for (std::size_t m = 0; m < modes.size(); ++m) out.col(m) = modes[m].*shape;
   return out;
 }
 
@@ -31,11 +30,9 @@ std::vector<Candidate> candidates(const std::vector<ModeShape>& first,
   std::vector<Candidate> out;
   for (std::size_t a = 0; a < first.size(); ++a)
     for (std::size_t b = 0; b < second.size(); ++b) {
-      const auto row = static_cast<Eigen::Index>(a);
-      const auto column = static_cast<Eigen::Index>(b);
       const double difference =
           second[b].natural_frequency_hz / first[a].natural_frequency_hz - 1.0;
-      const ModePair pair{a, b, difference, output_mac(row, column), input_mac(row, column)};
+      const ModePair pair{a, b, difference, output_mac(a, b), input_mac(a, b)};
       const double mac = pair.output_mac * pair.input_mac;
       const double nearness = 1.0 - std::abs(difference) / kMostModeDifference;
       if (nearness >= 0.0 && mac >= kLeastMac) out.push_back({pair, mac * nearness});

@@ -36,8 +36,7 @@ double ModeTracks::common_change(const std::vector<SeenMode>& modes, const Pairs
   std::vector<double> changes;
   for (std::size_t m = 0; m < modes.size(); ++m)
     if (pairs[m])
-      changes.push_back(std::log(modes[m].frequency_hz) -
-                        tracks_[static_cast<std::size_t>(*pairs[m])].log_frequency);
+      changes.push_back(std::log(modes[m].frequency_hz) - tracks_[*pairs[m]].log_frequency);
   return changes.size() < kLeastCommon ? 0.0 : median(changes);
 }
 

@@ -54,9 +54,8 @@ Eigen::MatrixXcd ModelSpectra::spectra(const Eigen::MatrixXd& samples,
                                        const std::vector<Eigen::Index>& channels) {
   Eigen::MatrixXcd out(std::ssize(channels), std::ssize(lines_));
   for (Eigen::Index c = 0; c < out.rows(); ++c) {
-    const auto X = dft_.forward(samples.col(channels[static_cast<std::size_t>(c)]));
-    for (Eigen::Index k = 0; k < out.cols(); ++k)
-      out(c, k) = X[static_cast<std::size_t>(lines_[static_cast<std::size_t>(k)])];
+    const auto X = dft_.forward(samples.col(channels[c]));
+    for (Eigen::Index k = 0; k < out.cols(); ++k) out(c, k) = X[lines_[k]];
   }
   return out / static_cast<double>(dft_.length());
 }

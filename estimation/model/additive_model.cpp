@@ -60,7 +60,7 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
       evaluate_basis(through, shape, submodel.coefficients(), {}, basis);
       for (Eigen::Index k = 0; k < out.cols(); ++k)
         for (int m = 0; m <= shape.numerator_degree; ++m) {
-          const double* B = submodel.numerator[static_cast<std::size_t>(m)].data();
+          const double* B = submodel.numerator[m].data();
           for (auto c = begin; c != end; ++c) out(*c - first, k) += B[*c] * basis.value(k, m);
         }
     }

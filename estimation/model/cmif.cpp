@@ -185,8 +185,7 @@ std::vector<ModeCandidate> pick_modes(const FrfEstimate& frf, const PeakOptions&
     }
   }
   std::ranges::stable_sort(peaks, std::greater<>(), &Peak::prominence);
-  if (peaks.size() > static_cast<std::size_t>(options.most_peaks))
-    peaks.resize(static_cast<std::size_t>(options.most_peaks));
+  if (peaks.size() > static_cast<std::size_t>(options.most_peaks)) peaks.resize(options.most_peaks);
   std::vector<ModeCandidate> modes;
   for (const Peak& peak : peaks) modes.push_back(peak.mode);
   std::ranges::stable_sort(modes, {}, &ModeCandidate::frequency_hz);

@@ -82,10 +82,10 @@ std::string fault_of(const std::vector<SubmodelRequest>& requests, bool rigid_bo
 Submodel start_submodel(const FrfEstimate& frf, const SubmodelRequest& request) {
   std::vector<std::complex<double>> poles;
   for (int i = 0; i < request.pairs(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
     const std::vector<double>& zeta = request.damping_ratio;
-    const double damping = zeta.empty() ? kUsualDamping : zeta[std::min(at, zeta.size() - 1)];
-    for (const std::complex<double> pole : mode_poles(request.frequency_hz[at], damping))
+    const double damping =
+        zeta.empty() ? kUsualDamping : zeta[std::min<std::size_t>(i, zeta.size() - 1)];
+    for (const std::complex<double> pole : mode_poles(request.frequency_hz[i], damping))
       poles.push_back(pole);
   }
   if (request.has_real_pole())
@@ -94,7 +94,7 @@ Submodel start_submodel(const FrfEstimate& frf, const SubmodelRequest& request) 
   s.integrators = request.shape.integrators;
   const Eigen::VectorXd a = denominator_of(poles);
   s.denominator.insert(s.denominator.end(), a.begin(), a.end());
-  s.numerator.assign(static_cast<std::size_t>(request.shape.functions()),
+  s.numerator.assign(request.shape.functions(),
                      Eigen::MatrixXd::Zero(frf.n_outputs(), frf.n_inputs()));
   s.role = SubmodelRole::given;
   return s;

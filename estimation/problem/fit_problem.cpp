@@ -164,11 +164,10 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
   const std::vector<SubmodelPlace> places = submodel_places(problem);
   std::vector<std::optional<HoldEquivalent>> through(groups.size());
   for_each_task(problem.threads, static_cast<int>(groups.size()), [&](int g) {
-    const auto at = static_cast<std::size_t>(g);
-    BasisGroup& group = groups[at];
-    through[at].emplace(problem.lines, group.delay_s);
+    BasisGroup& group = groups[g];
+    through[g].emplace(problem.lines, group.delay_s);
     resize(problem, wanted, group);
-    group.fractions = fraction_columns(*through[at], problem.lines.omega_rad_s.maxCoeff(),
+    group.fractions = fraction_columns(*through[g], problem.lines.omega_rad_s.maxCoeff(),
                                        problem.shapes, beta.a, with_derivatives, problem.held);
   });
   const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
@@ -184,9 +183,9 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
 
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
                                                   const std::vector<BasisGroup>& groups) {
-  std::vector<const BasisGroup*> out(static_cast<std::size_t>(problem.channels()));
+  std::vector<const BasisGroup*> out(problem.channels());
   for (const BasisGroup& group : groups)
-    for (const Eigen::Index c : group.channels) out[static_cast<std::size_t>(c)] = &group;
+    for (const Eigen::Index c : group.channels) out[c] = &group;
   return out;
 }
 

@@ -36,9 +36,8 @@ std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most);
 template <typename Range, typename Task>
 auto ordered_sum(const std::vector<Range>& ranges, int threads, const Task& task) {
   std::vector<decltype(task(ranges[0]))> parts(ranges.size());
-  for_each_task(threads, static_cast<int>(ranges.size()), [&](int i) {
-    parts[static_cast<std::size_t>(i)] = task(ranges[static_cast<std::size_t>(i)]);
-  });
+  for_each_task(threads, static_cast<int>(ranges.size()),
+                [&](int i) { parts[i] = task(ranges[i]); });
   for (std::size_t i = 1; i < parts.size(); ++i) parts[0] += parts[i];
   return std::move(parts[0]);
 }

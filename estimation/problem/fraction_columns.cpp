@@ -71,7 +71,7 @@ void fill_base(const HoldEquivalent& through, bool squares, FractionColumns& out
   SplitMatrix q;
   for (Eigen::Index i = 0; i < out.pairs(); ++i)
     for (Eigen::Index other = 0; other < 2; ++other) {
-      const Complex lambda = out.lambda[static_cast<std::size_t>(i)];
+      const Complex lambda = out.lambda[i];
       through.reciprocal(other == 0 ? lambda : std::conj(lambda), q);
       const Eigen::Index column = 1 + 4 * i + 2 * other;
       out.base.col(column) = q.re;

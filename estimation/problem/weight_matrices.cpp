@@ -66,7 +66,7 @@ void require_factors(const FrfEstimate& frf) {
         throw IndefiniteWeights(
             fmt::format("weighting likelihood: residual_covariance of {} on {} is not positive; "
                         "exclude the output",
-                        frf.outputs.names[static_cast<std::size_t>(y)], line_name(frf, k)));
+                        frf.outputs.names[y], line_name(frf, k)));
 }
 
 /// Also scaled to unit diagonal, where the diagonal is not zero.

@@ -20,9 +20,8 @@ constexpr double kLeastTogether = 4.0;
 constexpr Eigen::Index kChannels = 256;  // smoothed at a time
 
 std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
-  return frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())] + " <- " +
-         frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())] + " at " +
-         std::to_string(frf.frequency_hz[k]) + " Hz";
+  return frf.outputs.names[c % frf.n_outputs()] + " <- " + frf.inputs.names[c / frf.n_outputs()] +
+         " at " + std::to_string(frf.frequency_hz[k]) + " Hz";
 }
 
 /// Neighbours on each side of a line whose mean has the scatter of a variance with kWantedDof.

@@ -109,7 +109,7 @@ class Share {
     Eigen::MatrixXd Z_re = Eigen::MatrixXd::Zero(n_, n_a_);
     Eigen::MatrixXd Z_im = Eigen::MatrixXd::Zero(n_, n_a_);
     for (Eigen::Index d = 0; d < n_d_; ++d) {
-      const auto [f, p] = columns_[static_cast<std::size_t>(d)];
+      const auto [f, p] = columns_[d];
       const auto D_re = group_.D.re.col(d).segment(first_, n_);
       const auto D_im = group_.D.im.col(d).segment(first_, n_);
       Z_re.col(p) += D_re.cwiseProduct(R_re.col(f)) + D_im.cwiseProduct(R_im.col(f));
@@ -192,8 +192,8 @@ void expand(const GroupProducts& products, const Eigen::MatrixXd& B, int threads
   products.DD.for_each_pair(threads, [&](std::size_t p) {
     if (!products.DD.is_reduced(p)) return;
     const auto [l, r] = products.DD.pairs()[p];
-    const auto left = B.col(products.method.columns[static_cast<std::size_t>(l)].function);
-    const auto right = B.col(products.method.columns[static_cast<std::size_t>(r)].function);
+    const auto left = B.col(products.method.columns[l].function);
+    const auto right = B.col(products.method.columns[r].function);
     sums.DD(l, r) += products.DD.weighted_sum(p, sums.S, left.cwiseProduct(right));
   });
 }
@@ -223,8 +223,8 @@ GroupProducts::GroupProducts(const EquationMethod& of_method, const BasisGroup& 
       DD(group.fractions, group.fractions.D, group.fractions.D,
          triangular_pairs(std::ssize(method.columns))) {
   for (const auto& [l, r] : DD.direct()) {
-    const Eigen::Index f = method.columns[static_cast<std::size_t>(l)].function;
-    const Eigen::Index g = method.columns[static_cast<std::size_t>(r)].function;
+    const Eigen::Index f = method.columns[l].function;
+    const Eigen::Index g = method.columns[r].function;
     functions[{f, g}].push_back({l, r});
   }
 }

@@ -9,7 +9,7 @@ namespace {
 void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
                  IndexRange lines, const std::vector<IndexRange>& ranges,
                  std::vector<Eigen::MatrixXd>& out) {
-  const SplitMatrix& left = X[static_cast<std::size_t>(c)];
+  const SplitMatrix& left = X[c];
   SplitMatrix right;
   Eigen::MatrixXd gram;
   for (Eigen::Index d = c; d < pairs.channels; ++d) {
@@ -17,7 +17,7 @@ void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, E
     if (weight.cols() == 0) continue;
     const auto w_re = weight.re.col(0).array();
     const auto w_im = weight.im.col(0).array();
-    const SplitMatrix& other = X[static_cast<std::size_t>(d)];
+    const SplitMatrix& other = X[d];
     right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
     right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
     for (std::size_t r = 0; r < ranges.size(); ++r) {
@@ -41,11 +41,10 @@ std::vector<Eigen::MatrixXd> pair_grams(const ChannelPairs& pairs,
     const Eigen::Index n = pairs.channels * range.count;
     out.emplace_back(Eigen::MatrixXd::Zero(n, n));
   }
-  std::vector<SplitMatrix> X(static_cast<std::size_t>(pairs.channels));
+  std::vector<SplitMatrix> X(pairs.channels);
   const auto channels = static_cast<int>(pairs.channels);
   for (const IndexRange lines : ranges_of(pairs.lines, kTileLines)) {
-    for_each_task(pairs.threads, channels,
-                  [&](int c) { X[static_cast<std::size_t>(c)] = pairs.columns(c, lines); });
+    for_each_task(pairs.threads, channels, [&](int c) { X[c] = pairs.columns(c, lines); });
     for_each_task(pairs.threads, channels,
                   [&](int c) { add_channel(pairs, X, c, lines, ranges, out); });
   }

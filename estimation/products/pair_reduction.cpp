@@ -64,8 +64,8 @@ Eigen::MatrixXi largest_orders(const FractionColumns& columns) {
   const auto beyond = [&](Complex rad_s) { return std::max(1.0, highest / std::norm(rad_s)); };
   for (Eigen::Index i = 0; i < orders.rows(); ++i)
     for (Eigen::Index j = 0; j <= i; ++j) {
-      const Complex l = columns.lambda[static_cast<std::size_t>(i)];
-      const Complex r = columns.lambda[static_cast<std::size_t>(j)];
+      const Complex l = columns.lambda[i];
+      const Complex r = columns.lambda[j];
       const double nearest = std::max(beyond(l + r), beyond(l + std::conj(r)));
       double squared_loss = beyond(l) * beyond(r);
       int order = 1;
@@ -101,8 +101,8 @@ PairReduction::PairReduction(const FractionColumns& columns,
   const Eigen::MatrixXi largest = largest_orders(columns);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (columns.pairs() > 0) {
-      const FractionColumn& X = left[static_cast<std::size_t>(pairs_[p].left)];
-      const FractionColumn& Y = right[static_cast<std::size_t>(pairs_[p].right)];
+      const FractionColumn& X = left[pairs_[p].left];
+      const FractionColumn& Y = right[pairs_[p].right];
       if (X.pair >= 0 && Y.pair >= 0 && order(X) + order(Y) <= largest(X.pair, Y.pair)) continue;
     }
     place_[p] = std::ssize(direct_);
@@ -111,14 +111,14 @@ PairReduction::PairReduction(const FractionColumns& columns,
 }
 
 PairReduction::Terms PairReduction::terms(std::size_t pair) const {
-  const FractionColumn& X = (*left_)[static_cast<std::size_t>(pairs_[pair].left)];
-  const FractionColumn& Y = (*right_)[static_cast<std::size_t>(pairs_[pair].right)];
+  const FractionColumn& X = (*left_)[pairs_[pair].left];
+  const FractionColumn& Y = (*right_)[pairs_[pair].right];
   // conj(X): its coefficients are conjugated too.
   const std::array<Complex, 2> x = {std::conj(X.simple), std::conj(X.squared)};
   const std::array<Complex, 2> y = {Y.simple, Y.squared};
   const std::array<Complex, 2> y_conj = {std::conj(Y.simple), std::conj(Y.squared)};
-  const Complex m = std::conj(columns_->place[static_cast<std::size_t>(X.pair)]);
-  const Complex l = columns_->place[static_cast<std::size_t>(Y.pair)];
+  const Complex m = std::conj(columns_->place[X.pair]);
+  const Complex l = columns_->place[Y.pair];
   // Of the four products of a pole of X and one of Y, two are the conjugates of these.
   Product with_l;
   Product with_conj;
@@ -160,7 +160,7 @@ Eigen::MatrixXd PairReduction::expand_rows(const Eigen::MatrixXd& direct, int th
                                            Row&& row) const {
   Eigen::MatrixXd out(direct.cols(), std::ssize(pairs_));
   for_each_pair(threads, [&](std::size_t p) {
-    auto to = out.col(static_cast<Eigen::Index>(p));
+    auto to = out.col(p);
     if (is_reduced(p))
       row(p, to);
     else

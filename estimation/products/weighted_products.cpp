@@ -18,8 +18,7 @@ void add_products(const Eigen::MatrixXd& V, const std::vector<ColumnPair>& pairs
   Eigen::MatrixXd products(V.cols(), std::min(kBlockPairs, n_pairs));
   for (Eigen::Index first = 0; first < n_pairs; first += kBlockPairs) {
     const Eigen::Index count = std::min(kBlockPairs, n_pairs - first);
-    for (Eigen::Index p = 0; p < count; ++p)
-      fill(pairs[static_cast<std::size_t>(first + p)], products.col(p));
+    for (Eigen::Index p = 0; p < count; ++p) fill(pairs[first + p], products.col(p));
     sums.middleRows(first, count).noalias() += products.leftCols(count).transpose() * V.transpose();
   }
 }
@@ -153,7 +152,7 @@ void add_pair_sums(const Eigen::MatrixXd& V_re, const Eigen::MatrixXd& V_im, con
 }
 
 std::vector<Eigen::Index> indices(Eigen::Index first, Eigen::Index count) {
-  std::vector<Eigen::Index> out(static_cast<std::size_t>(count));
+  std::vector<Eigen::Index> out(count);
   std::iota(out.begin(), out.end(), first);
   return out;
 }

@@ -29,9 +29,8 @@ std::string channels_without_weight(const FrfEstimate& frf, const FitOptions& op
   std::vector<std::string> names;
   for (Eigen::Index c = 0; c < W.rows(); ++c)
     if (W.row(c).maxCoeff() == 0.0)
-      names.push_back(fmt::format("({}, {})",
-                                  frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())],
-                                  frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
+      names.push_back(fmt::format("({}, {})", frf.outputs.names[c % frf.n_outputs()],
+                                  frf.inputs.names[c / frf.n_outputs()]));
   if (names.empty()) return {};
   return fmt::format(
       "weighting: {} (output, input) {} zero weight: free numerators there are undetermined; they "

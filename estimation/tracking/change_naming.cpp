@@ -68,9 +68,9 @@ class ChangeNaming {
   double narrowest(const PossibleChange& change) const {
     double least = std::numeric_limits<double>::infinity();
     for (Eigen::Index p = 0; p < response_.size(); ++p) {
-      const TrackedParameter& of = response_.parameters()[static_cast<std::size_t>(p)];
+      const TrackedParameter& of = response_.parameters()[p];
       if (of.kind != TrackedKind::frequency || change.direction[p] == 0.0) continue;
-      const Submodel& mode = response_.model().submodels[static_cast<std::size_t>(of.index)];
+      const Submodel& mode = response_.model().submodels[of.index];
       least = std::min(least, mode.damping_ratio());
     }
     return least;
@@ -80,7 +80,7 @@ class ChangeNaming {
   /// large change of the stage also changes the inputs.
   Explanation explain(const PossibleChange& change, const PeriodSpectra& mean,
                       double linear_size) const {
-    const TrackedParameter& of = response_.parameters()[static_cast<std::size_t>(change.index)];
+    const TrackedParameter& of = response_.parameters()[change.index];
     const bool one_mode = change.kind == ChangeKind::parameter &&
                           (of.kind == TrackedKind::frequency || of.kind == TrackedKind::damping);
     const auto predicted = [&](double size) {
@@ -139,7 +139,7 @@ class ChangeNaming {
       const Eigen::VectorXd& d = change.what.direction;
       const double information = d.dot(reference_.information() * d);
       const double deviation = std::sqrt(d.dot(reference_.covariance() * d)) / information;
-      change.size = mean_scores[static_cast<Eigen::Index>(h)] * deviation;
+      change.size = mean_scores[h] * deviation;
       change.deviation = deviation / std::sqrt(independent(since));
       double explained = change.size * change.size * information;
       if (keeps(since)) {
@@ -186,9 +186,7 @@ class ChangeNaming {
       const PossibleChange& what = scores_.possible()[h];
       if (what.kind != ChangeKind::noise) continue;
       const double deviation = reference_.noise_deviation()[what.index];
-      const double ratio = keeps(since)
-                               ? power[what.index]
-                               : 1.0 + deviation * mean_scores[static_cast<Eigen::Index>(h)];
+      const double ratio = keeps(since) ? power[what.index] : 1.0 + deviation * mean_scores[h];
       changes.push_back(change_of_scatter(
           what, since, ratio, 2.0 * independent(differences) / (deviation * deviation)));
     }

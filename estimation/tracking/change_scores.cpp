@@ -12,7 +12,7 @@ Eigen::VectorXd ChangeScores::of(const Eigen::VectorXd& gradient,
                                  const Eigen::VectorXd& noise_power) const {
   Eigen::VectorXd scores = Eigen::VectorXd::Zero(std::ssize(possible_));
   for (Eigen::Index h = 0; h < scores.size(); ++h) {
-    const PossibleChange& change = possible_[static_cast<std::size_t>(h)];
+    const PossibleChange& change = possible_[h];
     const Eigen::VectorXd& d = change.direction;
     if (change.kind != ChangeKind::noise)
       scores[h] = d.dot(gradient) / std::sqrt(d.dot(reference_.covariance() * d));
@@ -27,8 +27,8 @@ Eigen::MatrixXd ChangeScores::correlation() const {
   Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(H, H);
   for (Eigen::Index g = 0; g < H; ++g)
     for (Eigen::Index h = 0; h < H; ++h) {
-      const Eigen::VectorXd& a = possible_[static_cast<std::size_t>(g)].direction;
-      const Eigen::VectorXd& b = possible_[static_cast<std::size_t>(h)].direction;
+      const Eigen::VectorXd& a = possible_[g].direction;
+      const Eigen::VectorXd& b = possible_[h].direction;
       if (a.size() == 0 || b.size() == 0) continue;
       const Eigen::VectorXd Kb = reference_.covariance() * b;
       correlation(g, h) = a.dot(Kb) / std::sqrt(a.dot(reference_.covariance() * a) * b.dot(Kb));
@@ -39,7 +39,7 @@ Eigen::MatrixXd ChangeScores::correlation() const {
 Eigen::VectorXd ChangeScores::freedom() const {
   Eigen::VectorXd freedom(std::ssize(possible_));
   for (Eigen::Index h = 0; h < freedom.size(); ++h) {
-    const Eigen::VectorXd& d = possible_[static_cast<std::size_t>(h)].direction;
+    const Eigen::VectorXd& d = possible_[h].direction;
     freedom[h] = d.size() > 0 ? (d.array() != 0.0).select(reference_.freedom(), HUGE_VAL).minCoeff()
                               : reference_.periods() - 1.0;
   }

@@ -19,8 +19,7 @@ Eigen::MatrixXd shapes_of(const Submodel& submodel, double omega_rad_s) {
   const Eigen::Index n_u = submodel.numerator.front().cols();
   Eigen::MatrixXd all(submodel.numerator.front().rows(), n_u * std::ssize(submodel.numerator));
   for (Eigen::Index p = 0; p < std::ssize(submodel.numerator); ++p)
-    all.middleCols(p * n_u, n_u) =
-        submodel.numerator[static_cast<std::size_t>(p)] * std::pow(omega_rad_s, p);
+    all.middleCols(p * n_u, n_u) = submodel.numerator[p] * std::pow(omega_rad_s, p);
   Eigen::JacobiSVD<Eigen::MatrixXd> svd(all, Eigen::ComputeThinU);
   svd.setThreshold(kOfShape);
   return svd.matrixU().leftCols(svd.rank());

@@ -22,8 +22,7 @@ Eigen::MatrixXcd inverse_root(Eigen::MatrixXcd C) {
 
 Eigen::MatrixXcd LineNoise::inverse_factor(const Eigen::MatrixXcd& scatter, Eigen::Index k,
                                            double freedom) const {
-  return inverse_root(0.5 * (scatter + neighbours_[static_cast<std::size_t>(k)]) /
-                      (freedom + static_cast<double>(n_y_)));
+  return inverse_root(0.5 * (scatter + neighbours_[k]) / (freedom + static_cast<double>(n_y_)));
 }
 
 /// The scatter around a line, of n_y degrees of freedom, each neighbour scaled to the power of the line's own noise.
@@ -38,15 +37,14 @@ Eigen::MatrixXcd LineNoise::scatter_around(Eigen::Index k) const {
   const auto sum_of = [&](const auto& weight) {
     Eigen::MatrixXcd sum = Eigen::MatrixXcd::Zero(n_y_, n_y_);
     for (Eigen::Index l = first; l <= last; ++l) {
-      const Eigen::MatrixXcd& other = scatter_[static_cast<std::size_t>(l)];
+      const Eigen::MatrixXcd& other = scatter_[l];
       if (l != k) sum += weight(other) * other;
     }
     return sum;
   };
   Eigen::MatrixXcd around = sum_of([&](const Eigen::MatrixXcd&) { return share; });
   for (int pass = 0; pass < kPasses; ++pass) {
-    const Eigen::MatrixXcd root =
-        inverse_root((scatter_[static_cast<std::size_t>(k)] + around) / (freedom + n_y));
+    const Eigen::MatrixXcd root = inverse_root((scatter_[k] + around) / (freedom + n_y));
     around = sum_of([&](const Eigen::MatrixXcd& other) {
       const double power = (root * other * root.adjoint()).trace().real();
       return share * n_y * freedom / std::max(power, 1e-300);
@@ -67,8 +65,7 @@ LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
       1.0 / static_cast<double>(periods) + time.array().square() / time.squaredNorm();
   for (Eigen::Index k = 0; k < N; ++k) {
     Eigen::MatrixXcd deviation(n_y_, periods);
-    for (Eigen::Index t = 0; t < periods; ++t)
-      deviation.col(t) = residuals[static_cast<std::size_t>(t)].col(k);
+    for (Eigen::Index t = 0; t < periods; ++t) deviation.col(t) = residuals[t].col(k);
     const Eigen::VectorXcd mean = deviation.rowwise().mean();
     deviation.colwise() -= mean;
     const Eigen::VectorXcd slope = deviation * time / time.squaredNorm();
@@ -80,7 +77,7 @@ LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
   }
   for (Eigen::Index k = 0; k < N; ++k) {
     neighbours_.push_back(scatter_around(k));
-    inverse_factor_.push_back(inverse_factor(scatter_[static_cast<std::size_t>(k)], k, freedom));
+    inverse_factor_.push_back(inverse_factor(scatter_[k], k, freedom));
   }
 }
 
@@ -88,8 +85,7 @@ Eigen::MatrixXd LineNoise::whitened(const Eigen::Ref<const Eigen::MatrixXcd>& co
   const auto N = std::ssize(inverse_factor_);
   Eigen::MatrixXd out(2 * n_y_ * N, columns.cols());
   for (Eigen::Index k = 0; k < N; ++k) {
-    const Eigen::MatrixXcd white =
-        inverse_factor_[static_cast<std::size_t>(k)] * columns.middleRows(k * n_y_, n_y_);
+    const Eigen::MatrixXcd white = inverse_factor_[k] * columns.middleRows(k * n_y_, n_y_);
     out.middleRows(2 * k * n_y_, n_y_) = white.real();
     out.middleRows((2 * k + 1) * n_y_, n_y_) = white.imag();
   }

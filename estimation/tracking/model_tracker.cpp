@@ -80,7 +80,7 @@ Eigen::VectorXd ModelTracker::State::statistics() const {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(response.size() + response.model().n_outputs());
   for (std::size_t h = 0; h < scores->possible().size(); ++h) {
     const PossibleChange& change = scores->possible()[h];
-    const double value = detector->largest_by_hypothesis()[static_cast<Eigen::Index>(h)];
+    const double value = detector->largest_by_hypothesis()[h];
     if (change.kind == ChangeKind::parameter) out[change.index] = value;
     if (change.kind == ChangeKind::noise) out[response.size() + change.index] = value;
   }

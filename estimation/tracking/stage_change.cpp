@@ -15,7 +15,7 @@ std::vector<PossibleChange> possible_changes(const AdditiveModel& model,
   for (Eigen::Index p = 0; p < q; ++p) {
     if (information(p, p) * largest[p] * largest[p] < 1.0) continue;
     changes.push_back({ChangeKind::parameter, p, Eigen::VectorXd::Unit(q, p)});
-    const TrackedKind kind = parameters[static_cast<std::size_t>(p)].kind;
+    const TrackedKind kind = parameters[p].kind;
     if (kind == TrackedKind::frequency) frequencies[p] = 1.0;
     if (kind == TrackedKind::sensor_gain) gains[p] = 1.0;
   }
@@ -28,7 +28,7 @@ std::vector<PossibleChange> possible_changes(const AdditiveModel& model,
 
 bool is_of_gains(const PossibleChange& change, const std::vector<TrackedParameter>& parameters) {
   if (change.kind != ChangeKind::parameter) return change.kind == ChangeKind::all_gains;
-  const TrackedKind kind = parameters[static_cast<std::size_t>(change.index)].kind;
+  const TrackedKind kind = parameters[change.index].kind;
   return kind == TrackedKind::sensor_gain || kind == TrackedKind::actuator_gain;
 }
 
@@ -36,7 +36,7 @@ std::string describe(const PossibleChange& change, const std::vector<TrackedPara
                      const AdditiveModel& model) {
   switch (change.kind) {
     case ChangeKind::parameter:
-      return describe(parameters[static_cast<std::size_t>(change.index)], model);
+      return describe(parameters[change.index], model);
     case ChangeKind::all_frequencies:
       return "frequencies of all modes";
     case ChangeKind::all_gains:

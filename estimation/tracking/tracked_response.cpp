@@ -44,15 +44,13 @@ TrackedResponse::Changes TrackedResponse::changes(const Eigen::VectorXd& x) cons
   const auto submodels = std::ssize(model_.submodels);
   Changes out{Eigen::VectorXd::Zero(submodels), Eigen::VectorXd::Zero(submodels),
               Eigen::VectorXd::Ones(model_.n_outputs()), Eigen::VectorXd::Ones(model_.n_inputs())};
-  for (Eigen::Index p = 0; p < size(); ++p)
-    out.of(parameters_[static_cast<std::size_t>(p)]) += x[p];
+  for (Eigen::Index p = 0; p < size(); ++p) out.of(parameters_[p]) += x[p];
   return out;
 }
 
 Submodel TrackedResponse::changed(std::size_t submodel, const Changes& change) const {
   const Submodel& s = model_.submodels[submodel];
-  const auto i = static_cast<Eigen::Index>(submodel);
-  return s.is_mode() ? moved(s, change.frequency[i], change.damping[i]) : s;
+  return s.is_mode() ? moved(s, change.frequency[submodel], change.damping[submodel]) : s;
 }
 
 Eigen::MatrixXcd TrackedResponse::response_of(AdditiveModel model, const Changes& change) const {
@@ -93,8 +91,7 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
   const Eigen::Index N = lines();
   // Of every submodel, to its frequency and damping; of all together, to delay and gains.
   const auto submodels = std::ssize(model_.submodels);
-  std::vector<Eigen::MatrixXcd> by_frequency(static_cast<std::size_t>(submodels),
-                                             Eigen::MatrixXcd::Zero(n_y, N));
+  std::vector<Eigen::MatrixXcd> by_frequency(submodels, Eigen::MatrixXcd::Zero(n_y, N));
   std::vector<Eigen::MatrixXcd> by_damping = by_frequency;
   Eigen::MatrixXcd by_delay = Eigen::MatrixXcd::Zero(n_y, N);
   SubmodelBasis basis;
@@ -102,7 +99,6 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
        channels_by_delay(model_.input_delays_s(), model_.output_delays_s())) {
     const HoldEquivalent through(lines_, delay_s + change.delay_s);
     for (std::size_t i = 0; i < model_.submodels.size(); ++i) {
-      const auto m = static_cast<Eigen::Index>(i);
       const Submodel submodel = changed(i, change);
       const bool mode = submodel.is_mode();
       const SubmodelShape shape = shape_of(submodel);
@@ -110,8 +106,8 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
       for (int p = 0; p <= shape.numerator_degree; ++p) {
         Eigen::MatrixXd B = Eigen::MatrixXd::Zero(n_y, n_u);
         for (const Eigen::Index c : members)
-          B.data()[c] = submodel.numerator[static_cast<std::size_t>(p)].data()[c] *
-                        change.sensor[c % n_y] * change.actuator[c / n_y];
+          B.data()[c] =
+              submodel.numerator[p].data()[c] * change.sensor[c % n_y] * change.actuator[c / n_y];
         const Eigen::MatrixXcd BU = B * U;
         for (Eigen::Index k = 0; k < N; ++k) {
           by_delay.col(k) += BU.col(k) * basis.delay(k, p);
@@ -120,31 +116,31 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
           const std::complex<double> d2 = basis.gradient(k, 2 * p + 1);
           const double a1 = submodel.denominator[1];
           const double a2 = submodel.denominator[2];
-          by_damping[i].col(k) += BU.col(k) * (d1 * (a1 / (1.0 + change.damping[m])));
+          by_damping[i].col(k) += BU.col(k) * (d1 * (a1 / (1.0 + change.damping[i])));
           by_frequency[i].col(k) -=
               BU.col(k) *
-              ((d1 * a1 + 2.0 * d2 * a2 + 2.0 * basis.value(k, p)) / (1.0 + change.frequency[m]));
+              ((d1 * a1 + 2.0 * d2 * a2 + 2.0 * basis.value(k, p)) / (1.0 + change.frequency[i]));
         }
       }
     }
   }
   Eigen::VectorXd without_gains = x;
   for (Eigen::Index p = 0; p < size(); ++p) {
-    const TrackedKind kind = parameters_[static_cast<std::size_t>(p)].kind;
+    const TrackedKind kind = parameters_[p].kind;
     if (kind == TrackedKind::sensor_gain || kind == TrackedKind::actuator_gain)
       without_gains[p] = 0.0;
   }
   const Eigen::MatrixXcd P = at(without_gains);
   Eigen::MatrixXcd out(n_y * N, size());
   for (Eigen::Index p = 0; p < size(); ++p) {
-    const TrackedParameter& parameter = parameters_[static_cast<std::size_t>(p)];
+    const TrackedParameter& parameter = parameters_[p];
     auto column = out.col(p).reshaped(n_y, N);
     switch (parameter.kind) {
       case TrackedKind::frequency:
-        column = by_frequency[static_cast<std::size_t>(parameter.index)];
+        column = by_frequency[parameter.index];
         break;
       case TrackedKind::damping:
-        column = by_damping[static_cast<std::size_t>(parameter.index)];
+        column = by_damping[parameter.index];
         break;
       case TrackedKind::delay:
         column = by_delay;

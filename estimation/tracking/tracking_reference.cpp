@@ -124,8 +124,7 @@ std::vector<Eigen::MatrixXcd> TrackingReference::learn_beside(
 /// @param residuals without motions_   @returns those of the other modes
 Eigen::MatrixXcd TrackingReference::add_motions(const std::vector<Eigen::MatrixXcd>& residuals) {
   Eigen::MatrixXd scatter(motion_basis_.rows(), std::ssize(residuals));
-  for (Eigen::Index t = 0; t < scatter.cols(); ++t)
-    scatter.col(t) = whitened(residuals[static_cast<std::size_t>(t)]);
+  for (Eigen::Index t = 0; t < scatter.cols(); ++t) scatter.col(t) = whitened(residuals[t]);
   scatter.colwise() -= scatter.rowwise().mean().eval();
   Eigen::MatrixXcd others(motions_.rows(), 0);
   for (std::size_t i = 1; i < all_motions_.size(); ++i) {
@@ -198,8 +197,7 @@ void TrackingReference::settle(const PeriodSpectra& mean, const ForgettingFilter
 void TrackingReference::learn_noise_power(const std::vector<Eigen::MatrixXcd>& residuals) {
   Eigen::ArrayXXd power(residual_.rows(), std::ssize(residuals) - 1);
   for (Eigen::Index t = 0; t < power.cols(); ++t)
-    power.col(t) = noise_power(residuals[static_cast<std::size_t>(t + 1)] -
-                               residuals[static_cast<std::size_t>(t)]);
+    power.col(t) = noise_power(residuals[t + 1] - residuals[t]);
   const Eigen::ArrayXd mean = power.rowwise().mean();
   const Eigen::ArrayXd scatter = (power.colwise() - mean).square().rowwise().mean();
   // At least that of independent lines; 1.5 times over many periods, because neighbours share one.

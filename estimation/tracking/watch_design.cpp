@@ -70,8 +70,7 @@ std::vector<LineSensitivity> line_sensitivities(const TrackedResponse& response,
   std::vector<LineSensitivity> out(U.size());
   for (Index j = 0; j < U.front().cols(); ++j) {
     Eigen::MatrixXcd of_signal(U.front().rows(), std::ssize(U));
-    for (Index k = 0; k < of_signal.cols(); ++k)
-      of_signal.col(k) = U[static_cast<std::size_t>(k)].col(j);
+    for (Index k = 0; k < of_signal.cols(); ++k) of_signal.col(k) = U[k].col(j);
     const Eigen::MatrixXcd J = response.derivatives(at_model, of_signal);
     for (std::size_t k = 0; k < U.size(); ++k)
       out[k].emplace_back(noise[k].matrixL().solve(J.middleRows(static_cast<Index>(k) * n_y, n_y)));
@@ -93,7 +92,7 @@ std::vector<Eigen::MatrixXcd> line_motions(const TrackedResponse& response,
 
 Eigen::MatrixXcd sensitivity(const LineSensitivity& line, const Eigen::VectorXcd& r) {
   Eigen::MatrixXcd J = r[0] * line[0];
-  for (std::size_t j = 1; j < line.size(); ++j) J += r[static_cast<Index>(j)] * line[j];
+  for (std::size_t j = 1; j < line.size(); ++j) J += r[j] * line[j];
   return J;
 }
 
@@ -115,8 +114,7 @@ InformativePower most_informative_power(const std::vector<Eigen::MatrixXd>& info
   out.power /= (bounds * out.power).maxCoeff();
   for (int i = 0;; ++i) {
     Eigen::MatrixXd M = prior;
-    for (Index k = 0; k < out.power.size(); ++k)
-      M += out.power[k] * information[static_cast<std::size_t>(k)];
+    for (Index k = 0; k < out.power.size(); ++k) M += out.power[k] * information[k];
     const Eigen::MatrixXd inverse = inverse_of(M);
     const Eigen::ArrayXd variance = inverse.diagonal()(wanted);
     const Eigen::ArrayXd ratio = variance / scale(wanted).array().square();
@@ -124,8 +122,7 @@ InformativePower most_informative_power(const std::vector<Eigen::MatrixXd>& info
     out.gradient_root = inverse(Eigen::all, wanted) * (w / variance).sqrt().matrix().asDiagonal();
     const Eigen::MatrixXd W = out.gradient_root * out.gradient_root.transpose();
     Eigen::ArrayXd d(out.power.size());
-    for (Index k = 0; k < d.size(); ++k)
-      d[k] = W.cwiseProduct(information[static_cast<std::size_t>(k)]).sum();
+    for (Index k = 0; k < d.size(); ++k) d[k] = W.cwiseProduct(information[k]).sum();
     const Eigen::ArrayXd price = bounds.transpose() * lambda;
     // The weighted mean of ln variance is below its maximum; by duality, no power lowers that mean by more than
     // max_k (d_k / price_k) sum lambda - d^T p.
@@ -145,8 +142,7 @@ Eigen::VectorXcd most_informative_phases(const LineSensitivity& line, const Eige
                                          Eigen::VectorXcd r) {
   // tr(V^T M_k V) = 2 |Z r|^2
   Eigen::MatrixXcd Z(line.front().rows() * V.cols(), r.size());
-  for (Index j = 0; j < r.size(); ++j)
-    Z.col(j) = (line[static_cast<std::size_t>(j)] * V).reshaped();
+  for (Index j = 0; j < r.size(); ++j) Z.col(j) = (line[j] * V).reshaped();
   const Eigen::MatrixXcd Q = Z.adjoint() * Z;
   constexpr int kSweeps = 5;
   for (int sweep = 0; sweep < kSweeps; ++sweep)

@@ -66,9 +66,8 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   pairs.lines = noise.correlation.known() ? problem.size() : 0;
   pairs.threads = problem.threads;
   pairs.columns = [&](Eigen::Index c, IndexRange lines) {
-    const auto at = static_cast<std::size_t>(c);
-    const Eigen::MatrixXd& inverse = known.channels[at].equations_inverse;
-    const auto& [F_re, F_im] = group_of[at]->F;
+    const Eigen::MatrixXd& inverse = known.channels[c].equations_inverse;
+    const auto& [F_re, F_im] = group_of[c]->F;
     return noise_scaled(problem, noise, c, lines,
                         {F_re.middleRows(lines.first, lines.count) * inverse,
                          F_im.middleRows(lines.first, lines.count) * inverse});
@@ -104,7 +103,7 @@ std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ende
     Eigen::MatrixXd likelihood = Eigen::MatrixXd::Zero(nu[r].rows(), nu[r].cols());
     for (Eigen::Index c = 0; c < problem.channels(); ++c) {
       const auto own = Eigen::seqN(c, n, problem.channels());
-      const ChannelCovariance& channel = known.channels[static_cast<std::size_t>(c)];
+      const ChannelCovariance& channel = known.channels[c];
       Z(own, Eigen::all) = channel.Z.middleRows(first, n);
       cross(Eigen::all, own) = channel.cross.middleCols(first, n);
       nu[r](own, own) = channel.own.block(first, first, n, n);
@@ -160,7 +159,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
   pairs.lines = problem.size();
   pairs.threads = problem.threads;
   pairs.columns = [&](Eigen::Index c, IndexRange lines) {
-    return group_of[static_cast<std::size_t>(c)]->F.middle_rows(lines.first, lines.count);
+    return group_of[c]->F.middle_rows(lines.first, lines.count);
   };
   pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
     return fit.matrices->between(c, d, lines.first, lines.count);
@@ -276,7 +275,7 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
   covariance.response_variance.resize(problem.channels(), problem.size());
   covariance.response_radius.resize(problem.channels(), problem.size());
   for_each_task(problem.threads, static_cast<int>(problem.channels()), [&](int c) {
-    const BasisGroup& group = *group_of[static_cast<std::size_t>(c)];
+    const BasisGroup& group = *group_of[c];
     const std::vector<Eigen::Index> own = own_parameters(problem, c);
     const Eigen::MatrixXd C = covariance.sandwich(own, own);
     for (const IndexRange lines : ranges_of(problem.size(), kTileLines)) {

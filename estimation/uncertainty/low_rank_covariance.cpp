@@ -51,9 +51,9 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
     inputs.parameters.push_back(parameters_of(problem, beta, factors, n_y * u, n_y));
   inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
     const Eigen::Index c = y + n_y * u;
-    return noise_scaled(problem, noise, c, lines,
-                        free_columns(problem, beta, factors, *group_of[static_cast<std::size_t>(c)],
-                                     c, inputs.parameters[static_cast<std::size_t>(u)], lines));
+    return noise_scaled(
+        problem, noise, c, lines,
+        free_columns(problem, beta, factors, *group_of[c], c, inputs.parameters[u], lines));
   };
   return correlated_gram(problem, noise.correlation, factors.size(), inputs);
 }
@@ -139,7 +139,7 @@ ParameterCovariance low_rank_covariance(const FitProblem& problem, const FitPara
   if (with_response) out.response_variance.resize(problem.channels(), problem.size());
   for (const BasisGroup& group : groups)
     for_each_task(problem.threads, static_cast<int>(group.channels.size()), [&](int r) {
-      const Eigen::Index c = group.channels[static_cast<std::size_t>(r)];
+      const Eigen::Index c = group.channels[r];
       const std::vector<Eigen::Index> own = parameters_of(problem, beta, factors, c, 1);
       out.numerator_variance.row(c) = numerator_variances(problem, beta, factors, c, C).transpose();
       if (!with_response) return;

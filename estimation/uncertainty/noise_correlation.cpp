@@ -66,11 +66,11 @@ class GramOfTiles {
   }
 
   void read(int u, IndexRange lines) {
-    OutputColumns& X = X_[static_cast<std::size_t>(u)];
-    X.resize(static_cast<std::size_t>(problem_.n_outputs));
+    OutputColumns& X = X_[u];
+    X.resize(problem_.n_outputs);
     for (std::size_t y = 0; y < X.size(); ++y)
       X[y] = inputs_.columns(u, static_cast<Eigen::Index>(y), lines);
-    Y_[static_cast<std::size_t>(u)] = correlation_.of_outputs(X, lines);
+    Y_[u] = correlation_.of_outputs(X, lines);
   }
 
   OutputColumns with_other_inputs(int u, IndexRange lines) const {
@@ -84,12 +84,11 @@ class GramOfTiles {
   }
 
   void multiply(int u, IndexRange lines) {
-    const auto input = static_cast<std::size_t>(u);
-    const OutputColumns& X = X_[input];
+    const OutputColumns& X = X_[u];
     OutputColumns together;
     if (correlation_.between_inputs()) together = with_other_inputs(u, lines);
-    const OutputColumns& Z = together.empty() ? Y_[input] : together;
-    Eigen::MatrixXd& K = K_[input];
+    const OutputColumns& Z = together.empty() ? Y_[u] : together;
+    Eigen::MatrixXd& K = K_[u];
     if (K.size() == 0) K.setZero(X.front().cols(), Z.front().cols());
     for (std::size_t y = 0; y < Z.size(); ++y) {
       K.noalias() += X[y].re.transpose() * Z[y].re;
@@ -124,9 +123,8 @@ OutputColumns NoiseCorrelation::of_outputs(const OutputColumns& X, IndexRange li
     for (Eigen::Index z = 0; z < n_y; ++z) {
       if (z == y) continue;
       const SplitMatrix rho = R(y, z, lines);
-      const SplitMatrix& from = X[static_cast<std::size_t>(z)];
-      for (Eigen::Index p = 0; p < from.cols(); ++p)
-        add_scaled(rho, from, p, Y[static_cast<std::size_t>(y)], p);
+      const SplitMatrix& from = X[z];
+      for (Eigen::Index p = 0; p < from.cols(); ++p) add_scaled(rho, from, p, Y[y], p);
     }
   return Y;
 }

@@ -67,25 +67,23 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
-    cross[static_cast<std::size_t>(c)].setZero(problem.globals(), problem.functions());
+    cross[c].setZero(problem.globals(), problem.functions());
   CorrelatedColumns inputs;
   inputs.first_input = range.first / n_y;
-  inputs.parameters.assign(static_cast<std::size_t>(range.count / n_y),
-                           indices(0, problem.globals()));
+  inputs.parameters.assign(range.count / n_y, indices(0, problem.globals()));
   inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
     const Eigen::Index c = range.first + n_y * u + y;
-    return noise_scaled(problem, noise, c, lines,
-                        projected_columns(problem, beta, *group_of[static_cast<std::size_t>(c)],
-                                          part.gn.channel(c).Z, c, lines));
+    return noise_scaled(
+        problem, noise, c, lines,
+        projected_columns(problem, beta, *group_of[c], part.gn.channel(c).Z, c, lines));
   };
   inputs.use = [&](Eigen::Index u, IndexRange lines, const OutputColumns& Z) {
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const Eigen::Index c = range.first + n_y * u + y;
-      const auto at = static_cast<std::size_t>(c);
-      const SplitMatrix& of_output = Z[static_cast<std::size_t>(y)];
+      const SplitMatrix& of_output = Z[y];
       const SplitMatrix F = noise_scaled(problem, noise, c, lines,
-                                         group_of[at]->F.middle_rows(lines.first, lines.count));
-      cross[at] += of_output.re.transpose() * F.re + of_output.im.transpose() * F.im;
+                                         group_of[c]->F.middle_rows(lines.first, lines.count));
+      cross[c] += of_output.re.transpose() * F.re + of_output.im.transpose() * F.im;
     }
   };
   return correlated_gram(problem, noise.correlation, problem.globals(), inputs);
@@ -175,7 +173,7 @@ void leave_unknown(const FitProblem& problem, Eigen::Index c, ParameterCovarianc
   if (!out.parts) return;
   const Eigen::Index n_f = problem.functions();
   const Eigen::Index globals = problem.globals();
-  out.parts->channels[static_cast<std::size_t>(c)] = {
+  out.parts->channels[c] = {
       Eigen::MatrixXd::Constant(n_f, n_f, unknown), Eigen::MatrixXd::Zero(globals, n_f),
       Eigen::MatrixXd::Zero(n_f, globals), Eigen::MatrixXd::Constant(n_f, n_f, unknown)};
 }
@@ -263,7 +261,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
                                                : std::size_t{0});
   for (Eigen::Index p = own.first; p < own.first + own.count; ++p) {
-    const IndexRange part = parts[static_cast<std::size_t>(p)];
+    const IndexRange part = parts[p];
     make_equations(part);
     Eigen::VectorXd& sum = sums.emplace_back(Eigen::VectorXd::Zero(2 * globals * globals + 1));
     if (!equations->gn.regular()) {
@@ -294,7 +292,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   bool all_determined = true;
   for (Eigen::Index p = own.first; p < own.first + own.count && all_determined; ++p) {
-    const IndexRange part = parts[static_cast<std::size_t>(p)];
+    const IndexRange part = parts[p];
     if (own.count > 1) make_equations(part);
     all_determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
       const ArrowSystem::Channel& gn = equations->gn.channel(c);
@@ -305,13 +303,12 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
       }
       Eigen::MatrixXd bb_inverse;
       if (!solve_scaled(gn.bb, unit, bb_inverse)) return false;
-      const auto at = static_cast<std::size_t>(c);
       const Eigen::MatrixXd& k_ab =
-          correlate ? cross[at] : Eigen::MatrixXd(k.ab - gn.Z.transpose() * k.bb);
+          correlate ? cross[c] : Eigen::MatrixXd(k.ab - gn.Z.transpose() * k.bb);
       ChannelCovariance channel = {half * bb_inverse * k.bb * bb_inverse,
                                    half * inverse * k_ab * bb_inverse, gn.Z, bb_inverse};
-      fill_channel(problem, beta, *group_of[at], c, channel, out);
-      if (out.parts) out.parts->channels[at] = std::move(channel);
+      fill_channel(problem, beta, *group_of[c], c, channel, out);
+      if (out.parts) out.parts->channels[c] = std::move(channel);
       return true;
     });
   }
@@ -366,8 +363,7 @@ ParameterCovariance joint_covariance(const FitProblem& problem, const FitParamet
         if (!solve_scaled(arrow.bb, unit, own)) return false;
         const Eigen::MatrixXd Z_c =
             Z(Eigen::seqN(c, problem.functions(), problem.channels()), Eigen::all);
-        fill_channel(problem, beta, *group_of[static_cast<std::size_t>(c)], c,
-                     {half * own, none, Z_c, own}, out);
+        fill_channel(problem, beta, *group_of[c], c, {half * own, none, Z_c, own}, out);
         return true;
       });
   if (!determined) return {};

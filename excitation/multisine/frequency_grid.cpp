@@ -129,7 +129,7 @@ Eigen::VectorXd FrequencyGrid::frequency_hz() const {
   Eigen::VectorXd frequency(size());
   // Not line * resolution_hz(): one rounding instead of two.
   for (Eigen::Index k = 0; k < size(); ++k) {
-    frequency[k] = lines_[static_cast<std::size_t>(k)] * sample_rate_hz_ / samples_per_period_;
+    frequency[k] = lines_[k] * sample_rate_hz_ / samples_per_period_;
   }
   return frequency;
 }

@@ -23,7 +23,7 @@ LineSpectrum::LineSpectrum(const FrequencyGrid& grid, int oversampling)
 
 Eigen::VectorXd LineSpectrum::samples(const Eigen::Ref<const Eigen::VectorXcd>& coefficients) {
   for (std::size_t k = 0; k < lines_.size(); ++k) {
-    half_spectrum_[lines_[k]] = coefficients[static_cast<Eigen::Index>(k)];
+    half_spectrum_[lines_[k]] = coefficients[k];
   }
   return dft_.inverse(half_spectrum_);
 }
@@ -32,8 +32,7 @@ Eigen::VectorXcd LineSpectrum::coefficients(const Eigen::Ref<const Eigen::Vector
   const std::span<const std::complex<double>> spectrum = dft_.forward(samples);
   Eigen::VectorXcd coefficients(std::ssize(lines_));
   for (std::size_t k = 0; k < lines_.size(); ++k) {
-    coefficients[static_cast<Eigen::Index>(k)] =
-        spectrum[static_cast<std::size_t>(lines_[k])] / static_cast<double>(dft_.length());
+    coefficients[k] = spectrum[lines_[k]] / static_cast<double>(dft_.length());
   }
   return coefficients;
 }

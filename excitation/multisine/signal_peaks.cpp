@@ -52,7 +52,7 @@ class HalfLines {
  private:
   static constexpr Index kPoints = 4;
 
-  Index at(Index node) const { return at_[static_cast<std::size_t>(node)]; }
+  Index at(Index node) const { return at_[node]; }
   std::complex<double> known(Index node, const Eigen::Ref<const Eigen::VectorXcd>& r) const {
     const Index below = signal_.below_band.cols();
     return node < below ? (signal_.below_band.col(node).transpose() * r).value()
@@ -96,8 +96,7 @@ struct SignalPredictor::Work {
       std::ranges::fill(input, 0.0);
       std::copy(r.data(), r.data() + N, input.begin());
       const auto forward = twofold.forward();
-      for (Index i = 0; i < begun.cols(); ++i)
-        begun(p, i) = forward[static_cast<std::size_t>(i)] / (2.0 * N);
+      for (Index i = 0; i < begun.cols(); ++i) begun(p, i) = forward[i] / (2.0 * N);
     }
     return begun;
   }

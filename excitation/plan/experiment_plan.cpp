@@ -51,7 +51,7 @@ void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size
     if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
       throw std::invalid_argument(fmt::format(
           "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
-          place, axis.channel, axis.shape[k], grid.lines()[static_cast<std::size_t>(k)]));
+          place, axis.channel, axis.shape[k], grid.lines()[k]));
     }
   }
 }
@@ -114,7 +114,7 @@ MatrixXcd mixing_matrix(ExcitationScheme scheme, int n) {
 
 /// Amplitudes of rms 1 on the lines of the axis.
 Eigen::VectorXd axis_amplitude(const FrequencyGrid& grid, const ExperimentSpec& spec, int axis) {
-  Eigen::VectorXd shape = spec.axes[static_cast<std::size_t>(axis)].shape;
+  Eigen::VectorXd shape = spec.axes[axis].shape;
   if (spec.scheme != ExcitationScheme::zippered) return unit_rms_amplitude(grid, shape);
   if (shape.size() == 0) shape.setOnes(grid.size());
   for (Index k = 0; k < grid.size(); ++k)
@@ -127,7 +127,7 @@ MatrixXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec, i
   const int axes = static_cast<int>(spec.axes.size());
   MatrixXd phase_rad(axes, grid.size());
   for (int p = 0; p < axes; ++p) {
-    const Eigen::VectorXd& given = spec.axes[static_cast<std::size_t>(p)].phase_rad;
+    const Eigen::VectorXd& given = spec.axes[p].phase_rad;
     if (given.size() > 0) {
       for (Index k = 0; k < grid.size(); ++k)
         phase_rad(p, k) = positive_phase_rad(std::polar(1.0, given[k]));
@@ -145,10 +145,8 @@ MatrixXd draw_phase_rad(const FrequencyGrid& grid, const ExperimentSpec& spec, i
 /// All phases of a plan with crest reduction, on all cores. Each realization is reduced separately, so the
 /// result does not depend on the distribution over threads.
 std::vector<MatrixXd> reduced_phases(const FrequencyGrid& grid, const ExperimentSpec& spec) {
-  std::vector<MatrixXd> phases(static_cast<std::size_t>(spec.realizations));
-  for_each_task(0, spec.realizations, [&](int m) {
-    phases[static_cast<std::size_t>(m)] = draw_phase_rad(grid, spec, m);
-  });
+  std::vector<MatrixXd> phases(spec.realizations);
+  for_each_task(0, spec.realizations, [&](int m) { phases[m] = draw_phase_rad(grid, spec, m); });
   return phases;
 }
 
@@ -203,7 +201,7 @@ void ExperimentPlan::check_run(RunId run) const {
 
 MatrixXd ExperimentPlan::phase_rad(int realization) const {
   check_run({realization, 0});
-  if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[static_cast<std::size_t>(realization)];
+  if (!reduced_phase_rad_.empty()) return reduced_phase_rad_[realization];
   return draw_phase_rad(grid_, spec_, realization);
 }
 
@@ -229,7 +227,7 @@ void ExperimentPlan::set_amplitude() {
   Eigen::VectorXd level(axes());
   for (int p = 0; p < axes(); ++p) {
     amplitude_.row(p) = axis_amplitude(grid_, spec_, p).transpose();
-    level[p] = spec_.axes[static_cast<std::size_t>(p)].level;
+    level[p] = spec_.axes[p].level;
   }
   if (spec_.scaling == AmplitudeScaling::peak) {
     Eigen::VectorXd peak = Eigen::VectorXd::Zero(axes());

@@ -28,7 +28,7 @@ bool has_paley_two(int size) {
 MatrixXd jacobsthal(int q) {
   VectorXd character = VectorXd::Constant(q, -1.0);
   character[0] = 0.0;
-  for (long long i = 1; i < q; ++i) character[static_cast<Eigen::Index>(i * i % q)] = 1.0;
+  for (long long i = 1; i < q; ++i) character[i * i % q] = 1.0;
   MatrixXd Q(q, q);
   for (int i = 0; i < q; ++i) {
     for (int j = 0; j < q; ++j) Q(i, j) = character[(i - j + q) % q];

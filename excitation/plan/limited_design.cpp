@@ -74,19 +74,16 @@ class Designer {
   }
 
   LimitedDesign design() {
-    std::vector<MatrixXd> phases(static_cast<std::size_t>(spec_.experiment.realizations));
-    for (int m = 0; m < spec_.experiment.realizations; ++m)
-      phases[static_cast<std::size_t>(m)] = plan_.phase_rad(m);
+    std::vector<MatrixXd> phases(spec_.experiment.realizations);
+    for (int m = 0; m < spec_.experiment.realizations; ++m) phases[m] = plan_.phase_rad(m);
     for (int turn = 0; turn < kTurns; ++turn) {
       set_amplitude();
       phases.front() = reduced(phases.front());
       take_crest_factors(predicted(phases.front()));
     }
     set_amplitude();
-    for_each_task(0, static_cast<int>(phases.size()), [&](int m) {
-      const auto i = static_cast<std::size_t>(m);
-      phases[i] = reduced(phases[i]);
-    });
+    for_each_task(0, static_cast<int>(phases.size()),
+                  [&](int m) { phases[m] = reduced(phases[m]); });
     // Each signal has a worst realization. Limiting that signal alone costs less variance than scaling all.
     for (int turn = 0; turn < kLastTurns; ++turn) {
       take_crest_factors(predicted_all(phases));
@@ -133,7 +130,7 @@ class Designer {
       MatrixXd bounds(std::ssize(spec_.signals), size * lines);
       Eigen::VectorXd cost(size * lines);
       for (Index i = 0; i < size; ++i) {
-        const Index p = group[static_cast<std::size_t>(i)];
+        const Index p = group[i];
         cost.segment(i * lines, lines) = cost_.row(p).transpose();
         for (std::size_t s = 0; s < spec_.signals.size(); ++s)
           bounds.block(static_cast<Index>(s), i * lines, 1, lines) =
@@ -141,8 +138,7 @@ class Designer {
       }
       const Eigen::VectorXd power = least_variance_power(cost, bounds).power;
       for (Index i = 0; i < size; ++i)
-        amplitude_.row(group[static_cast<std::size_t>(i)]) =
-            power.segment(i * lines, lines).cwiseSqrt().transpose();
+        amplitude_.row(group[i]) = power.segment(i * lines, lines).cwiseSqrt().transpose();
     }
     amplitude_ = (plan_.amplitude().array() > 0.0).select(amplitude_, 0.0).eval();
   }
@@ -168,9 +164,8 @@ class Designer {
 
   Peaks predicted_all(const std::vector<MatrixXd>& phases) const {
     std::vector<Peaks> peaks(phases.size());
-    for_each_task(0, static_cast<int>(phases.size()), [&](int m) {
-      peaks[static_cast<std::size_t>(m)] = predicted(phases[static_cast<std::size_t>(m)]);
-    });
+    for_each_task(0, static_cast<int>(phases.size()),
+                  [&](int m) { peaks[m] = predicted(phases[m]); });
     Peaks& all = peaks.front();
     for (const Peaks& more : peaks)
       for (std::size_t g = 0; g < all.size(); ++g)
@@ -210,7 +205,7 @@ class Designer {
     ExperimentSpec experiment = spec_.experiment;
     experiment.scaling = AmplitudeScaling::rms;
     for (std::size_t p = 0; p < experiment.axes.size(); ++p) {
-      const Eigen::VectorXd A = amplitude_.row(static_cast<Index>(p)).transpose();
+      const Eigen::VectorXd A = amplitude_.row(p).transpose();
       experiment.axes[p].shape = A;
       experiment.axes[p].level = A.norm() / std::sqrt(2.0);
     }

@@ -79,7 +79,7 @@ void add_channels(std::string& text, const char* kind, const std::vector<Channel
                         fmt::join(entries, ", \\\n  "));
   };
   add_table("NAMES", [&](std::size_t i) { return fmt::format("\"{}\"", channels[i].name); });
-  add_table("LIMITS", [&](std::size_t i) { return number(limits[static_cast<Eigen::Index>(i)]); });
+  add_table("LIMITS", [&](std::size_t i) { return number(limits[i]); });
   add_table("PER_COUNT", [&](std::size_t i) { return number(scales[i].si_per_count); });
 }
 

@@ -82,8 +82,7 @@ void CanStage::start(std::uint64_t run_seed, Inputs& first) {
   if ((first.valid & all_sensors()) != all_sensors()) {
     stop();
     refuse(PeerStatus::first_sample_missing, fmt::format("can: {}", transport_->name(0)),
-           fmt::format("; check sensor '{}'",
-                       info_.sensors[static_cast<std::size_t>(std::countr_one(first.valid))].name));
+           fmt::format("; check sensor '{}'", info_.sensors[std::countr_one(first.valid)].name));
   }
   running_ = true;
   stamped_ns_ = arrival_ns_;

@@ -56,9 +56,7 @@ class RegisterBlock {
   }
 
  private:
-  constexpr Word& at(int address) const noexcept {
-    return words_[static_cast<std::size_t>(address - first_)];
-  }
+  constexpr Word& at(int address) const noexcept { return words_[address - first_]; }
 
   int first_;
   std::span<Word> words_;

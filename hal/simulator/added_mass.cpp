@@ -15,8 +15,7 @@ std::vector<Eigen::Index> by_frequency(const std::vector<PlantMode>& modes) {
   std::vector<Eigen::Index> order(modes.size());
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
-    return modes[static_cast<std::size_t>(a)].natural_frequency_hz <
-           modes[static_cast<std::size_t>(b)].natural_frequency_hz;
+    return modes[a].natural_frequency_hz < modes[b].natural_frequency_hz;
   });
   return order;
 }
@@ -24,8 +23,7 @@ std::vector<Eigen::Index> by_frequency(const std::vector<PlantMode>& modes) {
 /// The shapes as columns.
 Eigen::MatrixXd columns(const std::vector<PlantMode>& modes, Eigen::VectorXd PlantMode::*shape) {
   Eigen::MatrixXd out((modes[0].*shape).size(), std::ssize(modes));
-  for (std::size_t i = 0; i < modes.size(); ++i)
-    out.col(static_cast<Eigen::Index>(i)) = modes[i].*shape;
+  for (std::size_t i = 0; i < modes.size(); ++i) out.col(i) = modes[i].*shape;
   return out;
 }
 
@@ -36,7 +34,7 @@ LoadedModes loaded_modes(const std::vector<PlantMode>& modes, const Eigen::Vecto
   const Eigen::Index n = std::ssize(modes);
   Eigen::VectorXd omega(n), damping(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
+    const PlantMode& mode = modes[i];
     omega[i] = kTwoPi * mode.natural_frequency_hz;
     damping[i] = 2.0 * mode.damping_ratio * omega[i];
   }
@@ -57,7 +55,7 @@ LoadedModes loaded_modes(const std::vector<PlantMode>& modes, const Eigen::Vecto
   Eigen::VectorXd square(n);
   Eigen::MatrixXd Q(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::Index i = order[static_cast<std::size_t>(k)];
+    const Eigen::Index i = order[k];
     square[i] = eigen.eigenvalues()[k];
     Q.col(i) = eigen.eigenvectors().col(k);
   }

@@ -123,7 +123,7 @@ class SampledLoop {
     // Held commands, newest first: u[n-1] ... u[n-d-1].
     const VectorXd of_old = x.segment(first_held + n * (held_ - 1), n);
     for (Index i = 0; i < count; ++i) {
-      const LoopMode& m = modes_[static_cast<std::size_t>(i)];
+      const LoopMode& m = modes_[i];
       y += m.seen * x[2 * i];
       if (m.accelerations.size() > 0)
         y += m.accelerations * (m.drive.dot(of_old) - m.omega * m.omega * x[2 * i] -
@@ -137,7 +137,7 @@ class SampledLoop {
     const VectorXd of_new =
         held_ > 1 ? VectorXd(x.segment(first_held + n * (held_ - 2), n)) : force;
     for (Index i = 0; i < count; ++i) {
-      const LoopMode& m = modes_[static_cast<std::size_t>(i)];
+      const LoopMode& m = modes_[i];
       next.segment<2>(2 * i) = m.transition * x.segment<2>(2 * i) + m.of_old * m.drive.dot(of_old) +
                                m.of_new * m.drive.dot(of_new);
     }

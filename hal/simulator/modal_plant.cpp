@@ -63,7 +63,7 @@ ModalPlant::ModalPlant(const std::vector<PlantMode>& modes, double delay_s, doub
   q_.setZero(modes_);
   v_.setZero(modes_);
   unloaded_.setZero(count);
-  for (Eigen::Index i = 0; i < count; ++i) take(i, modes[static_cast<std::size_t>(i)]);
+  for (Eigen::Index i = 0; i < count; ++i) take(i, modes[i]);
 }
 
 void ModalPlant::take(Eigen::Index i, const PlantMode& mode) noexcept {
@@ -83,7 +83,7 @@ void ModalPlant::reload(const LoadedModes& from, const LoadedModes& to) noexcept
     unloaded_.noalias() = from.inverse.transpose() * held_.col(c).head(n).matrix();
     held_.col(c).head(n).matrix().noalias() = to.basis.transpose() * unloaded_;
   }
-  for (Eigen::Index i = 0; i < n; ++i) take(i, to.modes[static_cast<std::size_t>(i)]);
+  for (Eigen::Index i = 0; i < n; ++i) take(i, to.modes[i]);
 }
 
 void ModalPlant::retune(Eigen::Index mode, double natural_frequency_hz,

@@ -96,9 +96,8 @@ void append_rigid_body(const StageInfo& info, const PlantSpec& plant,
   const Eigen::MatrixXd sensors = rigid_body_jacobian(info.sensors);
   for (std::size_t axis = 0; axis < kRigidAxes; ++axis) {
     const double root = std::sqrt(plant.axis_inertia()[axis]);
-    const auto column = static_cast<Eigen::Index>(axis);
     modes.push_back({plant.suspension_hz[axis], plant.suspension_damping,
-                     actuators.col(column) / root, sensors.col(column) / root});
+                     actuators.col(axis) / root, sensors.col(axis) / root});
   }
 }
 
@@ -107,7 +106,7 @@ Eigen::VectorXd shape_at(const PlateModes& plate, int mode, double mass_kg,
                          const std::vector<Channel>& channels) {
   Eigen::VectorXd shape(static_cast<Eigen::Index>(channels.size()));
   for (Eigen::Index i = 0; i < shape.size(); ++i) {
-    const Channel& channel = channels[static_cast<std::size_t>(i)];
+    const Channel& channel = channels[i];
     shape[i] = channel.gain * channel.direction[2] *
                plate.shape(mode, channel.position_m[0], channel.position_m[1]) / std::sqrt(mass_kg);
   }
@@ -130,8 +129,7 @@ void append_flexible(const StageInfo& info, const PlantSpec& plant, std::vector<
 
 Eigen::ArrayXd gains_of(const std::vector<Channel>& channels) {
   Eigen::ArrayXd gains(static_cast<Eigen::Index>(channels.size()));
-  for (Eigen::Index i = 0; i < gains.size(); ++i)
-    gains[i] = channels[static_cast<std::size_t>(i)].gain;
+  for (Eigen::Index i = 0; i < gains.size(); ++i) gains[i] = channels[i].gain;
   return gains;
 }
 
@@ -139,8 +137,7 @@ void separate_accelerations(const std::vector<Channel>& sensors, PlantMode& mode
   if (std::none_of(sensors.begin(), sensors.end(), is_acceleration)) return;
   mode.acceleration_shape.setZero(mode.sensor_shape.size());
   for (Eigen::Index i = 0; i < mode.sensor_shape.size(); ++i)
-    if (is_acceleration(sensors[static_cast<std::size_t>(i)]))
-      std::swap(mode.acceleration_shape[i], mode.sensor_shape[i]);
+    if (is_acceleration(sensors[i])) std::swap(mode.acceleration_shape[i], mode.sensor_shape[i]);
 }
 
 }  // namespace

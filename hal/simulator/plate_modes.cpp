@@ -74,7 +74,7 @@ PlateModes::PlateModes(const FreePlate& plate, int count) : plate_(plate) {
     for (int parity_y : {0, 1}) append_class(parity_x, parity_y);
   std::sort(modes_.begin(), modes_.end(),
             [](const Mode& a, const Mode& b) { return a.parameter < b.parameter; });
-  modes_.resize(static_cast<std::size_t>(count));
+  modes_.resize(count);
 }
 
 // Strain energy over D/2 and the plate's area:
@@ -116,7 +116,7 @@ void PlateModes::append_class(int parity_x, int parity_y) {
 }
 
 double PlateModes::shape(int mode, double x_m, double y_m) const {
-  const Mode& m = modes_[static_cast<std::size_t>(mode)];
+  const Mode& m = modes_[mode];
   return polynomials(2.0 * x_m / plate_.length_x_m, m.parity_x)
       .dot(m.coefficients * polynomials(2.0 * y_m / plate_.length_y_m, m.parity_y));
 }

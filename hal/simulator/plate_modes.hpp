@@ -32,7 +32,7 @@ class PlateModes {
   int count() const noexcept { return static_cast<int>(modes_.size()); }
 
   /// omega sqrt(rho h / D) in rad/m^2, of mode `mode` (0-based, ascending).
-  double wave_parameter(int mode) const { return modes_[static_cast<std::size_t>(mode)].parameter; }
+  double wave_parameter(int mode) const { return modes_[mode].parameter; }
 
   /// Displacement of a mode at (x, y) in m; its mean square over the plate is 1, and it is positive
   /// at the corner (a/2, b/2).

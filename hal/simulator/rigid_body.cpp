@@ -24,7 +24,7 @@ void require_independent(const Jacobian& jacobian, const Eigen::MatrixXd& invers
   require(!(row.cwiseAbs().maxCoeff() > kTolerance),
           "controller: axis {} is closed, but the {} cannot control it independently of the other "
           "axes; add {} or leave the axis open",
-          kRigidAxisNames[static_cast<std::size_t>(axis)], what, what);
+          kRigidAxisNames[axis], what, what);
 }
 
 // The gain that makes |C(j w_c)| / (inertia w_c^2) = 1.
@@ -42,7 +42,7 @@ double unit_crossover_gain(AxisController axis, double inertia, const char* name
 Jacobian position_jacobian(const std::vector<Channel>& sensors) {
   Jacobian jacobian = rigid_body_jacobian(sensors);
   for (std::size_t i = 0; i < sensors.size(); ++i)
-    if (is_acceleration(sensors[i])) jacobian.row(static_cast<Eigen::Index>(i)).setZero();
+    if (is_acceleration(sensors[i])) jacobian.row(i).setZero();
   return jacobian;
 }
 
@@ -97,7 +97,7 @@ RigidMotion free_motion(const MotionController& controller, double sample_rate_h
 Eigen::MatrixXd rigid_body_jacobian(const std::vector<Channel>& channels) {
   Eigen::MatrixXd jacobian(static_cast<Eigen::Index>(channels.size()), 6);
   for (Eigen::Index row = 0; row < jacobian.rows(); ++row) {
-    const Channel& channel = channels[static_cast<std::size_t>(row)];
+    const Channel& channel = channels[row];
     const auto position = Eigen::Map<const Eigen::RowVector3d>(channel.position_m);
     const auto direction = Eigen::Map<const Eigen::RowVector3d>(channel.direction);
     if (is_rotation(channel)) {
@@ -172,16 +172,15 @@ RigidMotion rigid_motion(const MotionControllerSpec& controller,
   for (std::size_t i = 0; i < controller.axes.size(); ++i) {
     const AxisController& axis = controller.axes[i];
     if (axis.crossover_hz == 0.0) continue;
-    const auto k = static_cast<Eigen::Index>(i);
     const double omega = 2.0 * pi * axis.crossover_hz;
     const double inertia = std::abs(axis_response(axis, axis.crossover_hz)) / (omega * omega);
     motion.bandwidth_rad_s =
         motion.bandwidth_rad_s == 0.0 ? omega : std::min(motion.bandwidth_rad_s, omega);
     add(motion.acceleration_per_n,
-        sensor_jacobian.col(k) * actuator_jacobian.col(k).transpose() / inertia);
+        sensor_jacobian.col(i) * actuator_jacobian.col(i).transpose() / inertia);
     const double braked = axis.brake ? inertia : 0.0;
     add(motion.force_per_acceleration,
-        braked * controller.actuator_decoupling.col(k) * controller.sensor_decoupling.row(k));
+        braked * controller.actuator_decoupling.col(i) * controller.sensor_decoupling.row(i));
   }
   if (motion.bandwidth_rad_s > 0.0)
     motion.contradiction = contradiction_of(sensor_jacobian, controller.sensor_decoupling);

@@ -90,7 +90,7 @@ std::vector<Factor> factors_of(const std::vector<double>& coefficients) {
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
   companion.diagonal(-1).setOnes();
   for (Eigen::Index i = 0; i < degree; ++i)
-    companion(0, i) = -coefficients[static_cast<std::size_t>(i + 1)] / coefficients.front();
+    companion(0, i) = -coefficients[i + 1] / coefficients.front();
   const Eigen::VectorXcd roots = eigenvalues(companion);
   std::vector<Factor> factors;
   std::vector<double> real;

@@ -64,8 +64,7 @@ LimitGuard::LimitGuard(const StageLimits& limits, const StageInfo& info)
   repeats_.setZero(sensors);
   believed_.setConstant(sensors, true);
   moves_.resize(sensors);
-  for (Eigen::Index i = 0; i < sensors; ++i)
-    moves_[i] = !is_acceleration(info.sensors[static_cast<std::size_t>(i)]);
+  for (Eigen::Index i = 0; i < sensors; ++i) moves_[i] = !is_acceleration(info.sensors[i]);
 }
 
 /// Three equal poles of a constant-acceleration observer (a g-h-k filter, critically damped).
@@ -87,7 +86,7 @@ void LimitGuard::carry(const Eigen::VectorXd& load, std::uint64_t ramp_samples) 
 void LimitGuard::start(const Inputs& first) noexcept {
   carried_samples_ = 0;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
-    const double y = first.y[static_cast<std::size_t>(i)];
+    const double y = first.y[i];
     p_[i] = std::isfinite(y) ? y : 0.0;
   }
   measured_ = p_.matrix();
@@ -140,7 +139,7 @@ LimitGuard::Finding LimitGuard::inspect(Inputs& inputs) noexcept {
   error_by_force_ *= forget_;
   force_by_force_ *= forget_;
   for (Eigen::Index i = 0; i < p_.size(); ++i) {
-    double& y = inputs.y[static_cast<std::size_t>(i)];
+    double& y = inputs.y[i];
     const std::uint64_t bit = std::uint64_t{1} << i;
     if (!std::isfinite(y)) {
       finding.add(sensor_failure(i, LimitKind::not_finite, y, 0.0, inputs.cycle), false);

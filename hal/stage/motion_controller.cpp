@@ -111,7 +111,7 @@ void MotionController::add_sections(const MotionControllerSpec& spec) {
   const Eigen::Index lanes = padded(count);
   coefficients_.setZero(lanes, 5 * sections_);
   for (Eigen::Index lane = 0; lane < count; ++lane) {
-    const auto& list = lists[static_cast<std::size_t>(lane)];
+    const auto& list = lists[lane];
     for (Eigen::Index i = 0; i < sections_; ++i) {
       const auto index = static_cast<std::size_t>(i);
       const BiquadSection s = index < list.size() ? list[index] : BiquadSection{};
@@ -250,12 +250,12 @@ ControllerStateSpace MotionController::realization() const {
   Eigen::VectorXd u(actuators());
   const auto step = [&](auto next, auto output) {
     probe.update(y.data(), u.data());
-    for (Eigen::Index i = 0; i < n; ++i) next[i] = *states[static_cast<std::size_t>(i)];
+    for (Eigen::Index i = 0; i < n; ++i) next[i] = *states[i];
     output = -u;
   };
   for (Eigen::Index i = 0; i < n; ++i) {
     probe.reset();
-    *states[static_cast<std::size_t>(i)] = 1.0;
+    *states[i] = 1.0;
     step(out.a.col(i), out.c.col(i));
   }
   for (Eigen::Index i = 0; i < sensors(); ++i) {

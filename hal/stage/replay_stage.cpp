@@ -54,9 +54,8 @@ void ReplayStage::give(Inputs& inputs, Eigen::Index sample) const noexcept {
 }
 
 void ReplayStage::compare(const Outputs& outputs) noexcept {
-  const auto sample = static_cast<Eigen::Index>(cycle_);
   for (Eigen::Index i = 0; i < u_.rows(); ++i) {
-    const double difference = std::abs(outputs.u[static_cast<std::size_t>(i)] - u_(i, sample));
+    const double difference = std::abs(outputs.u[i] - u_(i, cycle_));
     if (!(difference <= tolerance_n_)) ++mismatches_;  // NaN is a mismatch too
     largest_mismatch_n_ = std::max(largest_mismatch_n_, difference);
   }

@@ -78,20 +78,19 @@ inline FrfEstimate measured(const DenseProblem& problem, const CorrelatedNoise& 
     return out;
   };
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const Eigen::MatrixXcd L_C = noise.C[at].llt().matrixL();
-    const Eigen::MatrixXcd L_S = noise.S[at].llt().matrixL();
+    const Eigen::MatrixXcd L_C = noise.C[k].llt().matrixL();
+    const Eigen::MatrixXcd L_S = noise.S[k].llt().matrixL();
     // vec(L_C N L_S^T) = (L_S kron L_C) vec N
     frf.response.col(k) += (L_C * draw(n_y, n_u) * L_S.transpose()).reshaped();
-    Eigen::MatrixXcd C = noise.C[at];
+    Eigen::MatrixXcd C = noise.C[k];
     if (dof > 0) {
       const Eigen::MatrixXcd samples = L_C * draw(n_y, dof);
       C = samples * samples.adjoint() / static_cast<double>(dof);
     }
     frf.residual_covariance.col(k) = C.reshaped();
-    frf.input_factor.col(k) = noise.S[at].reshaped();
+    frf.input_factor.col(k) = noise.S[k].reshaped();
     const Eigen::VectorXd y = C.diagonal().real();
-    const Eigen::RowVectorXd u = noise.S[at].diagonal().real().transpose();
+    const Eigen::RowVectorXd u = noise.S[k].diagonal().real().transpose();
     frf.noise_variance.col(k) = (y * u).reshaped();
   }
   return frf;
@@ -141,8 +140,7 @@ inline std::vector<Eigen::MatrixXcd> joint_jacobian(const DenseProblem& problem,
     Eigen::MatrixXcd J(rows.rows(), rows.cols() + delays);
     J << rows.leftCols(denominators), Eigen::MatrixXcd(rows.rows(), delays),
         rows.rightCols(rows.cols() - denominators);
-    for (Eigen::Index d = 0; d < delays; ++d)
-      J.col(denominators + d) = slopes[static_cast<std::size_t>(d)].col(k);
+    for (Eigen::Index d = 0; d < delays; ++d) J.col(denominators + d) = slopes[d].col(k);
     out.push_back(std::move(J));
   }
   return out;
@@ -163,7 +161,7 @@ DenseEquations dense_equations(const DenseProblem& at, const Eigen::MatrixXcd& G
   for (std::size_t k = 0; k < J.size(); ++k) {
     const Eigen::MatrixXcd JW = J[k].adjoint() * weights(k);
     out.M += (JW * J[k]).real();
-    out.e += (JW * E.col(static_cast<Eigen::Index>(k))).real();
+    out.e += (JW * E.col(k)).real();
   }
   return out;
 }

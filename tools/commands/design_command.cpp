@@ -29,7 +29,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string limit_text(const Eigen::VectorXd& limits, std::size_t index) {
-  return limits.size() == 0 ? "-" : fmt::format("{:.4g}", limits[static_cast<Eigen::Index>(index)]);
+  return limits.size() == 0 ? "-" : fmt::format("{:.4g}", limits[index]);
 }
 
 Json channel_json(const ChannelPrediction& channel) {
@@ -139,10 +139,9 @@ void design_watch(const DesignFlags& flags, Console& console, const ExperimentCo
       {"tracked", "deviation per period", fmt::format("{:.2g} detected after", flags.watch.drift)}};
   Json json = {{"lines", plan.lines}, {"rms", plan.levels}, {"tracked", Json::array()}};
   for (std::size_t i = 0; i < plan.parameters.size(); ++i) {
-    const auto p = static_cast<Eigen::Index>(i);
     const std::string name = describe(plan.parameters[i], plan.model);
-    const double deviation = plan.forecast.deviation[p];
-    const double detected_s = plan.forecast.periods[p] * period_s;
+    const double deviation = plan.forecast.deviation[i];
+    const double detected_s = plan.forecast.periods[i] * period_s;
     const bool delay = plan.parameters[i].kind == TrackedKind::delay;
     rows.push_back({name, fmt::format("{:.2e}{}", deviation, delay ? " s" : ""),
                     std::isfinite(detected_s) ? fmt::format("{:.3g} s", detected_s) : "-"});

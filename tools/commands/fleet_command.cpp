@@ -202,7 +202,7 @@ void query_fleet(const FleetQueryFlags& flags, Console& console) {
       const Json value = value_of(rows, c);
       const bool rounded = value.is_number_float() && flags.csv.empty();
       table.back().push_back(rounded ? fmt::format("{:.7g}", rows.number(c)) : rows.text(c));
-      if (console.json) object[table[0][static_cast<std::size_t>(c)]] = value;
+      if (console.json) object[table[0][c]] = value;
     }
     if (console.json) list.push_back(std::move(object));
   }

@@ -53,10 +53,9 @@ nlohmann::ordered_json prediction_json(const PredictionError& error) {
 std::vector<std::string> prediction_lines(const PredictionError& error) {
   std::vector<std::vector<std::string>> rows = {{"sensor", "error rms", "signal rms", "ratio"}};
   for (std::size_t i = 0; i < error.sensors.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    rows.push_back({error.sensors[i], fmt::format("{:.4g}", error.error_rms[k]),
-                    fmt::format("{:.4g}", error.signal_rms[k]),
-                    fmt::format("{:.3e}", error.error_rms[k] / error.signal_rms[k])});
+    rows.push_back({error.sensors[i], fmt::format("{:.4g}", error.error_rms[i]),
+                    fmt::format("{:.4g}", error.signal_rms[i]),
+                    fmt::format("{:.3e}", error.error_rms[i] / error.signal_rms[i])});
   }
   std::vector<std::string> lines = {
       fmt::format("prediction of the sensor samples from the actuators, {}, {} ... {} Hz:",

@@ -231,7 +231,7 @@ YamlDocument YamlDocument::read(const std::filesystem::path& file) {
   if (!stream) fail_file(file, "cannot be read: {}", system_reason(errno));
   std::string text(kLongestFile + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
+  text.resize(stream.gcount());
   if (stream.bad()) fail_file(file, "cannot be read; check the disk");
   const bool json = text.starts_with('{') && file.extension() != ".json";  // JSON is YAML
   if (json || text.find('\0') != std::string::npos)

@@ -67,7 +67,7 @@ class LoopBuilder {
                                      Eigen::Index count) {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(by_stage.rows(), count);
     for (std::size_t i = 0; i < places.size(); ++i)
-      if (places[i]) out.col(*places[i]) = by_stage.col(static_cast<Eigen::Index>(i));
+      if (places[i]) out.col(*places[i]) = by_stage.col(i);
     return out;
   }
 
@@ -125,7 +125,7 @@ class LoopBuilder {
     for (Eigen::Index i = 0; i < all.actuators.size(); ++i) {
       if (!used(all.actuators, i)) continue;
       kept.push_back(i);
-      names.push_back(stage_.info.actuators[static_cast<std::size_t>(i)].name);
+      names.push_back(stage_.info.actuators[i].name);
     }
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(k.d.rows(), k.d.rows());
     const Eigen::MatrixXd T =

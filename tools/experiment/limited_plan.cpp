@@ -61,8 +61,7 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
     velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
                              request.velocity_m_s);
   for (Eigen::Index i = 0; i < velocity_m_s.size(); ++i)
-    if (is_acceleration(stage.info.sensors[static_cast<std::size_t>(i)]))
-      velocity_m_s[i] = kUnlimited;
+    if (is_acceleration(stage.info.sensors[i])) velocity_m_s[i] = kUnlimited;
   try {
     BoundedLoop loop = bounded_loop(outline.grid(), config.experiment, stage, prior,
                                     config.frf.outputs, velocity_m_s);

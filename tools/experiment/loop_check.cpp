@@ -52,9 +52,9 @@ class PriorLoop {
     const PlantPrior prior =
         read_plant_prior(config.limits->prior, config.stage.spec.info, band_hz, below_hz);
     for (std::size_t k = 0; k < prior.below_band.size(); ++k)
-      follow(prior.below_band[k], controller, below_hz[static_cast<Index>(k)]);
+      follow(prior.below_band[k], controller, below_hz[k]);
     for (std::size_t k = 0; k < prior.response.size(); ++k)
-      follow(prior.response[k], controller, band_hz[static_cast<Index>(k)]);
+      follow(prior.response[k], controller, band_hz[k]);
   }
 
   LoopCheck check() const {

@@ -42,7 +42,7 @@ std::vector<Index> places(const std::filesystem::path& file, const ChannelList& 
 std::vector<Channel> chosen(const std::vector<Channel>& channels,
                             const std::vector<Index>& indices) {
   std::vector<Channel> some;
-  for (const Index i : indices) some.push_back(channels[static_cast<std::size_t>(i)]);
+  for (const Index i : indices) some.push_back(channels[i]);
   return some;
 }
 
@@ -144,8 +144,8 @@ PlantPrior read_plant_prior(const std::filesystem::path& file, const StageInfo& 
   PlantPrior prior;
   prior.sensor_known.assign(stage.sensors.size(), false);
   prior.actuator_known.assign(stage.actuators.size(), false);
-  for (const Index i : sensors) prior.sensor_known[static_cast<std::size_t>(i)] = true;
-  for (const Index j : actuators) prior.actuator_known[static_cast<std::size_t>(j)] = true;
+  for (const Index i : sensors) prior.sensor_known[i] = true;
+  for (const Index j : actuators) prior.actuator_known[j] = true;
   const auto n_y = static_cast<Index>(stage.sensors.size());
   const auto n_u = static_cast<Index>(stage.actuators.size());
 

@@ -117,7 +117,7 @@ class WatchedStage {
   }
 
   const TrackedResponse& response() const noexcept { return response_; }
-  const LineSensitivity& at(Index k) const { return sensitivity_[static_cast<std::size_t>(k)]; }
+  const LineSensitivity& at(Index k) const { return sensitivity_[k]; }
 
   /// @param r  axes x lines, |r|^2 the share of the power
   std::vector<Eigen::MatrixXd> information(const Eigen::MatrixXcd& r) const {
@@ -131,7 +131,7 @@ class WatchedStage {
     if (!(rms_m > 0.0)) return Eigen::MatrixXd::Ones(1, r.cols());
     Eigen::MatrixXd use(motion_.front().rows(), r.cols());
     for (Index k = 0; k < r.cols(); ++k)
-      use.col(k) = (motion_[static_cast<std::size_t>(k)] * r.col(k)).cwiseAbs2() / (rms_m * rms_m);
+      use.col(k) = (motion_[k] * r.col(k)).cwiseAbs2() / (rms_m * rms_m);
     return use;
   }
   Eigen::MatrixXd prior() const {
@@ -141,8 +141,7 @@ class WatchedStage {
   Eigen::VectorXd change(double drift) const {
     Eigen::VectorXd change = Eigen::VectorXd::Zero(response_.size());
     for (Index p = 0; p < change.size(); ++p)
-      if (response_.parameters()[static_cast<std::size_t>(p)].kind == TrackedKind::frequency)
-        change[p] = drift;
+      if (response_.parameters()[p].kind == TrackedKind::frequency) change[p] = drift;
     return change;
   }
   /// By the lines of which r is not zero: only these are watched.
@@ -153,7 +152,7 @@ class WatchedStage {
     for (Index k = 0; k < r.cols(); ++k) {
       if (r.col(k).isZero(0.0)) continue;
       J.push_back(sensitivity(at(k), r.col(k)));
-      free_motion.push_back(free_motion_[static_cast<std::size_t>(k)]);
+      free_motion.push_back(free_motion_[k]);
     }
     return watch_forecast(J, free_motion, prior(), change(drift), options);
   }
@@ -213,8 +212,7 @@ WatchForecast forecast_of(const ExperimentConfig& config, const AdditiveModel& m
   const WatchedStage stage(config, model, frf, grid_of(config).frequency_hz());
   const ExperimentPlan plan = outline_plan(config);
   Eigen::MatrixXd share = plan.amplitude() / std::numbers::sqrt2;
-  for (Index j = 0; j < share.rows(); ++j)
-    share.row(j) /= config.experiment.axes[static_cast<std::size_t>(j)].level;
+  for (Index j = 0; j < share.rows(); ++j) share.row(j) /= config.experiment.axes[j].level;
   return stage.forecast(unit_phasors(plan.phase_rad(0)).cwiseProduct(share), drift,
                         period_s(config));
 }
@@ -237,9 +235,9 @@ WatchPlan make_watch_plan(const ExperimentConfig& config, const WatchRequest& re
   Eigen::VectorXd power = best.power.power;
   Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(stage.response().size());
   for (std::size_t k = 0; k < information.size(); ++k)
-    sum += power[static_cast<Index>(k)] * information[k].diagonal().array();
+    sum += power[k] * information[k].diagonal().array();
   for (std::size_t k = 0; k < information.size(); ++k) {
-    double& p = power[static_cast<Index>(k)];
+    double& p = power[k];
     const Eigen::MatrixXd& V = best.power.gradient_root;
     const Eigen::ArrayXd shares = p * information[k].diagonal().array() / sum;
     if ((stage.change(1.0).array() * shares).maxCoeff() < kNegligible &&
@@ -254,7 +252,7 @@ WatchPlan make_watch_plan(const ExperimentConfig& config, const WatchRequest& re
   std::vector<Index> kept;
   for (Index k = 0; k < power.size(); ++k)
     if (power[k] > 0.0) kept.push_back(k);
-  for (const Index k : kept) plan.lines.push_back(candidates.lines()[static_cast<std::size_t>(k)]);
+  for (const Index k : kept) plan.lines.push_back(candidates.lines()[k]);
   plan.parameters = stage.response().parameters();
   plan.forecast = stage.forecast(r, request.drift, period_s(config));
   plan.gap = best.power.gap;
@@ -275,7 +273,7 @@ std::string watch_experiment_text(const WatchPlan& plan, const ExperimentConfig&
   for (std::size_t j = 0; j < experiment.axes.size(); ++j) {
     axes.push_back(in_yaml(experiment.axes[j].channel));
     phases.push_back(fmt::format("    - {{axis: {}, rad: [{:.4f}]}}\n", axes.back(),
-                                 fmt::join(plan.phase_rad.row(static_cast<Index>(j)), ", ")));
+                                 fmt::join(plan.phase_rad.row(j), ", ")));
   }
   for (Index k = 0; k < plan.shape.size(); ++k)
     points.push_back(fmt::format("[{}, {:.5g}]", frequency_hz[k], plan.shape[k]));

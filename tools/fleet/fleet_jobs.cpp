@@ -36,7 +36,7 @@ std::vector<FleetLog> logs_of_table(const std::filesystem::path& table) {
     const auto fail = [&](const std::string& problem) {
       throw FormatError(table, fmt::format("{}", rows.lines[r]), problem);
     };
-    const std::string& name_of_log = fields[static_cast<std::size_t>(place - rows.names.begin())];
+    const std::string& name_of_log = fields[place - rows.names.begin()];
     if (name_of_log.empty()) fail("the field 'log' is empty; name a log, or remove the line");
     FleetLog log;
     log.file = (table.parent_path() / name_of_log).lexically_normal();

@@ -49,14 +49,12 @@ std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
   std::size_t rows = 0;
   for (std::size_t t = 0; t < tracks.time_s.size(); ++t)
     for (std::size_t p = 0; p < tracks.names.size(); ++p, ++rows) {
-      const auto row = static_cast<Eigen::Index>(t);
-      const auto column = static_cast<Eigen::Index>(p);
-      const double change = tracks.change(row, column);
+      const double change = tracks.change(t, p);
       const double nominal = tracks.nominal[p];
       const double value =
           tracks.kinds[p] == TrackedKind::delay ? nominal + change : nominal * (1.0 + change);
       add.run(log.stage, utc_of(start + tracks.time_s[t] / kDay_s), tracks.names[p],
-              to_string(tracks.kinds[p]), value, change, tracks.deviation(row, column));
+              to_string(tracks.kinds[p]), value, change, tracks.deviation(t, p));
     }
   transaction.commit();
   return rows;

@@ -132,7 +132,7 @@ class ReplayLog final : public ReplaySource {
 
   int runs() const override { return static_cast<int>(order_.size()); }
   void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override {
-    const std::size_t index = order_.at(static_cast<std::size_t>(run));
+    const std::size_t index = order_.at(run);
     LogSamples samples;
     log_->read(index, 0, log_->runs()[index].samples, samples);
     u = samples.actuators.transpose();

@@ -163,7 +163,7 @@ void tell_end(EventLog& events, const MeasuredStage& stage, const MeasurementRes
   const LimitViolation hit = stage.violation();
   if (result.exit_code == kStoppedForSafety && hit.kind != LimitKind::none) {
     const auto& channels = hit.of_sensor ? stage.info().sensors : stage.info().actuators;
-    events.write("limit", {{"channel", channels[static_cast<std::size_t>(hit.channel)].name},
+    events.write("limit", {{"channel", channels[hit.channel].name},
                            {"value", hit.value},
                            {"limit", hit.limit},
                            {"cycle", static_cast<std::int64_t>(hit.cycle)},

@@ -30,7 +30,7 @@ std::vector<double> frequencies_to_label(double low_hz, double high_hz, double w
   const int last = static_cast<int>(std::ceil(std::log10(high_hz)));
   std::vector<double> found;
   for (int sparse = 0; sparse < 8; ++sparse) {
-    const auto& of_decade = digits[static_cast<std::size_t>(std::min(sparse, 2))];
+    const auto& of_decade = digits[std::min(sparse, 2)];
     const int step = std::max(1, sparse - 1);
     found.clear();
     for (int decade = first; decade <= last; ++decade)

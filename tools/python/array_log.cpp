@@ -154,7 +154,7 @@ void ArrayLog::read(std::size_t run, std::uint64_t first, std::uint64_t count,
   };
   const bool actuators_finite = copy(actuators_[run], out.actuators);
   const bool sensors_finite = copy(sensors_[run], out.sensors);
-  out.marked = marked_[run].segment(static_cast<Eigen::Index>(first), count);
+  out.marked = marked_[run].segment(first, count);
   if (!actuators_finite || !sensors_finite)
     throw_not_finite(name_, info_, runs_[run], first, out, 0, out.marked.size());
 }

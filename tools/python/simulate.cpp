@@ -112,7 +112,7 @@ ExperimentArrays arrays_of(std::unique_ptr<RunMemory> recording) {
       columns(0, n_u), columns(n_u, n_y), FlagArray({M, E, S})};
   std::uint8_t* marked = arrays.marked->mutable_data();
   for (py::ssize_t n = 0; n < M * E * S; ++n) {
-    const double word = memory->rows[static_cast<std::size_t>(n * words + words - 1)];
+    const double word = memory->rows[n * words + words - 1];
     marked[n] = unpack_status(std::bit_cast<std::uint64_t>(word)).marked ? 1 : 0;
   }
   return arrays;

@@ -127,7 +127,7 @@ std::string encode_float64(const Eigen::Ref<const Eigen::VectorXd>& values) {
 
 std::string encode_float32(const Eigen::Ref<const Eigen::MatrixXd>& values) {
   std::vector<float> out;
-  out.reserve(static_cast<std::size_t>(values.size()));
+  out.reserve(values.size());
   for (Eigen::Index row = 0; row < values.rows(); ++row)
     for (const double value : values.row(row)) out.push_back(static_cast<float>(value));
   return packed_planes(out);
@@ -154,7 +154,7 @@ ComplexCode encode_complex_block16(const Eigen::MatrixXcd& values, Expectation e
   std::vector<std::uint16_t> mantissas;
   std::vector<std::uint8_t> exponents;
   mantissas.reserve(2 * static_cast<std::size_t>(values.size()));
-  exponents.reserve(static_cast<std::size_t>(values.size()));
+  exponents.reserve(values.size());
   int before = 0;
   Eigen::MatrixXcd decoded =
       encode_each(values, expected, [&](std::complex<double> value, std::complex<double> guess) {
@@ -173,7 +173,7 @@ ComplexCode encode_complex_block16(const Eigen::MatrixXcd& values, Expectation e
 LogBytes encode_log_bytes(const Eigen::Ref<const Eigen::MatrixXd>& values) {
   LogBytes out;
   std::vector<std::uint8_t> codes;
-  codes.reserve(static_cast<std::size_t>(values.size()));
+  codes.reserve(values.size());
   std::uint8_t before = 0;
   for (Eigen::Index row = 0; row < values.rows(); ++row) {
     double low = std::numeric_limits<double>::infinity();

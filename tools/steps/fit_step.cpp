@@ -121,7 +121,7 @@ Distortion distortion_of(const AdditiveModel& model) {
   out.band_hz.resize(count, 2);
   out.level.resize(channels, count);
   for (Eigen::Index b = 0; b < count; ++b) {
-    const Json& band = bands[static_cast<std::size_t>(b)];
+    const Json& band = bands[b];
     const std::vector<double> edges = numbers_in(band, "band_hz");
     const std::vector<double> level = numbers_in(band, "level");
     if (edges.size() != 2 || std::ssize(level) != channels) return {};

@@ -74,7 +74,7 @@ ExternalEnd run_external(const std::vector<std::string>& words,
   if (WIFEXITED(end.status) && WEXITSTATUS(end.status) == kNotFound)
     throw FileError(
         fmt::format("{}: not installed; install the Debian package {}", name_of(words), package));
-  end.messages.resize(static_cast<std::size_t>(::lseek(messages.get(), 0, SEEK_END)));
+  end.messages.resize(::lseek(messages.get(), 0, SEEK_END));
   const ssize_t size = ::pread(messages.get(), end.messages.data(), end.messages.size(), 0);
   end.messages.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
   return end;

@@ -169,12 +169,11 @@ nlohmann::ordered_json StageWatch::state_of(const TrackedPeriod& tracked) const 
   if (tracked.statistics.size() == 0) return json;
   const std::size_t properties = json["tracked"].size();
   for (std::size_t p = 0; p < properties; ++p)
-    json["tracked"][p]["statistic"] = tracked.statistics[static_cast<Eigen::Index>(p)];
+    json["tracked"][p]["statistic"] = tracked.statistics[p];
   for (std::size_t i = 0; i < json["noise"].size(); ++i) {
     nlohmann::ordered_json& sensor = json["noise"][i];
-    sensor["statistic"] = tracked.statistics[static_cast<Eigen::Index>(properties + i)];
-    if (tracked.noise_power.size() > 0)
-      sensor["power"] = tracked.noise_power[static_cast<Eigen::Index>(i)];
+    sensor["statistic"] = tracked.statistics[properties + i];
+    if (tracked.noise_power.size() > 0) sensor["power"] = tracked.noise_power[i];
   }
   return json;
 }

@@ -118,7 +118,7 @@ WatchedTracks read_tracks(const std::filesystem::path& file, double every_s) {
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values(
         std::ssize(chosen), static_cast<Eigen::Index>(q));
     for (std::size_t r = 0; r < chosen.size(); ++r)
-      hdf5.read_rows(dataset, chosen[r], 1, values.row(static_cast<Eigen::Index>(r)).data());
+      hdf5.read_rows(dataset, chosen[r], 1, values.row(r).data());
     return values;
   };
   out.change = read("/change");

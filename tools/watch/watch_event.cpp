@@ -14,9 +14,7 @@ namespace {
 constexpr double kSure = 0.95;
 
 const TrackedParameter* parameter_of(const PossibleChange& change, const ModelTracker& tracker) {
-  return change.kind == ChangeKind::parameter
-             ? &tracker.parameters()[static_cast<std::size_t>(change.index)]
-             : nullptr;
+  return change.kind == ChangeKind::parameter ? &tracker.parameters()[change.index] : nullptr;
 }
 
 bool is_channel_gain(const TrackedParameter* parameter) {
@@ -110,8 +108,7 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
       {"statistic", change.statistic}};
   if (parameter != nullptr &&
       (parameter->kind == TrackedKind::frequency || parameter->kind == TrackedKind::damping))
-    json["mode_hz"] =
-        model.submodels[static_cast<std::size_t>(parameter->index)].natural_frequency_hz();
+    json["mode_hz"] = model.submodels[parameter->index].natural_frequency_hz();
   if (parameter != nullptr && parameter->kind == TrackedKind::actuator_gain)
     json["channel"] = model.inputs.name(parameter->index);
   if (parameter != nullptr && parameter->kind == TrackedKind::sensor_gain)
@@ -130,7 +127,7 @@ nlohmann::ordered_json tracked_json(const ModelTracker& tracker, const AdditiveM
   const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (Eigen::Index p = 0; p < deviation.size(); ++p) {
-    const TrackedParameter& parameter = tracker.parameters()[static_cast<std::size_t>(p)];
+    const TrackedParameter& parameter = tracker.parameters()[p];
     json.push_back({{"kind", to_string(parameter.kind)},
                     {"name", describe(parameter, model)},
                     {"change", tracker.estimate()[p]},
@@ -144,7 +141,7 @@ std::vector<std::string> tracked_lines(const ModelTracker& tracker, const Additi
   std::vector<std::vector<std::string>> rows = {
       {"tracked", "change from the model (+- without its error)"}};
   for (Eigen::Index p = 0; p < deviation.size(); ++p) {
-    const TrackedParameter& parameter = tracker.parameters()[static_cast<std::size_t>(p)];
+    const TrackedParameter& parameter = tracker.parameters()[p];
     rows.push_back(
         {describe(parameter, model), size_text(&parameter, tracker.estimate()[p], deviation[p])});
   }

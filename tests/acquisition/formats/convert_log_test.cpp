@@ -132,9 +132,8 @@ TEST_F(ConvertLog, CsvReadsBackToTheSameNumbers) {
       EXPECT_EQ(values[3], static_cast<double>(row) / 1000.0);
       EXPECT_EQ(values[4], test::is_marked(run, row) ? 1.0 : 0.0);
       for (int c = 0; c < 3; ++c) {
-        EXPECT_EQ(values[static_cast<std::size_t>(5 + c)],
-                  excitation(static_cast<Eigen::Index>(row % test::kPeriod), c));
-        EXPECT_EQ(values[static_cast<std::size_t>(8 + c)], test::actuator_value(run, row, c));
+        EXPECT_EQ(values[5 + c], excitation(static_cast<Eigen::Index>(row % test::kPeriod), c));
+        EXPECT_EQ(values[8 + c], test::actuator_value(run, row, c));
       }
       EXPECT_EQ(values[12], test::sensor_value(run, row, 1));
     }

@@ -81,8 +81,7 @@ class MeasurementLoopTest : public ::testing::Test {
   Eigen::VectorXd excitation_at(std::uint64_t n) const {
     Eigen::VectorXd r = Eigen::VectorXd::Zero(kActuators);
     const auto row = static_cast<Eigen::Index>(n % kPeriod);
-    for (Eigen::Index c = 0; c < 3; ++c)
-      r[excitation_.actuators[static_cast<std::size_t>(c)]] += excitation_.period(row, c);
+    for (Eigen::Index c = 0; c < 3; ++c) r[excitation_.actuators[c]] += excitation_.period(row, c);
     return r;
   }
 

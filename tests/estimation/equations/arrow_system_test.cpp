@@ -246,7 +246,7 @@ TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
   const Eigen::VectorXd step = ArrowSystem(fit, beta, groups, FitMethod::gn).solve_globals(0.0);
   const test::DenseEquations dense = test::dense_equations(
       problem, problem.G, DelayModel::per_channel, [&](std::size_t k) -> Eigen::MatrixXcd {
-        return problem.W.col(static_cast<Eigen::Index>(k)).asDiagonal().toDenseMatrix();
+        return problem.W.col(k).asDiagonal().toDenseMatrix();
       });
   const Eigen::VectorXd expected = test::scaled_inverse(dense.M) * dense.e;
   // The error of the finite differences is 1e-9 of a column.

@@ -132,7 +132,7 @@ TEST(StackedTriangle, HasTheProductsOfAllMatrices) {
         Eigen::MatrixXd(test::random_matrix(random, 4, 4).triangularView<Eigen::Upper>()));
     products += parts.back().transpose() * parts.back();
   }
-  const auto part = [&](Eigen::Index i) { return parts[static_cast<std::size_t>(i)]; };
+  const auto part = [&](Eigen::Index i) { return parts[i]; };
   const Eigen::MatrixXd R = stacked_triangle(19, 2, part);
   EXPECT_LT((R.transpose() * R - products).norm(), 1e-12 * products.norm());
   EXPECT_EQ(R, stacked_triangle(19, 1, part));

@@ -149,10 +149,10 @@ TEST(LoopMargins, HaveTheScatterOfModelsWithThisCovariance) {
         loop_margins(test::with_parameters(model, delays, x + R * noise), controller, kUnknown));
     ASSERT_EQ(other.size(), told.size());
     for (std::size_t i = 0; i < told.size(); ++i)
-      sum[static_cast<Eigen::Index>(i)] += std::pow(other[i].value - told[i].value, 2);
+      sum[i] += std::pow(other[i].value - told[i].value, 2);
   }
   for (std::size_t i = 0; i < told.size(); ++i) {
-    const double scatter = std::sqrt(sum[static_cast<Eigen::Index>(i)] / kTrials);
+    const double scatter = std::sqrt(sum[i] / kTrials);
     ASSERT_TRUE(told[i].deviation);
     // Four standard deviations of a deviation from 300 trials.
     EXPECT_NEAR(scatter / *told[i].deviation, 1.0, 4.0 / std::sqrt(2.0 * kTrials))
@@ -179,7 +179,7 @@ TEST(LoopView, DiscsContainTheCurvesOfModelsWithThisCovariance) {
     const AdditiveModel other = test::with_parameters(model, 0, x + deviation.asDiagonal() * noise);
     const auto points = loop_points(other, controller, lines, false);
     for (Eigen::Index k = 0; k < lines.size(); ++k) {
-      const LoopPoint& point = points[static_cast<std::size_t>(k)];
+      const LoopPoint& point = points[k];
       for (Eigen::Index i = 0; i < 2; ++i, ++all)
         inside += std::abs(point.loop[i] - view.loop(i, k)) <= view.loop_radius(i, k) ? 1 : 0;
       inside += std::abs(point.determinant - view.determinant[k]) <= view.determinant_radius[k];

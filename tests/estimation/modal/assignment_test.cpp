@@ -23,7 +23,7 @@ double total(const Eigen::MatrixXd& cost, double limit, const Pairs& pairs) {
 /// By trying every permutation of the longer side.
 double least_total(const Eigen::MatrixXd& cost, double limit) {
   const Eigen::Index size = std::max(cost.rows(), cost.cols());
-  std::vector<Eigen::Index> column(static_cast<std::size_t>(size));
+  std::vector<Eigen::Index> column(size);
   std::iota(column.begin(), column.end(), 0);
   double least = 1e300;
   do {

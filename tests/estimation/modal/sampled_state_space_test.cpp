@@ -84,9 +84,7 @@ TEST(SampledStateSpace, AgreesWithScipy) {
   Eigen::MatrixXcd expected(6, lines.size());
   for (Eigen::Index k = 0; k < lines.size(); ++k)
     for (Eigen::Index c = 0; c < 6; ++c) {
-      const auto& value =
-          reference["response"][static_cast<std::size_t>(k)][static_cast<std::size_t>(c % 2)]
-                   [static_cast<std::size_t>(c / 2)];
+      const auto& value = reference["response"][k][c % 2][static_cast<std::size_t>(c / 2)];
       expected(c, k) = {value[0].get<double>(), value[1].get<double>()};
     }
   const SampledStateSpace sampled = sampled_state_space(model);
@@ -205,14 +203,13 @@ TEST(SampledStateSpace, RunsAsWritten) {
   Eigen::VectorXd x = Eigen::VectorXd::Zero(sampled.system.order());
   for (int n = 0; n < kSamples; ++n) {
     const long long at = n - sampled.input_delay_samples[0];
-    const Eigen::VectorXd input =
-        Eigen::VectorXd::Constant(1, at >= 0 ? u[static_cast<std::size_t>(at)] : 0.0);
+    const Eigen::VectorXd input = Eigen::VectorXd::Constant(1, at >= 0 ? u[at] : 0.0);
     const double y = (sampled.system.C * x + sampled.system.D * input).value();
     x = sampled.system.A * x + sampled.system.B * input;
     double expected = 0.0;
     for (int k = 0; k <= n; ++k) {
       const double since = (n - k - 1.25) * kPeriod;
-      expected += u[static_cast<std::size_t>(k)] * (step(since) - step(since - kPeriod));
+      expected += u[k] * (step(since) - step(since - kPeriod));
     }
     EXPECT_NEAR(y, expected, 1e-13) << "sample " << n;
   }

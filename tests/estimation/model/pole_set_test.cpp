@@ -25,7 +25,7 @@ TEST(PoleSet, FractionsAreRealOnConjugatePairs) {
   for (Eigen::Index k = 0; k < 3; ++k) {
     const Complex x = some_x()[k];
     for (Eigen::Index i = 0; i < 2; ++i) {
-      const Complex p = kPoles.pairs[static_cast<std::size_t>(i)];
+      const Complex p = kPoles.pairs[i];
       // Over their common denominator: (2 x - 2 Re p) and -2 Im p, both real in x.
       const Complex denominator = x * x - 2.0 * p.real() * x + std::norm(p);
       EXPECT_LT(std::abs(phi(k, 2 * i) - (2.0 * x - 2.0 * p.real()) / denominator), 1e-14);

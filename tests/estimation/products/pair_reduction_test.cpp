@@ -72,13 +72,12 @@ void expect_columns(const FractionColumns& columns, const std::vector<FractionCo
   for (std::size_t c = 0; c < expanded.size(); ++c) {
     if (expanded[c].pair < 0) continue;
     ++found;
-    const auto column = static_cast<Eigen::Index>(c);
     Eigen::VectorXcd value = written_out(columns, expanded[c]);
     if (with_first)
       for (Eigen::Index k = 0; k < value.size(); ++k) value[k] *= columns.first(k, 0);
     Eigen::VectorXcd wanted(functions.re.rows());
-    wanted.real() = functions.re.col(column);
-    wanted.imag() = functions.im.col(column);
+    wanted.real() = functions.re.col(c);
+    wanted.imag() = functions.im.col(c);
     // Two fractions of a conjugate pair cancel to the ratio of the mode's frequency and the line's.
     EXPECT_LT((value - wanted).norm(), 1e-11 * wanted.norm()) << c;
   }
@@ -137,8 +136,7 @@ class ReductionTest : public testing::Test {
     const Eigen::MatrixXd right_power = power(right);
     for (std::size_t p = 0; p < pairs.size(); ++p)
       for (Eigen::Index m = 0; m < W.rows(); ++m) {
-        const auto row = static_cast<Eigen::Index>(p);
-        EXPECT_NEAR(sums(row, m), wanted(row, m),
+        EXPECT_NEAR(sums(p, m), wanted(p, m),
                     1e-9 * std::sqrt(left_power(m, pairs[p].left) * right_power(m, pairs[p].right)))
             << pairs[p].left << " with " << pairs[p].right;
       }

@@ -112,8 +112,7 @@ TEST(LineNoise, ADriftWhileItIsLearnedIsNotNoise) {
   const std::vector<Eigen::MatrixXcd> steady = noise.periods(kPeriods);
   std::vector<Eigen::MatrixXcd> drifting = steady;
   const Eigen::MatrixXcd change = noise.period();
-  for (int t = 0; t < kPeriods; ++t)
-    drifting[static_cast<std::size_t>(t)] += (3.0 + static_cast<double>(t)) * change;
+  for (int t = 0; t < kPeriods; ++t) drifting[t] += (3.0 + static_cast<double>(t)) * change;
   const Eigen::MatrixXcd columns = noise.period().reshaped();
   const LineNoise a(steady);
   const LineNoise b(drifting);

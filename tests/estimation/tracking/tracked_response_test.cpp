@@ -26,8 +26,7 @@ Eigen::VectorXd changes(const TrackedResponse& response) {
   test::RandomNumbers random(4);
   Eigen::VectorXd x(response.size());
   for (Eigen::Index p = 0; p < x.size(); ++p) {
-    const bool delay =
-        response.parameters()[static_cast<std::size_t>(p)].kind == TrackedKind::delay;
+    const bool delay = response.parameters()[p].kind == TrackedKind::delay;
     x[p] = (delay ? 2e-5 : 0.1) * random.uniform(0.5, 1.0) *
            (!delay && random.integer(0, 1) == 0 ? -1.0 : 1.0);
   }
@@ -83,7 +82,7 @@ TEST(TrackedResponse, IsThatOfTheChangedStageBehindTheExactHold) {
     StageProperties stage;
     ASSERT_EQ(x.size(), 14);
     for (std::size_t i = 0; i < 4; ++i) {
-      stage.frequency_hz[i] *= 1.0 + x[static_cast<Eigen::Index>(i)];
+      stage.frequency_hz[i] *= 1.0 + x[i];
       stage.damping_ratio[i] *= 1.0 + x[static_cast<Eigen::Index>(i) + 4];
     }
     stage.sensor_gain += x.segment(8, 2);
@@ -112,8 +111,7 @@ void expect_derivatives(const AdditiveModel& model, const std::string& what) {
   const Eigen::MatrixXcd derivatives = response.derivatives(x, U);
   ASSERT_EQ(derivatives.cols(), x.size());
   for (Eigen::Index p = 0; p < x.size(); ++p) {
-    const bool delay =
-        response.parameters()[static_cast<std::size_t>(p)].kind == TrackedKind::delay;
+    const bool delay = response.parameters()[p].kind == TrackedKind::delay;
     const double scale = delay ? 1.0 / test::kTrackedRateHz : 1.0;
     const auto slope = [&](double step) -> Eigen::MatrixXcd {
       const Eigen::VectorXd direction = Eigen::VectorXd::Unit(x.size(), p) * (step * scale);
@@ -126,7 +124,7 @@ void expect_derivatives(const AdditiveModel& model, const std::string& what) {
     const Eigen::MatrixXcd expected = (4.0 * slope(1e-5) - slope(2e-5)) / 3.0;
     EXPECT_GT(expected.norm(), 0.0);
     EXPECT_LT((derivatives.col(p) - expected.reshaped()).norm(), 3e-9 * expected.norm())
-        << describe(response.parameters()[static_cast<std::size_t>(p)], model) << ", " << what;
+        << describe(response.parameters()[p], model) << ", " << what;
   }
 }
 

@@ -138,7 +138,7 @@ TEST(WatchForecast, DeviationIsThatOfTheTracker) {
   // 256 periods estimate a deviation to 4 %.
   for (Index p = 0; p < tracked.size(); ++p)
     EXPECT_NEAR(tracked[p], forecast.deviation[p], 0.1 * forecast.deviation[p])
-        << to_string(response.parameters()[static_cast<std::size_t>(p)].kind);
+        << to_string(response.parameters()[p].kind);
   EXPECT_GE(forecast.periods.minCoeff(), 3.0);
 }
 

@@ -37,14 +37,14 @@ void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool te
     const FitResult fit = fit_additive_model(frf, problem.model, options);
     ASSERT_TRUE(fit.trustworthy()) << fit.message();
     for (Eigen::Index i = 0; i < 3; ++i) {
-      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i + 1)];
+      const Submodel& s = fit.model.submodels[i + 1];
       values(2 * i, run) = s.natural_frequency_hz();
       values(2 * i + 1, run) = s.damping_ratio();
       reported[2 * i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
       reported[2 * i + 1] += std::pow(*s.damping_ratio_std, 2) / kRuns;
     }
     for (Eigen::Index i = 0; i < 4; ++i) {
-      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i)];
+      const Submodel& s = fit.model.submodels[i];
       const auto rows = Eigen::seqN(i * problem.channels(), problem.channels());
       numerators(rows, run) = s.numerator[0].reshaped();
       numerators_reported(rows) += s.numerator_std[0].reshaped().cwiseAbs2() / kRuns;
@@ -59,7 +59,7 @@ void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool te
   test::expect_honest(test::scatter_of(values), reported);
   for (Eigen::Index q = 0; q < kQuantities; ++q) {
     // Unbiased within the scatter of the mean.
-    const Submodel& truth = problem.model.submodels[static_cast<std::size_t>(q / 2 + 1)];
+    const Submodel& truth = problem.model.submodels[q / 2 + 1];
     EXPECT_NEAR(values.row(q).mean(),
                 q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
                 4.0 * std::sqrt(reported[q] / kRuns));
@@ -131,7 +131,7 @@ TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
     setup.options.threads = 1;
     const FitResult fit = fit_additive_model(setup.frf, problem.model, setup.options);
     for (Eigen::Index i = 0; i < 3; ++i) {
-      const Submodel& s = fit.model.submodels[static_cast<std::size_t>(i + 1)];
+      const Submodel& s = fit.model.submodels[i + 1];
       values(i, run) = s.natural_frequency_hz();
       reported[i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
     }

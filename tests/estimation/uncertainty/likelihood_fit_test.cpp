@@ -159,12 +159,11 @@ Eigen::MatrixXd expect_fisher_deviations(const Measurement& m) {
   // Conjugate gradients to 1e-2 in the norm of the arrow, variances to its square, and the true norm is larger by the
   // condition of the correlations, 1e3 here, at its worst.
   for (Eigen::Index i = 0; i < 3; ++i)
-    test::expect_mode_deviations(fit.model.submodels[static_cast<std::size_t>(i + 1)],
-                                 C.block<2, 2>(2 * i, 2 * i), 5e-3);
+    test::expect_mode_deviations(fit.model.submodels[i + 1], C.block<2, 2>(2 * i, 2 * i), 5e-3);
   const std::vector<Eigen::MatrixXcd> J = test::joint_jacobian(at, DelayModel::estimate);
   Eigen::MatrixXd ratio = fit.response_variance;
   for (Eigen::Index k = 0; k < ratio.cols(); ++k) {
-    const Eigen::MatrixXcd& J_k = J[static_cast<std::size_t>(k)];
+    const Eigen::MatrixXcd& J_k = J[k];
     for (Eigen::Index c = 0; c < ratio.rows(); ++c)
       ratio(c, k) /= (J_k.row(c) * C * J_k.row(c).adjoint())(0, 0).real();
   }

@@ -52,10 +52,8 @@ void expect_slopes(const Submodel& mode) {
       Submodel s = mode;
       const Eigen::Index n = s.numerator[0].size();
       double& value =
-          p < 2 ? s.denominator[static_cast<std::size_t>(p + 1)]
-                : s.numerator[static_cast<std::size_t>((p - 2) / n)].reshaped()[(p - 2) % n];
-      const double scale =
-          p < 2 ? value : s.numerator[static_cast<std::size_t>((p - 2) / n)].norm();
+          p < 2 ? s.denominator[p + 1] : s.numerator[(p - 2) / n].reshaped()[(p - 2) % n];
+      const double scale = p < 2 ? value : s.numerator[(p - 2) / n].norm();
       value += by * scale;
       return std::pair(modal_quantities(s), by * scale);
     };

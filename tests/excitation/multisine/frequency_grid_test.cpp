@@ -45,7 +45,7 @@ TEST(FrequencyGrid, NeverExcitesZeroFrequencyNorHalfTheRate) {
 TEST(FrequencyGrid, ConvertsLinesToHertzAndRadiansOnce) {
   const FrequencyGrid grid(1000.0, 3000, {1, 10, 1499});
   for (Eigen::Index k = 0; k < 3; ++k) {
-    const double wanted = grid.lines()[static_cast<std::size_t>(k)] / 3.0;
+    const double wanted = grid.lines()[k] / 3.0;
     EXPECT_DOUBLE_EQ(grid.frequency_hz()[k], wanted);
     EXPECT_DOUBLE_EQ(grid.omega_rad_s()[k], 2.0 * std::numbers::pi * wanted);
   }

@@ -75,7 +75,7 @@ TEST(Multisine, SamplesAreTheCosinesOfItsAmplitudesAndPhases) {
   for (int n = 0; n < 30; ++n) {
     double sum = 0.0;
     for (Eigen::Index k = 0; k < 3; ++k) {
-      const int line = grid.lines()[static_cast<std::size_t>(k)];
+      const int line = grid.lines()[k];
       sum += m.amplitude[k] * std::cos(kTurn * line * n / 30.0 + m.phase_rad[k]);
     }
     // Angles up to 14 * 2 pi, rounded to 88 eps, times amplitudes of 2.4.
@@ -111,7 +111,7 @@ TEST(Multisine, LeavesEveryOtherLineEmpty) {
     const Eigen::VectorXcd spectrum = dft_over_n(m.samples);
     Eigen::VectorXd empty = spectrum.cwiseAbs();
     for (Eigen::Index k = 0; k < grid.size(); ++k) {
-      const int line = grid.lines()[static_cast<std::size_t>(k)];
+      const int line = grid.lines()[k];
       empty[line] = 0.0;
       EXPECT_NEAR(std::abs(spectrum[line] - std::polar(m.amplitude[k] / 2.0, m.phase_rad[k])), 0.0,
                   64.0 * kEps)

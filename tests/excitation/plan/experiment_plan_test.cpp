@@ -107,7 +107,7 @@ TEST(ExperimentPlan, PhasesAreThoseOfTheIndependentReference) {
   const FrequencyGrid grid(1000.0, 200, {1, 3, 5, 7, 9, 11, 13, 15});
   const Eigen::VectorXd phases = ExperimentPlan(grid, spec).phase_rad(2).row(3);
   for (Eigen::Index k = 0; k < 8; ++k) {
-    EXPECT_EQ(phases[k], test::reference::kStreamPhaseRad[static_cast<std::size_t>(k)]);
+    EXPECT_EQ(phases[k], test::reference::kStreamPhaseRad[k]);
   }
 }
 
@@ -125,7 +125,7 @@ TEST_P(OrthogonalPlan, ExperimentsAreOrthogonalOnEveryLine) {
     for (int e = 0; e < n; ++e) spectra.push_back(plan.spectrum({m, e}));
     for (Eigen::Index k = 0; k < plan.grid().size(); ++k) {
       Eigen::MatrixXcd R(n, n);
-      for (int e = 0; e < n; ++e) R.col(e) = spectra[static_cast<std::size_t>(e)].col(k);
+      for (int e = 0; e < n; ++e) R.col(e) = spectra[e].col(k);
       // R R^H = n D^2, D the size A / 2 of each axis: sums of n products of size D^2.
       const Eigen::VectorXd D = plan.amplitude().col(k) / 2.0;
       const Eigen::MatrixXcd normalized =
@@ -182,7 +182,7 @@ TEST(ExperimentPlan, SpectrumIsTheDftOfTheExcitation) {
       Eigen::VectorXcd rest =
           Eigen::Map<const Eigen::VectorXcd>(spectrum.data(), dft.half_size()) / 200.0;
       for (Eigen::Index k = 0; k < plan.grid().size(); ++k) {
-        rest[plan.grid().lines()[static_cast<std::size_t>(k)]] -= wanted(p, k);
+        rest[plan.grid().lines()[k]] -= wanted(p, k);
       }
       EXPECT_LT(rest.cwiseAbs().maxCoeff(), 32.0 * kEps) << "axis " << p;
     }
@@ -245,8 +245,7 @@ TEST(ExperimentPlan, ZipperedAxesShareARunAndNoLine) {
       EXPECT_LT(crest_factor(excitation.col(p)), 2.0);
       const auto spectrum = dft.forward(excitation.col(p));
       for (std::size_t k = 0; k < plan.grid().lines().size(); ++k) {
-        const double amplitude =
-            std::abs(spectrum[static_cast<std::size_t>(plan.grid().lines()[k])]) / 100.0;
+        const double amplitude = std::abs(spectrum[plan.grid().lines()[k]]) / 100.0;
         const double wanted = plan.amplitude()(p, static_cast<Eigen::Index>(k));
         EXPECT_EQ(wanted > 0.0, k % 3 == static_cast<std::size_t>(p)) << k;
         EXPECT_NEAR(amplitude, wanted, 64.0 * kEps) << k;

@@ -30,7 +30,7 @@ TEST(WorkerPool, TheFirstFailureIsThrown) {
 
 TEST(WorkerPool, TasksWithoutAWorkerRunOnceAndPassExceptionsOn) {
   std::vector<int> calls(100, 0);
-  for_each_task(0, 100, [&](int i) { ++calls[static_cast<std::size_t>(i)]; });
+  for_each_task(0, 100, [&](int i) { ++calls[i]; });
   EXPECT_EQ(calls, std::vector<int>(100, 1));
   EXPECT_THROW(for_each_task(0, 8,
                              [](int i) {

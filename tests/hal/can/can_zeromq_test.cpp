@@ -22,10 +22,9 @@ class Router {
 
   std::vector<std::uint8_t> receive() {
     host_.resize(64);
-    host_.resize(static_cast<std::size_t>(zmq_recv(socket_.get(), host_.data(), host_.size(), 0)));
+    host_.resize(zmq_recv(socket_.get(), host_.data(), host_.size(), 0));
     std::vector<std::uint8_t> message(1000);
-    message.resize(
-        static_cast<std::size_t>(zmq_recv(socket_.get(), message.data(), message.size(), 0)));
+    message.resize(zmq_recv(socket_.get(), message.data(), message.size(), 0));
     return message;
   }
   void answer(const std::vector<std::uint8_t>& message) {

@@ -21,8 +21,7 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::VectorXd shape_of(const std::vector<PlantMode>& modes, Eigen::Index actuator) {
   Eigen::VectorXd shape(std::ssize(modes));
-  for (Eigen::Index i = 0; i < shape.size(); ++i)
-    shape[i] = modes[static_cast<std::size_t>(i)].actuator_shape[actuator];
+  for (Eigen::Index i = 0; i < shape.size(); ++i) shape[i] = modes[i].actuator_shape[actuator];
   return shape;
 }
 
@@ -33,8 +32,7 @@ std::complex<double> receptance(const std::vector<PlantMode>& modes, const Eigen
   const std::complex<double> s(0.0, kTurn * hz);
   for (std::size_t i = 0; i < modes.size(); ++i) {
     const double omega = kTurn * modes[i].natural_frequency_hz;
-    const auto k = static_cast<Eigen::Index>(i);
-    sum += out[k] * in[k] / (s * s + 2.0 * modes[i].damping_ratio * omega * s + omega * omega);
+    sum += out[i] * in[i] / (s * s + 2.0 * modes[i].damping_ratio * omega * s + omega * omega);
   }
   return sum;
 }
@@ -60,8 +58,8 @@ TEST(AddedMass, ChangesTheResponseAsTheForceOfTheMassDoes) {
   const LoadedModes loaded = loaded_modes(modes, p, mass_kg);
   Eigen::VectorXd y(p.size()), y_loaded(p.size());
   for (Eigen::Index i = 0; i < p.size(); ++i) {
-    y[i] = modes[static_cast<std::size_t>(i)].sensor_shape[1];
-    y_loaded[i] = loaded.modes[static_cast<std::size_t>(i)].sensor_shape[1];
+    y[i] = modes[i].sensor_shape[1];
+    y_loaded[i] = loaded.modes[i].sensor_shape[1];
   }
   const Eigen::VectorXd u = shape_of(modes, 0);
   const Eigen::VectorXd u_loaded = shape_of(loaded.modes, 0);
@@ -99,7 +97,7 @@ class Reference {
     const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(n, n) + mass_kg * at_ * at_.transpose();
     Eigen::VectorXd omega(n), damping(n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const PlantMode& mode = modes_[static_cast<std::size_t>(i)];
+      const PlantMode& mode = modes_[i];
       omega[i] = kTurn * mode.natural_frequency_hz;
       damping[i] = 2.0 * mode.damping_ratio * omega[i];
     }
@@ -130,8 +128,7 @@ class Reference {
   }
   double sensor() const {
     double sum = 0.0;
-    for (Eigen::Index i = 0; i < q_.size(); ++i)
-      sum += modes_[static_cast<std::size_t>(i)].sensor_shape[0] * q_[i];
+    for (Eigen::Index i = 0; i < q_.size(); ++i) sum += modes_[i].sensor_shape[0] * q_[i];
     return sum;
   }
 

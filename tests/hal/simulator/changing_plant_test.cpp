@@ -58,10 +58,10 @@ double acting_force(const PlantMode& mode, int n) {
 /// The sensor of the small stage at t_1 ... t_cycles. Before t_n + delay, u[n-1] acts; then u[n].
 std::vector<double> reference(const test::SimulatedSpec& spec, const Truth& truth, int cycles) {
   const double period_s = 1.0 / spec.info.sample_rate_hz;
-  std::vector<double> y(static_cast<std::size_t>(cycles));
+  std::vector<double> y(cycles);
   const std::vector<PlantMode> modes = plant_modes(spec.info, spec.plant);
   for (int m = 0; m < static_cast<int>(modes.size()); ++m) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(m)];
+    const PlantMode& mode = modes[m];
     Motion motion;
     for (int n = 0; n < cycles; ++n) {
       const Factors factors = truth(m, n);
@@ -69,7 +69,7 @@ std::vector<double> reference(const test::SimulatedSpec& spec, const Truth& trut
       const double zeta = mode.damping_ratio * factors.damping;
       motion = advance(motion, omega, zeta, acting_force(mode, n - 1), spec.info.delay_s);
       motion = advance(motion, omega, zeta, acting_force(mode, n), period_s - spec.info.delay_s);
-      y[static_cast<std::size_t>(n)] += mode.sensor_shape[0] * motion.q;
+      y[n] += mode.sensor_shape[0] * motion.q;
     }
   }
   return y;
@@ -165,10 +165,10 @@ TEST(ChangingPlant, ChangesOfOneModeMultiply) {
 std::vector<double> integrated(const test::SimulatedSpec& spec, const Fault& ramp, double late,
                                int cycles) {
   const double period_s = 1.0 / spec.info.sample_rate_hz;
-  std::vector<double> y(static_cast<std::size_t>(cycles));
+  std::vector<double> y(cycles);
   const std::vector<PlantMode> modes = plant_modes(spec.info, spec.plant);
   for (int m = 0; m < static_cast<int>(modes.size()); ++m) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(m)];
+    const PlantMode& mode = modes[m];
     const double start_s = (static_cast<double>(ramp.from_cycle) + late) * period_s;
     const auto slope = [&](const Motion& x, double t_s, double force) {
       const double grown = std::clamp((t_s - start_s) / ramp.ramp_s, 0.0, 1.0);
@@ -193,7 +193,7 @@ std::vector<double> integrated(const test::SimulatedSpec& spec, const Fault& ram
         x.q += h / 6.0 * (a.q + 2.0 * b.q + 2.0 * c.q + d.q);
         x.v += h / 6.0 * (a.v + 2.0 * b.v + 2.0 * c.v + d.v);
       }
-      y[static_cast<std::size_t>(n)] += mode.sensor_shape[0] * x.q;
+      y[n] += mode.sensor_shape[0] * x.q;
     }
   }
   return y;

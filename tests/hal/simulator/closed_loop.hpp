@@ -21,8 +21,7 @@ class ClosedLoop {
   /// Computes u[n], then exchanges the sample with the stage.
   Outcome step(const Eigen::VectorXd& excitation) {
     controller_.update(driver_.y.data(), driver_.u.data());
-    for (Eigen::Index i = 0; i < excitation.size(); ++i)
-      driver_.u[static_cast<std::size_t>(i)] += excitation[i];
+    for (Eigen::Index i = 0; i < excitation.size(); ++i) driver_.u[i] += excitation[i];
     return driver_.step();
   }
 

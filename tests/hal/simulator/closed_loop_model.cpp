@@ -45,7 +45,7 @@ System plant_system(const SimulatedSpec& spec) {
            MatrixXd::Zero(outputs, inputs)};
   const auto past = [&](Index steps) { return 2 * count + inputs * (steps - 1); };
   for (Index i = 0; i < count; ++i) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
+    const PlantMode& mode = modes[i];
     const MatrixXd early = propagation(mode, fraction * period_s);
     const MatrixXd late = propagation(mode, (1.0 - fraction) * period_s);
     s.a.block(2 * i, 2 * i, 2, 2) = late.leftCols(2) * early.leftCols(2);
@@ -103,7 +103,7 @@ System controller_system(const MotionControllerSpec& spec) {
            MatrixXd::Zero(count, states), MatrixXd::Zero(count, count)};
   Index row = 0;
   for (Index i = 0; i < count; ++i) {
-    const System& axis = axes[static_cast<std::size_t>(i)];
+    const System& axis = axes[i];
     const Index n = axis.a.rows();
     s.a.block(row, row, n, n) = axis.a;
     s.b.block(row, i, n, 1) = axis.b;

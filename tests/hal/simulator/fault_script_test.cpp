@@ -180,9 +180,8 @@ TEST(SensorNoise, IsMultiplied) {
       EXPECT_EQ(loud.step(), Outcome::ok);
       EXPECT_EQ(usual.step(), Outcome::ok);
       for (int i : {0, 1}) {
-        const auto sensor = static_cast<std::size_t>(i);
         const double factor = n >= 5 && (channel == -1 || channel == i) ? 3.0 : 1.0;
-        EXPECT_DOUBLE_EQ(loud.y[sensor], factor * usual.y[sensor]) << n;
+        EXPECT_DOUBLE_EQ(loud.y[i], factor * usual.y[i]) << n;
       }
     }
   }

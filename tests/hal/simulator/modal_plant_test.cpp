@@ -38,7 +38,7 @@ StateSpace dense(const std::vector<PlantMode>& modes) {
   StateSpace s{MatrixXd::Zero(2 * n, 2 * n), MatrixXd::Zero(2 * n, modes[0].actuator_shape.size()),
                MatrixXd::Zero(modes[0].sensor_shape.size(), 2 * n)};
   for (Eigen::Index i = 0; i < n; ++i) {
-    const PlantMode& mode = modes[static_cast<std::size_t>(i)];
+    const PlantMode& mode = modes[i];
     const double omega = kTwoPi * mode.natural_frequency_hz;
     constexpr double kV = 1000.0;
     s.a(i, n + i) = kV;
@@ -76,9 +76,7 @@ TEST_P(DelayedPlant, FollowsTheMatrixExponentialOfTheWholeSystem) {
   const auto whole = static_cast<int>(std::floor(delay_samples));
   const double fraction = delay_samples - whole;
   std::vector<VectorXd> u;
-  const auto held = [&](int n) {
-    return n < 0 ? VectorXd(VectorXd::Zero(2)) : u[static_cast<std::size_t>(n)];
-  };
+  const auto held = [&](int n) { return n < 0 ? VectorXd(VectorXd::Zero(2)) : u[n]; };
   VectorXd x = VectorXd::Zero(4);
   double largest = 0.0;
   double error = 0.0;
@@ -155,7 +153,7 @@ TEST(ModalPlant, ConservesEnergy) {
   for (std::size_t i = 0; i < 2; ++i) {
     observed[i].sensor_shape = VectorXd::Zero(4);
     observed[i].sensor_shape.head<2>() = modes[i].actuator_shape;
-    observed[i].sensor_shape[static_cast<Eigen::Index>(2 + i)] = 1.0;
+    observed[i].sensor_shape[2 + i] = 1.0;
   }
   const double period_s = 1e-3;
   ModalPlant plant(observed, 0.0, 1.0 / period_s);
@@ -177,7 +175,7 @@ TEST(ModalPlant, ConservesEnergy) {
   double energy = 0.0;
   for (Eigen::Index i = 0; i < 2; ++i) {
     // Free vibration q = A cos(w t + p): two samples give A.
-    const double omega = kTwoPi * modes[static_cast<std::size_t>(i)].natural_frequency_hz;
+    const double omega = kTwoPi * modes[i].natural_frequency_hz;
     const double q0 = y[2 + i];
     const double q1 = next[2 + i];
     const double wt = omega * period_s;

@@ -16,7 +16,7 @@ inline Eigen::VectorXd odd_multisine(int period, int lines, double rms, std::uin
   std::mt19937_64 engine(seed);
   std::uniform_real_distribution<double> phase(0.0, 2.0 * std::numbers::pi);
   const double amplitude = rms * std::sqrt(2.0 / lines);
-  std::vector<std::complex<double>> spectrum(static_cast<std::size_t>(period));
+  std::vector<std::complex<double>> spectrum(period);
   for (int i = 0; i < lines; ++i) {
     const auto line = static_cast<std::size_t>(2 * i + 1);
     spectrum[line] = std::polar(0.5 * amplitude * period, phase(engine));
@@ -26,7 +26,7 @@ inline Eigen::VectorXd odd_multisine(int period, int lines, double rms, std::uin
   Eigen::FFT<double> fft;
   fft.inv(samples, spectrum);
   Eigen::VectorXd signal(period);
-  for (int n = 0; n < period; ++n) signal[n] = samples[static_cast<std::size_t>(n)].real();
+  for (int n = 0; n < period; ++n) signal[n] = samples[n].real();
   return signal;
 }
 
@@ -38,7 +38,7 @@ inline Eigen::VectorXcd spectrum(const Eigen::VectorXd& signal) {
   fft.fwd(lines, samples);
   Eigen::VectorXcd out(signal.size());
   for (Eigen::Index k = 0; k < out.size(); ++k)
-    out[k] = lines[static_cast<std::size_t>(k)] * 2.0 / static_cast<double>(signal.size());
+    out[k] = lines[k] * 2.0 / static_cast<double>(signal.size());
   return out;
 }
 

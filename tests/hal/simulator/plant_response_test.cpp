@@ -132,9 +132,7 @@ TEST(WaferStageModes, HaveSeventeenFlexibleOnesBelowTwoKilohertz) {
   const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
   const auto modes = plant_modes(spec.info, spec.plant);
   ASSERT_EQ(modes.size(), 32U);
-  const auto frequency = [&](int flexible) {
-    return modes[static_cast<std::size_t>(6 + flexible)].natural_frequency_hz;
-  };
+  const auto frequency = [&](int flexible) { return modes[6 + flexible].natural_frequency_hz; };
   EXPECT_DOUBLE_EQ(frequency(0), 180.0);
   EXPECT_LT(frequency(16), 1970.0);
   EXPECT_GT(frequency(17), 2050.0);

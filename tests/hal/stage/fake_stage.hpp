@@ -12,15 +12,14 @@ class FakeStage final : public CyclicStage {
  public:
   FakeStage(int actuators, int sensors, double sample_rate_hz) {
     info_.sample_rate_hz = sample_rate_hz;
-    info_.actuators.resize(static_cast<std::size_t>(actuators));
-    info_.sensors.resize(static_cast<std::size_t>(sensors));
+    info_.actuators.resize(actuators);
+    info_.sensors.resize(sensors);
     for (Channel& actuator : info_.actuators) actuator.unit.assign(1, 'N');
     for (Channel& sensor : info_.sensors) sensor.unit.assign(1, 'm');
     for (int i = 0; i < actuators; ++i)
-      info_.actuators[static_cast<std::size_t>(i)].name.assign(1, static_cast<char>('a' + i));
-    for (int i = 0; i < sensors; ++i)
-      info_.sensors[static_cast<std::size_t>(i)].name.assign(1, static_cast<char>('s' + i));
-    measurement.resize(static_cast<std::size_t>(sensors));
+      info_.actuators[i].name.assign(1, static_cast<char>('a' + i));
+    for (int i = 0; i < sensors; ++i) info_.sensors[i].name.assign(1, static_cast<char>('s' + i));
+    measurement.resize(sensors);
   }
 
   const StageInfo& info() const noexcept override { return info_; }

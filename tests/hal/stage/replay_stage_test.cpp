@@ -22,7 +22,7 @@ class MemorySource final : public ReplaySource {
   explicit MemorySource(std::vector<Recorded> runs) : runs_(std::move(runs)) {}
   int runs() const override { return static_cast<int>(runs_.size()); }
   void load(int run, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override {
-    const Recorded& r = runs_[static_cast<std::size_t>(run)];
+    const Recorded& r = runs_[run];
     u = r.u;
     y = r.y;
     marked = r.marked;

@@ -86,7 +86,7 @@ std::string last_line(const std::string& text) {
 SimulatedSpec plant_of(const JudgementStage& stage, const TroublePlan& plan) {
   SimulatedSpec spec = stage.spec;
   if (plan.drifting_mode >= 0)
-    spec.plant.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)].natural_frequency_hz *=
+    spec.plant.in_plane_modes[plan.drifting_mode].natural_frequency_hz *=
         1.0 - 0.5 * plan.drift_relative / stage.realizations;
   if (plan.swapped[0] >= 0 && !stage.stage_file) {
     // Only a stage file could reveal it; the expected answer uses the names in the log.
@@ -129,11 +129,8 @@ Eigen::MatrixXcd exact_response(const JudgementStage& stage, const TroublePlan& 
         G.col(plan.late) /= turn;
     }
     for (Eigen::Index c = 0; c < exact.rows(); ++c)
-      exact(c, k) =
-          G(channel_index(spec.info.sensors,
-                          frf.outputs.names[static_cast<std::size_t>(c % frf.n_outputs())]),
-            channel_index(spec.info.actuators,
-                          frf.inputs.names[static_cast<std::size_t>(c / frf.n_outputs())]));
+      exact(c, k) = G(channel_index(spec.info.sensors, frf.outputs.names[c % frf.n_outputs()]),
+                      channel_index(spec.info.actuators, frf.inputs.names[c / frf.n_outputs()]));
   }
   return exact;
 }

@@ -101,8 +101,7 @@ class Loop {
   }
 
   void drift(double done) {
-    const PlantMode& mode =
-        stage_.spec.plant.in_plane_modes[static_cast<std::size_t>(plan_.drifting_mode)];
+    const PlantMode& mode = stage_.spec.plant.in_plane_modes[plan_.drifting_mode];
     plant_.retune(static_cast<Eigen::Index>(kRigidAxes) + plan_.drifting_mode,
                   mode.natural_frequency_hz * (1.0 + plan_.drift_relative * (done - 0.5)),
                   mode.damping_ratio);
@@ -118,7 +117,7 @@ class Loop {
     seen_ = y_;
     if (plan_.setpoint_m == 0.0) return;
     for (Eigen::Index i = 0; i < y_.size(); ++i)
-      seen_[i] -= heave_[static_cast<std::size_t>(i)] * plan_.setpoint_m * setpoint(turns);
+      seen_[i] -= heave_[i] * plan_.setpoint_m * setpoint(turns);
   }
 
   void push() {
@@ -247,8 +246,7 @@ Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const Tr
                         Eigen::Index e) {
     std::copy(signal.begin(), signal.end(), dft.input().begin());
     const auto spectrum = dft.forward();
-    for (std::size_t k = 0; k < lines.size(); ++k)
-      into[k](row, e) = spectrum[static_cast<std::size_t>(lines[k])];
+    for (std::size_t k = 0; k < lines.size(); ++k) into[k](row, e) = spectrum[lines[k]];
   };
   for (const RunId& run : experiment.runs()) {
     const Eigen::MatrixXd r = experiment.excitation(run);
@@ -264,8 +262,7 @@ Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const Tr
   }
   Eigen::MatrixXcd G(n_y * n_u, static_cast<Eigen::Index>(lines.size()));
   for (std::size_t k = 0; k < lines.size(); ++k)
-    G.col(static_cast<Eigen::Index>(k)) =
-        (sum[k].topRows(n_y) * sum[k].bottomRows(n_u).inverse()).reshaped();
+    G.col(k) = (sum[k].topRows(n_y) * sum[k].bottomRows(n_u).inverse()).reshaped();
   return G;
 }
 

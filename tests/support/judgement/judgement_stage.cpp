@@ -70,9 +70,8 @@ void place_in_plane(RandomNumbers& random, const char* prefix, const char* unit,
   const double b = 0.4 * plant.length_y_m * random.uniform(0.8, 1.0);
   const std::array<std::array<double, 2>, 4> at = {{{0.0, -b}, {0.0, b}, {a, 0.0}, {-a, 0.0}}};
   for (int i = 0; i < count; ++i)
-    channels.push_back(channel(fmt::format("{}h{}", prefix, i + 1), unit,
-                               at[static_cast<std::size_t>(i)][0],
-                               at[static_cast<std::size_t>(i)][1], i < 2 ? 0 : 1));
+    channels.push_back(
+        channel(fmt::format("{}h{}", prefix, i + 1), unit, at[i][0], at[i][1], i < 2 ? 0 : 1));
 }
 
 void draw_body(RandomNumbers& random, const Sizes& sizes, SimulatedSpec& spec) {
@@ -80,7 +79,7 @@ void draw_body(RandomNumbers& random, const Sizes& sizes, SimulatedSpec& spec) {
   spec.info.name = "random stage";
   spec.info.backend = "sim";
   const std::array<double, 3> rates = {1000.0, 2000.0, 4000.0};
-  spec.info.sample_rate_hz = rates[static_cast<std::size_t>(random.integer(0, 2))];
+  spec.info.sample_rate_hz = rates[random.integer(0, 2)];
   plant.mass_kg = random.uniform(5.0, 30.0);
   plant.length_x_m = random.uniform(0.4, 0.8);
   plant.length_y_m = plant.length_x_m * random.uniform(0.7, 1.3);
@@ -206,7 +205,7 @@ void draw_noise(RandomNumbers& random, JudgementStage& stage) {
   stage.snr_db = random.uniform(30.0, 50.0);
   double response_noise = median * std::pow(10.0, -stage.snr_db / 20.0);
   for (int i = 0; i < stage.modes_in_band; ++i) {
-    const PlantMode& mode = spec.plant.in_plane_modes[static_cast<std::size_t>(i)];
+    const PlantMode& mode = spec.plant.in_plane_modes[i];
     const double omega = 2.0 * kPi * mode.natural_frequency_hz;
     const double peak = mode.actuator_shape.cwiseAbs().maxCoeff() *
                         mode.sensor_shape.cwiseAbs().maxCoeff() /

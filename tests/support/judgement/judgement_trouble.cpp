@@ -73,7 +73,7 @@ const char* to_string(Trouble trouble) noexcept {
 
 std::optional<Trouble> trouble_of(const std::string& name) noexcept {
   for (int i = 0; i < kTroubles; ++i)
-    if (name == kNames[static_cast<std::size_t>(i)]) return static_cast<Trouble>(i);
+    if (name == kNames[i]) return static_cast<Trouble>(i);
   return std::nullopt;
 }
 
@@ -115,9 +115,7 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
       break;
     case Trouble::mode_drift: {
       plan.drifting_mode = random.integer(0, stage.modes_in_band - 1);
-      const double damping =
-          stage.spec.plant.in_plane_modes[static_cast<std::size_t>(plan.drifting_mode)]
-              .damping_ratio;
+      const double damping = stage.spec.plant.in_plane_modes[plan.drifting_mode].damping_ratio;
       plan.drift_relative = 2.0 * damping * random.uniform(0.3, 2.0);
       plan.right_causes = {"drift", "realizations", "changed"};
       break;

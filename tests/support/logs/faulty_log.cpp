@@ -63,8 +63,7 @@ class Loop {
         force_(plant_.actuators()),
         window_m_(1e-3) {
     if (fault.kind != Kind::drifting_mode) return;
-    const PlantMode mode =
-        plant_modes(request.stage.info, request.stage.plant)[static_cast<std::size_t>(fault.a)];
+    const PlantMode mode = plant_modes(request.stage.info, request.stage.plant)[fault.a];
     mode_hz_ = mode.natural_frequency_hz;
     mode_damping_ = mode.damping_ratio;
   }
@@ -227,7 +226,7 @@ void lose_samples(const PlantedFault& fault, Eigen::Index period, Eigen::MatrixX
 
 void spoil_recording(const PlantedFault& fault, MemoryLog& log) {
   if (fault.kind == Kind::lost_samples) {
-    LogSamples& record = log.records[static_cast<std::size_t>(fault.a)];
+    LogSamples& record = log.records[fault.a];
     lose_samples(fault, log.log_info.period_samples, record.sensors);
     lose_samples(fault, log.log_info.period_samples, record.actuators);
     return;
@@ -245,8 +244,7 @@ void spoil_recording(const PlantedFault& fault, MemoryLog& log) {
     Eigen::MatrixXd& x = fault.of_sensor ? record.sensors : record.actuators;
     if (fault.kind == Kind::recorded_swap) x.col(fault.a).swap(x.col(fault.b));
     if (fault.kind == Kind::mapped_excitation) {
-      const Eigen::MatrixXd& period =
-          log.excitation_periods[static_cast<std::size_t>(&record - log.records.data())];
+      const Eigen::MatrixXd& period = log.excitation_periods[&record - log.records.data()];
       for (Eigen::Index n = 0; n < x.rows(); ++n)
         x(n, fault.a) = period(n % period.rows(), fault.a);
     }

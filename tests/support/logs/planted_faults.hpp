@@ -34,7 +34,7 @@ struct Judgement {
 
 inline std::string channel_text(const PlantedFault& fault, const LogInfo& info) {
   const auto& names = fault.of_sensor ? info.sensors.names : info.actuators.names;
-  const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
+  const auto name = [&](int i) { return names[i]; };
   if (fault.kind != PlantedFault::Kind::recorded_swap &&
       fault.kind != PlantedFault::Kind::wired_swap)
     return name(fault.a);

@@ -47,7 +47,7 @@ SharedFunctions shared_functions(const AdditiveModel& truth, const Eigen::Vector
     return Eigen::VectorXcd((8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h));
   };
   for (Eigen::Index i = 0; i < count; ++i) {
-    const AdditiveModel unit = unit_model(truth, truth.submodels[static_cast<std::size_t>(i)]);
+    const AdditiveModel unit = unit_model(truth, truth.submodels[i]);
     out.value.col(i) = reference_response(unit, frequency_hz, hold).transpose();
     out.to_delay.col(i) = slope(kStep / (6.3 * frequency_hz.maxCoeff()), [&](double by) {
       AdditiveModel moved = unit;
@@ -98,7 +98,7 @@ CramerRaoBound cramer_rao_bound(const AdditiveModel& truth, const Eigen::VectorX
   const auto n = static_cast<Eigen::Index>(truth.submodels.size());
   std::vector<Eigen::Index> unknown;  // of the 2 n + 1 shared ones: those of submodels with poles
   for (Eigen::Index i = 0; i < 2 * n; ++i)
-    if (truth.submodels[static_cast<std::size_t>(i % n)].is_mode()) unknown.push_back(i);
+    if (truth.submodels[i % n].is_mode()) unknown.push_back(i);
   unknown.push_back(2 * n);
   const auto m = static_cast<Eigen::Index>(unknown.size());
 
@@ -106,8 +106,7 @@ CramerRaoBound cramer_rao_bound(const AdditiveModel& truth, const Eigen::VectorX
   Eigen::MatrixXd rest(variance.rows() * m, m);  // what the numerators cannot follow
   for (Eigen::Index c = 0; c < variance.rows(); ++c) {
     Eigen::VectorXd B(n);
-    for (Eigen::Index i = 0; i < n; ++i)
-      B[i] = truth.submodels[static_cast<std::size_t>(i)].numerator[0].reshaped()[c];
+    for (Eigen::Index i = 0; i < n; ++i) B[i] = truth.submodels[i].numerator[0].reshaped()[c];
     const Eigen::VectorXd deviation = variance.row(c).transpose().cwiseSqrt();
     Eigen::MatrixXd R = channel_factor(shared, B, deviation);
     const Eigen::MatrixXd lower = R.bottomRightCorner(2 * n + 1, 2 * n + 1)(Eigen::all, unknown);
@@ -124,17 +123,17 @@ CramerRaoBound cramer_rao_bound(const AdditiveModel& truth, const Eigen::VectorX
   bound.frequency_std_hz.setZero(n);
   bound.damping_std.setZero(n);
   for (Eigen::Index p = 0; p + 1 < m; ++p) {
-    const Eigen::Index at = unknown[static_cast<std::size_t>(p)];
+    const Eigen::Index at = unknown[p];
     (at < n ? bound.frequency_std_hz : bound.damping_std)[at % n] = root.row(p).norm();
   }
   bound.numerator_std.assign(truth.submodels.size(), truth.submodels[0].numerator[0]);
   for (Eigen::Index c = 0; c < variance.rows(); ++c) {
-    const Eigen::MatrixXd& R = factors[static_cast<std::size_t>(c)];
+    const Eigen::MatrixXd& R = factors[c];
     const Eigen::MatrixXd own = upper_inverse(R.topLeftCorner(n, n));
     const Eigen::MatrixXd border = R.topRightCorner(n, 2 * n + 1)(Eigen::all, unknown);
     const Eigen::MatrixXd through = own * border * root;
     for (Eigen::Index i = 0; i < n; ++i)
-      bound.numerator_std[static_cast<std::size_t>(i)].reshaped()[c] =
+      bound.numerator_std[i].reshaped()[c] =
           std::sqrt(0.5 * own.row(i).squaredNorm() + through.row(i).squaredNorm());
   }
   return bound;

@@ -150,7 +150,7 @@ PaperStep paper_step(const DenseProblem& problem, Left left) {
     const Eigen::VectorXcd E = error_at(problem, k);
     Eigen::MatrixXcd upsilon(problem.channels(), K);
     for (Eigen::Index i = 0; i < K; ++i) {
-      const Submodel& s = problem.model.submodels[static_cast<std::size_t>(i)];
+      const Submodel& s = problem.model.submodels[i];
       upsilon.col(i) = (E + submodel_response(problem, s, k)) / denominator_at(problem, s, k);
     }
     M += real_product(z, problem.W.col(k), phi);
@@ -158,7 +158,7 @@ PaperStep paper_step(const DenseProblem& problem, Left left) {
   }
   PaperStep step{M.fullPivLu().solve(rhs), Eigen::VectorXd(first.back())};
   for (Eigen::Index i = 0; i < K; ++i) {
-    const Eigen::Index begin = first[static_cast<std::size_t>(i)];
+    const Eigen::Index begin = first[i];
     const Eigen::Index size = first[static_cast<std::size_t>(i) + 1] - begin;
     step.next_beta.segment(begin, size) = step.solution.col(i).segment(begin, size);
   }

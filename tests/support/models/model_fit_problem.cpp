@@ -20,8 +20,7 @@ Submodel empty_submodel(const AdditiveModel& model, int integrators, std::vector
   Submodel s;
   s.integrators = integrators;
   s.denominator.insert(s.denominator.end(), a.begin(), a.end());
-  s.numerator.assign(static_cast<std::size_t>(matrices),
-                     Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs()));
+  s.numerator.assign(matrices, Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs()));
   return s;
 }
 

@@ -61,16 +61,14 @@ SampledSystem make_sampled(const RationalFunction& function, double period_s, do
   SampledSystem out;
   for (Eigen::Index i = 0; i + 1 < n; ++i) A(i, i + 1) = 1.0L;
   if (n > 0) {
-    for (Eigen::Index i = 0; i < n; ++i)
-      A(n - 1, i) = -coefficient[static_cast<std::size_t>(i)] / highest;
+    for (Eigen::Index i = 0; i < n; ++i) A(n - 1, i) = -coefficient[i] / highest;
     b(n - 1, 0) = 1.0L;
   }
   if (function.power < n) {
     c(0, function.power) = gain;
   } else {  // x^n / a(x) = 1 - (rest) / a(x)
     out.direct = gain;
-    for (Eigen::Index i = 0; i < n; ++i)
-      c(0, i) = -gain * coefficient[static_cast<std::size_t>(i)] / highest;
+    for (Eigen::Index i = 0; i < n; ++i) c(0, i) = -gain * coefficient[i] / highest;
   }
 
   const Long samples = static_cast<Long>(delay_s) / T;

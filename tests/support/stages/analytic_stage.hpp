@@ -115,7 +115,7 @@ class AnalyticStage final : public CyclicStage {
   std::uint64_t all() const { return (std::uint64_t{1} << y_.size()) - 1; }
 
   void give(Inputs& inputs, const Eigen::VectorXd& y) noexcept {
-    for (Eigen::Index i = 0; i < y.size(); ++i) inputs.y[static_cast<std::size_t>(i)] = y[i];
+    for (Eigen::Index i = 0; i < y.size(); ++i) inputs.y[i] = y[i];
     inputs.cycle = cycle_;
     inputs.t_sample_ns =
         static_cast<std::int64_t>(1e9 * static_cast<double>(cycle_) / info_.sample_rate_hz);

@@ -83,8 +83,8 @@ inline Eigen::MatrixXd synthesize(const Eigen::MatrixXcd& spectrum, const std::v
 }
 
 inline double omega_of(const LoopExperiment& experiment, Eigen::Index k) {
-  return 2.0 * std::numbers::pi * experiment.lines[static_cast<std::size_t>(k)] *
-         experiment.sample_rate_hz / experiment.period_samples;
+  return 2.0 * std::numbers::pi * experiment.lines[k] * experiment.sample_rate_hz /
+         experiment.period_samples;
 }
 
 /// R of one realization: for each experiment, n_u x lines; amplitude 1 a line, zippered lines as much
@@ -95,13 +95,12 @@ inline std::vector<Eigen::MatrixXcd> excitation_spectra(const LoopExperiment& x,
                           : x.experiments > 0              ? x.experiments
                                                            : x.axes;
   const auto N = static_cast<Eigen::Index>(x.lines.size());
-  std::vector<Eigen::MatrixXcd> R(static_cast<std::size_t>(experiments),
-                                  Eigen::MatrixXcd::Zero(n_u, N));
+  std::vector<Eigen::MatrixXcd> R(experiments, Eigen::MatrixXcd::Zero(n_u, N));
   for (int axis = 0; axis < x.axes; ++axis) {
     for (Eigen::Index k = 0; k < N; ++k) {
       const std::complex<double> phase = random.phase();
       for (int e = 0; e < experiments; ++e) {
-        std::complex<double>& r = R[static_cast<std::size_t>(e)](axis, k);
+        std::complex<double>& r = R[e](axis, k);
         switch (x.scheme) {
           case AxisScheme::single_axis:
             if (e % x.axes == axis) r = e < x.axes ? phase : random.phase();

@@ -29,7 +29,7 @@ double density(ColouredNoise& noise, double hz) {
   const double turn = 2.0 * std::numbers::pi / kSamples;
   std::vector<std::complex<double>> kernel(kSamples);
   for (int n = 0; n < kSamples; ++n)
-    kernel[static_cast<std::size_t>(n)] =
+    kernel[n] =
         0.5 * (1.0 - std::cos(turn * n)) * std::polar(1.0, -turn * n * hz * kSamples / kRateHz);
   double sum = 0.0;
   for (int i = 0; i < kPeriodograms; ++i) {

@@ -40,7 +40,7 @@ std::vector<Mode> draw_modes(RandomNumbers& random, const RandomStageSpec& spec,
     if (!crowded(mode)) modes.push_back(mode);
   }
   for (int p = 0; p < pairs; ++p) {  // the first modes drawn get a close neighbour
-    const Mode first = modes[static_cast<std::size_t>(p)];
+    const Mode first = modes[p];
     const double half_power_width = 2.0 * first.damping_ratio * first.frequency_hz;
     modes.push_back({first.frequency_hz + random.uniform(0.6, 2.0) * half_power_width,
                      first.damping_ratio * random.uniform(0.7, 1.4)});

@@ -115,7 +115,7 @@ VariedPlant draw_varied_plant(std::uint64_t seed) {
   RandomNumbers random(seed);
   VariedPlant plant;
   AdditiveModel& model = plant.truth;
-  const Size& size = kSizes[static_cast<std::size_t>(random.integer(0, 7))];
+  const Size& size = kSizes[random.integer(0, 7)];
   model.outputs = channels("y", size.outputs, "m");
   model.inputs = channels("u", size.inputs, "N");
   model.sample_rate_hz = 10000.0;

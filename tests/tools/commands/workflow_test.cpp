@@ -280,7 +280,7 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
   channels.insert(channels.end(), prediction.sensors.begin(), prediction.sensors.end());
   ASSERT_EQ(channels.size(), 5U);
   for (Eigen::Index i = 0; i < 5; ++i) {
-    const ChannelPrediction& channel = channels[static_cast<std::size_t>(i)];
+    const ChannelPrediction& channel = channels[i];
     EXPECT_NEAR(channel.rms, std::sqrt(square[i]), kTolerance * channel.rms);
     EXPECT_NEAR(channel.peak, peak[i], kTolerance * channel.peak);
   }

@@ -122,7 +122,7 @@ TEST_F(LimitedPlanTest, BelowItsLinesAPriorIsARigidBodyWithCompliance) {
   const FrfEstimate exact = exact_pilot(stage, below);
   for (Eigen::Index b = 0; b < below.size(); ++b) {
     const Eigen::MatrixXcd G = exact.response.col(b).reshaped(2, 3);
-    EXPECT_LT((prior.below_band[static_cast<std::size_t>(b)] - G).norm(), 0.03 * G.norm());
+    EXPECT_LT((prior.below_band[b] - G).norm(), 0.03 * G.norm());
   }
   const PlantPrior all = read_plant_prior(at("prior.h5"), stage.spec.info, lines);
   EXPECT_EQ(all.extrapolated_below_hz, 0.0);

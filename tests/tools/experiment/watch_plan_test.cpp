@@ -34,7 +34,7 @@ TEST_F(WatchPlanTest, TheFileIsAnExperimentThatPlaysTheDesign) {
   const WatchForecast forecast =
       forecast_of(config, read_model(at("model.json")), read_frf(at("frf.h5")), 1e-5);
   for (std::size_t p = 0; p < told["tracked"].size(); ++p)
-    EXPECT_NEAR(forecast.deviation[static_cast<Eigen::Index>(p)], told["tracked"][p]["deviation"],
+    EXPECT_NEAR(forecast.deviation[p], told["tracked"][p]["deviation"],
                 1e-3 * told["tracked"][p]["deviation"].get<double>());
 
   succeed({"design", "w.yaml", "-o", "w.h5"});

@@ -118,7 +118,7 @@ class WeightsOfTheProgram : public test::ProgramTest {};
 TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   const FrfEstimate frf = test::numbered_frf();
   write_frf(at("frf.h5"), frf);
-  std::vector<double> weights(static_cast<std::size_t>(frf.response.size()), 1.0);
+  std::vector<double> weights(frf.response.size(), 1.0);
   weights[5] = -1.0;
   write_weights(at("w.h5"), weights);
   fail({"fit", "frf.h5", "-o", "model.json", "--weighting", "w.h5"}, 3,

@@ -171,14 +171,13 @@ TEST_F(Plot, AnEntryIsDrawnFromTheNumbersOfTheFiles) {
   ASSERT_EQ(table.at("deviation").size(), static_cast<std::size_t>(lines));
   const Eigen::MatrixXcd model = response_like(read_model(at("model.json")), frf);
   for (Eigen::Index k = 0; k < lines; ++k) {
-    const auto row = static_cast<std::size_t>(k);
     const Eigen::Index line = file.lines() - lines + k;
     const std::complex<double> modelled = model(channel, k);
-    EXPECT_NEAR(table.at("model")[row], std::abs(modelled), 1e-12 * std::abs(modelled));
-    EXPECT_NEAR(table.at("residual")[row], std::abs(file.response(channel, line) - modelled),
+    EXPECT_NEAR(table.at("model")[k], std::abs(modelled), 1e-12 * std::abs(modelled));
+    EXPECT_NEAR(table.at("residual")[k], std::abs(file.response(channel, line) - modelled),
                 1e-12 * std::abs(modelled));
     // Two realizations: their scatter is too uncertain, the noise is shown.
-    EXPECT_NEAR(table.at("deviation")[row], std::sqrt(file.noise_variance(channel, line)), 1e-25);
+    EXPECT_NEAR(table.at("deviation")[k], std::sqrt(file.noise_variance(channel, line)), 1e-25);
   }
 }
 
@@ -210,8 +209,7 @@ TEST_F(Plot, TheModeIndicatorHasItsCurvesAndAMarkForEveryMode) {
     const double omega = file.omega_rad_s()[k];
     const Eigen::VectorXd s = svd(Eigen::MatrixXcd(omega * omega * file.at(k)), 0).singularValues();
     for (Eigen::Index i = 0; i < n; ++i)
-      EXPECT_NEAR(curves.at("curve_" + std::to_string(i + 1))[static_cast<std::size_t>(k)],
-                  s[i] * s[i], 1e-10 * s[0] * s[0]);
+      EXPECT_NEAR(curves.at("curve_" + std::to_string(i + 1))[k], s[i] * s[i], 1e-10 * s[0] * s[0]);
   }
   const auto marks = table_of(picture, "modes.txt");
   EXPECT_EQ(marks.at("frequency_hz"),

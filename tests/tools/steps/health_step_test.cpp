@@ -129,8 +129,7 @@ TEST_F(RecordingFault, ThreeActuatorsInACircleAreNamedOneExchangeAfterTheOther) 
   test::spoil_recording({Kind::recorded_swap, false, 1, 2}, log_);
   const std::vector<Finding> found = findings_of(log_);
   ASSERT_EQ(health_notes(found).size(), 2U) << told(found);
-  for (int i = 0; i < 2; ++i)
-    EXPECT_EQ(found[static_cast<std::size_t>(i)].cause, Cause::swapped) << told(found);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(found[i].cause, Cause::swapped) << told(found);
 }
 
 TEST_F(RecordingFault, AnActuatorThatIsOneOrTwoSamplesLateIsSkewed) {
@@ -173,7 +172,7 @@ TEST(DataHealth, AFewClippedSamplesAreNotTakenForAnExcitationThatWasNotRecorded)
   const MemoryLog log = test::simulate_faulty_log(
       request, {test::PlantedFault::Kind::saturation, false, kActuator, 0, 7.3});
   const HealthRecord record = read_health_record({&log}, {});
-  const ChannelScan& scan = record.scan[static_cast<std::size_t>(record.n_y() + kActuator)];
+  const ChannelScan& scan = record.scan[record.n_y() + kActuator];
   EXPECT_LE(scan.high().count, 10U);
   EXPECT_LE(scan.low().count, 10U);
   const auto findings =

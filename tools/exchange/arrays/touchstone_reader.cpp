@@ -161,11 +161,10 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
     frf.outputs.units.emplace_back(1, parameters.outputs[std::min<std::size_t>(port, 1)]);
   }
   frf.outputs.names = frf.inputs.names;
-  frf.frequency_hz.resize(static_cast<Eigen::Index>(count));
+  frf.frequency_hz.resize(count);
   frf.response.resize(n * n, static_cast<Eigen::Index>(count));
   for (std::size_t k = 0; k < count; ++k) {
-    const auto line = static_cast<Eigen::Index>(k);
-    frf.frequency_hz[line] = numbers[k * step] * options.unit_hz;
+    frf.frequency_hz[k] = numbers[k * step] * options.unit_hz;
     for (Eigen::Index q = 0; q < n * n; ++q) {
       const std::size_t at = k * step + 1 + 2 * static_cast<std::size_t>(q);
       // Row by row, except for two ports: 11, 21, 12, 22.
@@ -173,8 +172,8 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
       const std::string& output = frf.outputs.unit(channel % n);
       // Version 1 divides an impedance by the reference resistance and multiplies an admittance by it.
       const int power_of_ohm = output == frf.inputs.unit(channel / n) ? 0 : output == "V" ? 1 : -1;
-      frf.response(channel, line) = value_of(numbers[at], numbers[at + 1], options.form) *
-                                    std::pow(options.reference_ohm, power_of_ohm);
+      frf.response(channel, k) = value_of(numbers[at], numbers[at + 1], options.form) *
+                                 std::pow(options.reference_ohm, power_of_ohm);
     }
   }
   if (parameters.letter == 'S') return {std::move(frf), ""};

@@ -115,7 +115,7 @@ void name_channels(const ImportMap& map, const char* key, const ImportMap::Signa
   }
   for (std::size_t c = 0; c < count; ++c) {
     const double factor = factors[c] * (group.scale.empty() ? 1.0 : group.scale[c]);
-    if (factor != 1.0) out.samples.col(static_cast<Eigen::Index>(c)) *= factor;
+    if (factor != 1.0) out.samples.col(c) *= factor;
   }
 }
 

@@ -90,7 +90,7 @@ ImportSummary LogSummary::summary(const LogInfo& info,
     std::vector<std::string> parts;
     Json& list = out.json[group] = Json::array();
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      const double value = rms[static_cast<Eigen::Index>(c)];
+      const double value = rms[c];
       parts.push_back(fmt::format("{} {:.4g} {}", channels.names[c], value, channels.units[c]));
       list.push_back({{"name", channels.names[c]}, {"unit", channels.units[c]}, {"rms", value}});
     }

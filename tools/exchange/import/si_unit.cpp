@@ -148,8 +148,7 @@ void take_si_units(FrfEstimate& frf, std::vector<std::string>& notes) {
         "log in SI units",
         own.front());
   for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
-    const double factor = outputs[static_cast<std::size_t>(c % frf.n_outputs())] /
-                          inputs[static_cast<std::size_t>(c / frf.n_outputs())];
+    const double factor = outputs[c % frf.n_outputs()] / inputs[c / frf.n_outputs()];
     frf.response.row(c) *= factor;
     if (frf.noise_variance.size() > 0) frf.noise_variance.row(c) *= factor * factor;
     if (frf.total_variance.size() > 0) frf.total_variance.row(c) *= factor * factor;

@@ -123,8 +123,7 @@ ModeCorrelation correlate_modes(const AdditiveModel& model, const std::filesyste
     out.other.push_back(mode_of(mode));
     Eigen::VectorXcd& shape = out.other.back().output_shape;
     shape.resize(std::ssize(places));
-    for (std::size_t i = 0; i < places.size(); ++i)
-      shape[static_cast<Eigen::Index>(i)] = *value_at(mode, places[i]);
+    for (std::size_t i = 0; i < places.size(); ++i) shape[i] = *value_at(mode, places[i]);
     out.other.back().input_shape = alike;
   }
   out.pairs = pair_modes(out.own, out.other);

@@ -55,12 +55,12 @@ std::string integers(const std::string& name, const char* what, const Values& va
 std::string transition(const std::string& name, const StateSpace& system) {
   const Eigen::Index n = std::max<Eigen::Index>(system.order(), 1);  // C has no empty arrays
   Eigen::MatrixXd pairs = Eigen::MatrixXd::Zero(n, 2);
-  std::vector<long long> first(static_cast<std::size_t>(n));
+  std::vector<long long> first(n);
   for (const StateBlock& block : system.blocks)
     for (Eigen::Index i = 0; i < block.size; ++i) {
       // A single state is the first entry of a pair that begins with it, or ends with it at the end of the state.
       const Eigen::Index start = std::min(block.first, std::max<Eigen::Index>(n - 2, 0));
-      first[static_cast<std::size_t>(block.first + i)] = start;
+      first[block.first + i] = start;
       for (Eigen::Index j = 0; j < block.size; ++j)
         pairs(block.first + i, block.first + j - start) =
             system.A(block.first + i, block.first + j);

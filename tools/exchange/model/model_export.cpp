@@ -93,7 +93,7 @@ UffMode uff_mode(const ModeShape& shape, const ChannelList& outputs) {
   mode.values_per_node = 3;
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     mode.nodes.push_back(static_cast<long long>(i) + 1);
-    const std::complex<double> value = shape.output_shape[static_cast<Eigen::Index>(i)];
+    const std::complex<double> value = shape.output_shape[i];
     const int direction = std::max(1, uff_direction(outputs.names[i]));
     for (int axis = 1; axis <= 3; ++axis) mode.values.push_back(axis == direction ? value : 0.0);
   }

@@ -98,10 +98,8 @@ void write_driving_point(Hdf5File& file, const AdditiveModel& model, const Drivi
   std::vector<double> mass;
   for (const ModeShape& mode : modes) mass.push_back(driving_point_mass(mode, point));
   write_vector(file, dataset, mass);
-  file.write_attribute(dataset, "output",
-                       model.outputs.names.at(static_cast<std::size_t>(point.output)));
-  file.write_attribute(dataset, "input",
-                       model.inputs.names.at(static_cast<std::size_t>(point.input)));
+  file.write_attribute(dataset, "output", model.outputs.names.at(point.output));
+  file.write_attribute(dataset, "input", model.inputs.names.at(point.input));
 }
 
 void write_rigid_body(Hdf5File& file, const AdditiveModel& model) {

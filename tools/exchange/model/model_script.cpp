@@ -106,8 +106,7 @@ std::string uncertain_modes(const AdditiveModel& model, const Syntax& syntax) {
                            static_cast<double>(block.first) + 1.0);
   }
   Eigen::MatrixXd states(std::ssize(pairs), 2);
-  for (Eigen::Index row = 0; row < states.rows(); ++row)
-    states.row(row) = pairs[static_cast<std::size_t>(row)];
+  for (Eigen::Index row = 0; row < states.rows(); ++row) states.row(row) = pairs[row];
   return syntax.assign("NATURAL_FREQUENCY_STD_HZ", syntax.vector(frequency_std_hz)) +
          syntax.assign("DAMPING_RATIO_STD", syntax.vector(damping_std)) +
          syntax.assign("MODE_STATES", syntax.matrix(states));

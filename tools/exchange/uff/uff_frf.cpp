@@ -260,8 +260,7 @@ Eigen::MatrixXd variance_of(const std::filesystem::path& file, const UffContent&
   Eigen::MatrixXd variance(frf.response.rows(), frf.lines());
   for (const auto& [channel, f] : table)
     for (Eigen::Index k = 0; k < frf.lines(); ++k)
-      variance(channel.first + frf.n_outputs() * channel.second, k) =
-          f->ordinate.at(static_cast<std::size_t>(k)).real();
+      variance(channel.first + frf.n_outputs() * channel.second, k) = f->ordinate.at(k).real();
   return variance;
 }
 
