@@ -4,15 +4,15 @@
 
 #include <algorithm>
 #include <new>
-#include <stdexcept>
 
 #include "excitation/multisine/fft_planner.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 
 RealDft::RealDft(int length)
     : length_(length), real_(nullptr, &fftw_free), half_(nullptr, &fftw_free) {
-  if (length < 2) throw std::invalid_argument("DFT: the length must be at least 2");
+  require(length >= 2, "DFT: the length must be at least 2");
   real_.reset(fftw_alloc_real(static_cast<std::size_t>(length)));
   // FFTW documents that fftw_complex and std::complex<double> have the same layout.
   fftw_complex* const half = fftw_alloc_complex(static_cast<std::size_t>(half_size()));
@@ -43,9 +43,8 @@ std::span<const std::complex<double>> RealDft::forward(
 }
 
 Eigen::VectorXd RealDft::inverse(const Eigen::Ref<const Eigen::VectorXcd>& half_spectrum) {
-  if (half_spectrum.size() != half_size()) {
-    throw std::invalid_argument("inverse DFT: the half spectrum must have length / 2 + 1 entries");
-  }
+  require(half_spectrum.size() == half_size(),
+          "inverse DFT: the half spectrum must have length / 2 + 1 entries");
   std::copy_n(half_spectrum.data(), half_spectrum.size(), half_.get());
   fftw_execute(inverse_.get());
   return Eigen::Map<const Eigen::VectorXd>(real_.get(), length_);

@@ -1,13 +1,11 @@
 #include "excitation/multisine/frequency_grid.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "excitation/multisine/random_stream.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -17,36 +15,24 @@ constexpr bool is_odd(int line) { return line % 2 != 0; }
 int highest_line(int samples_per_period) { return (samples_per_period + 1) / 2 - 1; }
 
 void check_rate_and_period(double sample_rate_hz, int samples_per_period) {
-  if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz)) {
-    throw std::invalid_argument(fmt::format(
-        "frequency grid: the sample rate must be positive and finite; got {} Hz", sample_rate_hz));
-  }
-  if (samples_per_period < 3) {
-    throw std::invalid_argument(fmt::format(
-        "frequency grid: a period must have at least 3 samples; got {}", samples_per_period));
-  }
+  require(sample_rate_hz > 0.0 && std::isfinite(sample_rate_hz),
+          "frequency grid: the sample rate must be positive and finite; got {} Hz", sample_rate_hz);
+  require(samples_per_period >= 3, "frequency grid: a period must have at least 3 samples; got {}",
+          samples_per_period);
 }
 
 void check_band(double sample_rate_hz, const LineSpec& spec) {
-  if (!std::isfinite(spec.low_hz) || !std::isfinite(spec.high_hz) || spec.low_hz < 0.0) {
-    throw std::invalid_argument(fmt::format(
-        "frequency band: invalid limits {} to {} Hz; both must be finite and nonnegative",
-        spec.low_hz, spec.high_hz));
-  }
-  if (spec.low_hz > spec.high_hz) {
-    throw std::invalid_argument(
-        fmt::format("frequency band: {} to {} Hz is reversed; low_hz must not exceed high_hz",
-                    spec.low_hz, spec.high_hz));
-  }
-  if (spec.high_hz >= sample_rate_hz / 2.0) {
-    throw std::invalid_argument(fmt::format(
-        "frequency band: {} Hz is at or above half the sample rate; high_hz must be below {} Hz",
-        spec.high_hz, sample_rate_hz / 2.0));
-  }
-  if (spec.selection == LineSelection::odd_random && spec.group_size < 2) {
-    throw std::invalid_argument(fmt::format(
-        "frequency band: a group must have at least 2 odd lines; got {}", spec.group_size));
-  }
+  require(std::isfinite(spec.low_hz) && std::isfinite(spec.high_hz) && spec.low_hz >= 0.0,
+          "frequency band: invalid limits {} to {} Hz; both must be finite and nonnegative",
+          spec.low_hz, spec.high_hz);
+  require(spec.low_hz <= spec.high_hz,
+          "frequency band: {} to {} Hz is reversed; low_hz must not exceed high_hz", spec.low_hz,
+          spec.high_hz);
+  require(spec.high_hz < sample_rate_hz / 2.0,
+          "frequency band: {} Hz is at or above half the sample rate; high_hz must be below {} Hz",
+          spec.high_hz, sample_rate_hz / 2.0);
+  require(spec.selection != LineSelection::odd_random || spec.group_size >= 2,
+          "frequency band: a group must have at least 2 odd lines; got {}", spec.group_size);
 }
 
 /// Omits one line of every complete group; an incomplete last group remains whole.
@@ -83,16 +69,14 @@ FrequencyGrid::FrequencyGrid(double sample_rate_hz, int samples_per_period, std:
       samples_per_period_(samples_per_period),
       lines_(std::move(lines)) {
   check_rate_and_period(sample_rate_hz, samples_per_period);
-  if (lines_.empty()) throw std::invalid_argument("frequency grid: at least one line is required");
-  if (std::adjacent_find(lines_.begin(), lines_.end(), std::greater_equal<>()) != lines_.end()) {
-    throw std::invalid_argument("frequency grid: the lines must be strictly increasing");
-  }
-  if (lines_.front() < 1 || lines_.back() > highest_line(samples_per_period)) {
-    throw std::invalid_argument(fmt::format(
-        "frequency grid: lines {} to {} are out of range; use 1 to {} (zero frequency and half the "
-        "sample rate are excluded) for a period of {} samples",
-        lines_.front(), lines_.back(), highest_line(samples_per_period), samples_per_period));
-  }
+  require(!lines_.empty(), "frequency grid: at least one line is required");
+  require(std::ranges::adjacent_find(lines_, std::greater_equal<>()) == lines_.end(),
+          "frequency grid: the lines must be strictly increasing");
+  require(
+      lines_.front() >= 1 && lines_.back() <= highest_line(samples_per_period),
+      "frequency grid: lines {} to {} are out of range; use 1 to {} (zero frequency and half the "
+      "sample rate are excluded) for a period of {} samples",
+      lines_.front(), lines_.back(), highest_line(samples_per_period), samples_per_period);
 }
 
 FrequencyGrid FrequencyGrid::band(double sample_rate_hz, int samples_per_period,
@@ -115,12 +99,10 @@ FrequencyGrid FrequencyGrid::band(double sample_rate_hz, int samples_per_period,
   for (int line = first; line <= last; ++line) {
     if (!odd_only || is_odd(line)) lines.push_back(line);
   }
-  if (lines.empty()) {
-    throw std::invalid_argument(
-        fmt::format("frequency band: no {}line between {} and {} Hz; the line spacing is {} Hz. "
-                    "Widen the band or lengthen the period",
-                    odd_only ? "odd " : "", spec.low_hz, spec.high_hz, 1.0 / lines_per_hz));
-  }
+  require(!lines.empty(),
+          "frequency band: no {}line between {} and {} Hz; the line spacing is {} Hz. Widen the "
+          "band or lengthen the period",
+          odd_only ? "odd " : "", spec.low_hz, spec.high_hz, 1.0 / lines_per_hz);
   if (spec.selection == LineSelection::odd_random) lines = leave_out_at_random(lines, spec);
   return {sample_rate_hz, samples_per_period, std::move(lines)};
 }

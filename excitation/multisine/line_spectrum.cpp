@@ -2,15 +2,15 @@
 
 #include <complex>
 #include <limits>
-#include <stdexcept>
+
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
 
 int dense_length(const FrequencyGrid& grid, int oversampling) {
-  if (grid.samples_per_period() > std::numeric_limits<int>::max() / oversampling) {
-    throw std::invalid_argument("multisine: the period is too long for oversampling; shorten it");
-  }
+  require(grid.samples_per_period() <= std::numeric_limits<int>::max() / oversampling,
+          "multisine: the period is too long for oversampling; shorten it");
   return oversampling * grid.samples_per_period();
 }
 

@@ -1,38 +1,27 @@
 #include "excitation/multisine/multisine.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <stdexcept>
 
 #include "excitation/multisine/line_spectrum.hpp"
 #include "excitation/multisine/multisine_lines.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
 
 void check(const FrequencyGrid& grid, const MultisineSpec& spec) {
-  if (!(spec.level > 0.0) || !std::isfinite(spec.level)) {
-    throw std::invalid_argument(
-        fmt::format("multisine: level must be positive and finite; got {}", spec.level));
-  }
-  if (spec.crest_iterations < 0) {
-    throw std::invalid_argument(fmt::format("multisine: crest_iterations must be 0 or more; got {}",
-                                            spec.crest_iterations));
-  }
+  require(spec.level > 0.0 && std::isfinite(spec.level),
+          "multisine: level must be positive and finite; got {}", spec.level);
+  require(spec.crest_iterations >= 0, "multisine: crest_iterations must be 0 or more; got {}",
+          spec.crest_iterations);
   if (spec.shape.size() == 0) return;
-  if (spec.shape.size() != grid.size()) {
-    throw std::invalid_argument(
-        fmt::format("multisine: shape has {} entries; expected one per line ({})",
-                    spec.shape.size(), grid.size()));
-  }
-  if (!spec.shape.allFinite() || (spec.shape.array() < 0.0).any()) {
-    throw std::invalid_argument("multisine: shape must be finite and nonnegative on every line");
-  }
-  if ((spec.shape.array() == 0.0).all()) {
-    throw std::invalid_argument(
-        "multisine: shape is zero on every line; at least one entry must be positive");
-  }
+  require(spec.shape.size() == grid.size(),
+          "multisine: shape has {} entries; expected one per line ({})", spec.shape.size(),
+          grid.size());
+  require(spec.shape.allFinite() && (spec.shape.array() >= 0.0).all(),
+          "multisine: shape must be finite and nonnegative on every line");
+  require((spec.shape.array() != 0.0).any(),
+          "multisine: shape is zero on every line; at least one entry must be positive");
 }
 
 }  // namespace
@@ -54,9 +43,7 @@ Multisine random_phase_multisine(const FrequencyGrid& grid, const MultisineSpec&
 
 double crest_factor(const Eigen::Ref<const Eigen::VectorXd>& samples) {
   const double peak = samples.size() == 0 ? 0.0 : samples.lpNorm<Eigen::Infinity>();
-  if (!(peak > 0.0)) {
-    throw std::invalid_argument("crest factor: all samples are zero; at least one must be nonzero");
-  }
+  require(peak > 0.0, "crest factor: all samples are zero; at least one must be nonzero");
   return peak * std::sqrt(static_cast<double>(samples.size())) / samples.stableNorm();
 }
 

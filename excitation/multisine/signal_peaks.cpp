@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 
 #include "excitation/multisine/dft.hpp"
 #include "excitation/multisine/line_spectrum.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -15,9 +15,8 @@ namespace {
 using Eigen::Index;
 
 int twice(int samples) {
-  if (samples > std::numeric_limits<int>::max() / 2)
-    throw std::invalid_argument(
-        "excitation: the period is too long to predict the response from rest; shorten it");
+  require(samples <= std::numeric_limits<int>::max() / 2,
+          "excitation: the period is too long to predict the response from rest; shorten it");
   return 2 * samples;
 }
 

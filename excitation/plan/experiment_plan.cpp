@@ -14,6 +14,7 @@
 #include "excitation/multisine/random_stream.hpp"
 #include "excitation/plan/hadamard_matrix.hpp"
 #include "excitation/threads/worker_pool.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -25,63 +26,48 @@ using Eigen::MatrixXd;
 void check_axis(const FrequencyGrid& grid, const ExperimentSpec& spec, std::size_t number) {
   const ExcitationAxis& axis = spec.axes[number];
   const std::string place = fmt::format("experiment: axes[{}]", number);
-  if (axis.channel.empty()) throw std::invalid_argument(place + ".channel: missing name");
-  if (!(axis.level > 0.0) || !std::isfinite(axis.level)) {
-    throw std::invalid_argument(fmt::format("{}.level ({}): must be positive and finite; got {}",
-                                            place, axis.channel, axis.level));
-  }
-  if (axis.phase_rad.size() > 0 &&
-      (axis.phase_rad.size() != grid.size() || !axis.phase_rad.allFinite()))
-    throw std::invalid_argument(
-        fmt::format("{}.phase_rad ({}): has {} entries; expected one finite number per line ({})",
-                    place, axis.channel, axis.phase_rad.size(), grid.size()));
-  if (axis.phase_rad.size() > 0 && spec.crest_iterations > 0)
-    throw std::invalid_argument(
-        fmt::format("{}.phase_rad ({}): given phases are not reduced; set crest_iterations to 0",
-                    place, axis.channel));
+  require(!axis.channel.empty(), "{}.channel: missing name", place);
+  require(axis.level > 0.0 && std::isfinite(axis.level),
+          "{}.level ({}): must be positive and finite; got {}", place, axis.channel, axis.level);
+  const bool given = axis.phase_rad.size() > 0;
+  require(!given || (axis.phase_rad.size() == grid.size() && axis.phase_rad.allFinite()),
+          "{}.phase_rad ({}): has {} entries; expected one finite number per line ({})", place,
+          axis.channel, axis.phase_rad.size(), grid.size());
+  require(!given || spec.crest_iterations == 0,
+          "{}.phase_rad ({}): given phases are not reduced; set crest_iterations to 0", place,
+          axis.channel);
   if (axis.shape.size() == 0) return;
-  if (axis.shape.size() != grid.size()) {
-    throw std::invalid_argument(
-        fmt::format("{}.shape ({}): has {} entries; expected one per line ({})", place,
-                    axis.channel, axis.shape.size(), grid.size()));
-  }
+  require(axis.shape.size() == grid.size(),
+          "{}.shape ({}): has {} entries; expected one per line ({})", place, axis.channel,
+          axis.shape.size(), grid.size());
   for (Index k = 0; k < grid.size(); ++k) {
     if (!has_line(spec.scheme, static_cast<Index>(number), std::ssize(spec.axes), k)) continue;
     // An unexcited line has no FRF, so it must not be in the grid.
-    if (!(axis.shape[k] > 0.0) || !std::isfinite(axis.shape[k])) {
-      throw std::invalid_argument(fmt::format(
-          "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
-          place, axis.channel, axis.shape[k], grid.lines()[k]));
-    }
+    require(
+        axis.shape[k] > 0.0 && std::isfinite(axis.shape[k]),
+        "{}.shape ({}): is {} at line {}; must be positive and finite on every line of the grid",
+        place, axis.channel, axis.shape[k], grid.lines()[k]);
   }
 }
 
 void check(const FrequencyGrid& grid, const ExperimentSpec& spec) {
   const auto at_least = [](const char* field, int value, int least) {
-    if (value < least) {
-      throw std::invalid_argument(
-          fmt::format("experiment: {} must be at least {}; got {}", field, least, value));
-    }
+    require(value >= least, "experiment: {} must be at least {}; got {}", field, least, value);
   };
   at_least("realizations", spec.realizations, 1);
   at_least("periods", spec.periods, 1);
   at_least("transient_periods", spec.transient_periods, 0);
   at_least("crest_iterations", spec.crest_iterations, 0);
-  if (spec.axes.empty())
-    throw std::invalid_argument("experiment: axes: at least one axis is required");
-  if (spec.scheme == ExcitationScheme::zippered && grid.size() < std::ssize(spec.axes)) {
-    throw std::invalid_argument(
-        fmt::format("experiment: scheme zippered distributes {} lines over {} axes, which is too "
-                    "few. Lengthen the period or widen the band",
-                    grid.size(), spec.axes.size()));
-  }
+  require(!spec.axes.empty(), "experiment: axes: at least one axis is required");
+  require(spec.scheme != ExcitationScheme::zippered || grid.size() >= std::ssize(spec.axes),
+          "experiment: scheme zippered distributes {} lines over {} axes, which is too few. "
+          "Lengthen the period or widen the band",
+          grid.size(), spec.axes.size());
   std::set<std::string> channels;
   for (std::size_t p = 0; p < spec.axes.size(); ++p) {
     check_axis(grid, spec, p);
-    if (!channels.insert(spec.axes[p].channel).second) {
-      throw std::invalid_argument(fmt::format(
-          "experiment: axes[{}].channel: duplicate channel '{}'", p, spec.axes[p].channel));
-    }
+    require(channels.insert(spec.axes[p].channel).second,
+            "experiment: axes[{}].channel: duplicate channel '{}'", p, spec.axes[p].channel);
   }
 }
 
@@ -191,12 +177,10 @@ double ExperimentPlan::duration_s() const noexcept {
 }
 
 void ExperimentPlan::check_run(RunId run) const {
-  if (run.realization < 0 || run.realization >= spec_.realizations || run.experiment < 0 ||
-      run.experiment >= experiments()) {
-    throw std::invalid_argument(fmt::format(
-        "experiment: unknown realization {}, experiment {}; realizations: {}, experiments: {}",
-        run.realization, run.experiment, spec_.realizations, experiments()));
-  }
+  require(run.realization >= 0 && run.realization < spec_.realizations && run.experiment >= 0 &&
+              run.experiment < experiments(),
+          "experiment: unknown realization {}, experiment {}; realizations: {}, experiments: {}",
+          run.realization, run.experiment, spec_.realizations, experiments());
 }
 
 MatrixXd ExperimentPlan::phase_rad(int realization) const {

@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "excitation/words/require.hpp"
+
 namespace stageid {
 namespace {
 
@@ -88,14 +90,11 @@ bool has_hadamard_matrix(int size) {
 }
 
 MatrixXd hadamard_matrix(int size) {
-  if (size < 1)
-    throw std::invalid_argument(
-        fmt::format("Hadamard matrix: size must be positive; got {}", size));
-  if (!has_hadamard_matrix(size)) {
+  require(size >= 1, "Hadamard matrix: size must be positive; got {}", size);
+  if (!has_hadamard_matrix(size))
     throw std::invalid_argument(fmt::format(
         "Hadamard matrix: unsupported size {}; the nearest supported sizes are {} and {}", size,
         nearest(size, -1), nearest(size, +1)));
-  }
   MatrixXd H = construct(size);
   // Negating rows and columns keeps H H^T = size I.
   for (Eigen::Index i = 0; i < size; ++i) H.row(i) *= H(i, 0);

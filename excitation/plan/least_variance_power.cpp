@@ -1,10 +1,9 @@
 #include "excitation/plan/least_variance_power.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
+
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -18,19 +17,16 @@ constexpr double kSmallestCost = 1e-12;
 
 void check(const Eigen::Ref<const Eigen::VectorXd>& cost,
            const Eigen::Ref<const Eigen::MatrixXd>& bounds) {
-  if (cost.size() != bounds.cols() || cost.size() == 0 || bounds.rows() == 0)
-    throw std::invalid_argument(fmt::format(
-        "excitation power: {} costs and {} x {} bounds; the bounds must have one column per cost",
-        cost.size(), bounds.rows(), bounds.cols()));
-  if (!cost.allFinite() || !(cost.minCoeff() >= 0.0) || !(cost.maxCoeff() > 0.0))
-    throw std::invalid_argument(
-        "excitation power: the costs must be finite and nonnegative, and at least one must be "
-        "positive");
-  if (!bounds.allFinite() || !(bounds.minCoeff() >= 0.0))
-    throw std::invalid_argument("excitation power: the bounds must be finite and nonnegative");
+  require(cost.size() == bounds.cols() && cost.size() > 0 && bounds.rows() > 0,
+          "excitation power: {} costs and {} x {} bounds; the bounds must have one column per cost",
+          cost.size(), bounds.rows(), bounds.cols());
+  require(cost.allFinite() && cost.minCoeff() >= 0.0 && cost.maxCoeff() > 0.0,
+          "excitation power: the costs must be finite and nonnegative, and at least one must be "
+          "positive");
+  require(bounds.allFinite() && bounds.minCoeff() >= 0.0,
+          "excitation power: the bounds must be finite and nonnegative");
   for (Eigen::Index i = 0; i < cost.size(); ++i)
-    if (!(bounds.col(i).maxCoeff() > 0.0))
-      throw std::invalid_argument(fmt::format("excitation power: entry {} is unbounded", i));
+    require(bounds.col(i).maxCoeff() > 0.0, "excitation power: entry {} is unbounded", i);
 }
 
 }  // namespace

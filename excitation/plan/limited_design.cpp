@@ -1,16 +1,14 @@
 #include "excitation/plan/limited_design.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "excitation/multisine/multisine_lines.hpp"
 #include "excitation/plan/joint_crest_reduction.hpp"
 #include "excitation/plan/least_variance_power.hpp"
 #include "excitation/threads/worker_pool.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -25,27 +23,25 @@ constexpr double kFirstCrestFactor = 2.5;
 constexpr double kEnough = 0.93;  // below 1, because the peaks between the samples must fit too
 
 void check(const FrequencyGrid& grid, const LimitedDesignSpec& spec) {
-  const auto fail = [](const std::string& what) {
-    throw std::invalid_argument("limited design: " + what);
-  };
   const auto axes = std::ssize(spec.experiment.axes);
-  if (spec.cost.rows() != axes || spec.cost.cols() != grid.size())
-    fail(fmt::format("cost is {} x {}; expected {} axes x {} lines", spec.cost.rows(),
-                     spec.cost.cols(), axes, grid.size()));
-  if (!(spec.safety > 0.0 && spec.safety <= 1.0))
-    fail(fmt::format("safety is {}; it must be in (0, 1]", spec.safety));
-  if (spec.experiment.crest_iterations < 1)
-    fail("crest_iterations must be 1 or more, because the design includes the phases");
+  require(spec.cost.rows() == axes && spec.cost.cols() == grid.size(),
+          "limited design: cost is {} x {}; expected {} axes x {} lines", spec.cost.rows(),
+          spec.cost.cols(), axes, grid.size());
+  require(spec.safety > 0.0 && spec.safety <= 1.0,
+          "limited design: safety is {}; it must be in (0, 1]", spec.safety);
+  require(spec.experiment.crest_iterations >= 1,
+          "limited design: crest_iterations must be 1 or more, because the design includes the "
+          "phases");
   for (const BoundedSignal& s : spec.signals) {
-    if (s.transfer.rows() != axes || s.transfer.cols() != grid.size() || !s.transfer.allFinite())
-      fail(fmt::format("{}: transfer must be {} axes x {} lines and finite", s.name, axes,
-                       grid.size()));
-    if (!(s.peak_limit > 0.0) || !(s.rms_limit > 0.0) || !(s.reserve >= 0.0))
-      fail(fmt::format("{}: limits must be positive and the reserve nonnegative", s.name));
-    if (!(s.reserve < spec.safety * s.peak_limit))
-      fail(fmt::format(
-          "{}: the reserve {:.4g} uses up the limit {:.4g}; lower the reserve or raise the limit",
-          s.name, s.reserve, s.peak_limit));
+    require(s.transfer.rows() == axes && s.transfer.cols() == grid.size() && s.transfer.allFinite(),
+            "limited design: {}: transfer must be {} axes x {} lines and finite", s.name, axes,
+            grid.size());
+    require(s.peak_limit > 0.0 && s.rms_limit > 0.0 && s.reserve >= 0.0,
+            "limited design: {}: limits must be positive and the reserve nonnegative", s.name);
+    require(s.reserve < spec.safety * s.peak_limit,
+            "limited design: {}: the reserve {:.4g} uses up the limit {:.4g}; lower the reserve or "
+            "raise the limit",
+            s.name, s.reserve, s.peak_limit);
   }
 }
 

@@ -2,8 +2,8 @@
 
 #include <limits>
 
+#include "excitation/words/require.hpp"
 #include "hal/can/can_encoding.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 

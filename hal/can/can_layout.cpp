@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/peer_status.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

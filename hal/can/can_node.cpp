@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/peer_status.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/can/can_player.hpp"
 #include "hal/stage/peer_status.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

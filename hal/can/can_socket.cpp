@@ -17,7 +17,7 @@
 #include <cstring>
 #include <ctime>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {

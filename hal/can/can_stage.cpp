@@ -9,8 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/can/can_bus_load.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

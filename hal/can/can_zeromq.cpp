@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {

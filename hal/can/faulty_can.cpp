@@ -8,8 +8,8 @@
 #include <regex>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/can/can_layout.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

@@ -7,7 +7,7 @@
 #include <array>
 #include <cerrno>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {

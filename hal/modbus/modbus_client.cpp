@@ -10,8 +10,8 @@
 #include <cmath>
 #include <thread>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {

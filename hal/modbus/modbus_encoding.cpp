@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 

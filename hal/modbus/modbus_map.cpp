@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid::modbus_map {
 void require_channels(const StageInfo& info) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 

@@ -17,8 +17,8 @@
 #include <thread>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/modbus/modbus_encoding.hpp"
 #include "hal/modbus/modbus_map.hpp"
-#include "hal/stage/require.hpp"
 #include "hal/stage/supervisor.hpp"
 
 namespace stageid {

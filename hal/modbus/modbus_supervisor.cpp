@@ -7,10 +7,10 @@
 #include <chrono>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/modbus/modbus_map.hpp"
 #include "hal/modbus/modbus_session.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/peer_status.hpp"
 #include "hal/stage/plant_watch.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

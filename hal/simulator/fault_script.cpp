@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "excitation/words/require.hpp"
 #include "hal/simulator/mode_transition.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/simulator/plate_modes.hpp"
 #include "hal/simulator/rigid_body.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

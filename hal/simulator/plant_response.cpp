@@ -7,9 +7,9 @@
 #include <cmath>
 #include <complex>
 
+#include "excitation/words/require.hpp"
 #include "hal/simulator/mode_transition.hpp"
 #include "hal/simulator/plant_spec.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

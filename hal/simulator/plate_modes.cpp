@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "excitation/decompositions/decompositions.hpp"
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "excitation/words/require.hpp"
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/noise.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "excitation/decompositions/decompositions.hpp"
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {

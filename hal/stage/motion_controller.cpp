@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "excitation/decompositions/decompositions.hpp"
+#include "excitation/words/require.hpp"
 #include "hal/stage/controller_sections.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

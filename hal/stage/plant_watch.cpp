@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "excitation/words/require.hpp"
 #include "hal/stage/pacer.hpp"
-#include "hal/stage/require.hpp"
 
 namespace stageid {
 namespace {

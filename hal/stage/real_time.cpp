@@ -14,7 +14,7 @@
 #include <fstream>
 #include <future>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 #include "hal/stage/stage.hpp"
 
 namespace stageid {

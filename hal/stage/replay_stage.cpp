@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "hal/stage/require.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 
