@@ -116,10 +116,9 @@ class Predictor {
   void judge_actuator(std::size_t i) {
     ChannelPrediction& channel = result_.actuators[i];
     const StageLimits& limits = stage_.limits;
-    const auto index = static_cast<Eigen::Index>(i);
-    compare(channel, "|u|", channel.peak, limits.actuator_n, index);
-    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, index, "/s");
-    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, index);
+    compare(channel, "|u|", channel.peak, limits.actuator_n, i);
+    compare(channel, "slew", channel.slew_per_s, limits.slew_n_s, i, "/s");
+    compare(channel, "thermal rms", channel.thermal_rms, limits.thermal_rms_n, i);
   }
 
   const ExperimentPlan& plan_;

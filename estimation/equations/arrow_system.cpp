@@ -235,10 +235,9 @@ Eigen::VectorXd ArrowSystem::solve(const Eigen::VectorXd& right_side, double dam
   Eigen::VectorXd schur_e = right_side.head(globals);
   Eigen::MatrixXd own;
   for (std::size_t c = 0; c < channels_.size(); ++c) {
-    const auto row = static_cast<Eigen::Index>(c);
-    solve_scaled(channels_[c].bb, e_b.row(row).transpose(), own);
+    solve_scaled(channels_[c].bb, e_b.row(c).transpose(), own);
     schur_e.noalias() -= channels_[c].ab * own;
-    B.row(row) = own.transpose();
+    B.row(c) = own.transpose();
   }
   if (globals == 0) return x;
   x.head(globals) = solve_schur(schur_e, damping, frozen);

@@ -49,10 +49,8 @@ Eigen::MatrixXd stacked_triangle(Eigen::Index count, const Workers& workers,
   }
   while (shares.size() > 1) {
     const std::size_t pairs = shares.size() / 2;
-    for_each_task(workers.threads, static_cast<int>(pairs), [&](int pair) {
-      const auto p = static_cast<std::size_t>(pair);
-      append(shares[p], shares[shares.size() - 1 - p]);
-    });
+    for_each_task(workers.threads, static_cast<int>(pairs),
+                  [&](int pair) { append(shares[pair], shares[shares.size() - 1 - pair]); });
     shares.resize(shares.size() - pairs);
   }
   return std::move(shares.front());

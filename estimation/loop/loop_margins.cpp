@@ -79,14 +79,13 @@ class MarginSearch {
   std::vector<double> crossings(Eigen::Index k, const std::function<double(Complex)>& of) const {
     std::vector<double> out;
     for (std::size_t i = 1; i < points_.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
       const double before = of(curve(points_[i - 1], k));
       const double after = of(curve(points_[i], k));
       if (!(std::min(before, after) < 0.0 && std::max(before, after) >= 0.0)) continue;
       std::uintmax_t evaluations = 100;
       const auto [low, high] = boost::math::tools::toms748_solve(
-          [&](double f) { return of(curve_at(k, f)); }, grid_hz_[at - 1], grid_hz_[at], before,
-          after, boost::math::tools::eps_tolerance<double>(kCrossingBits), evaluations);
+          [&](double f) { return of(curve_at(k, f)); }, grid_hz_[i - 1], grid_hz_[i], before, after,
+          boost::math::tools::eps_tolerance<double>(kCrossingBits), evaluations);
       out.push_back(0.5 * (low + high));
     }
     return out;

@@ -23,17 +23,17 @@ class Augmentation {
     std::vector<bool> visited(row_of.size(), false);
     row_of[0] = row;
     Eigen::Index at = 0;
-    while (row_of[index(at)] != 0) {
-      visited[index(at)] = true;
-      const Eigen::Index from = row_of[index(at)];
+    while (row_of[at] != 0) {
+      visited[at] = true;
+      const Eigen::Index from = row_of[at];
       Eigen::Index next = 0;
       double least = infinity;
       for (Eigen::Index c = 1; c <= columns; ++c) {
-        if (visited[index(c)]) continue;
+        if (visited[c]) continue;
         const double reduced = cost_(from - 1, c - 1) - row_price_[from] - column_price_[c];
         if (reduced < slack[c]) {
           slack[c] = reduced;
-          before[index(c)] = at;
+          before[c] = at;
         }
         if (slack[c] < least) {
           least = slack[c];
@@ -41,8 +41,8 @@ class Augmentation {
         }
       }
       for (Eigen::Index c = 0; c <= columns; ++c) {
-        if (visited[index(c)]) {
-          row_price_[row_of[index(c)]] += least;
+        if (visited[c]) {
+          row_price_[row_of[c]] += least;
           column_price_[c] -= least;
         } else {
           slack[c] -= least;
@@ -50,12 +50,10 @@ class Augmentation {
       }
       at = next;
     }
-    for (; at != 0; at = before[index(at)]) row_of[index(at)] = row_of[index(before[index(at)])];
+    for (; at != 0; at = before[at]) row_of[at] = row_of[before[at]];
   }
 
  private:
-  static std::size_t index(Eigen::Index i) { return static_cast<std::size_t>(i); }
-
   const Eigen::MatrixXd& cost_;
   Eigen::VectorXd row_price_;
   Eigen::VectorXd column_price_;

@@ -269,7 +269,6 @@ std::uint64_t FaultScript::spoil(std::uint64_t cycle, std::span<double> fresh,
   std::uint64_t missing = 0;
   for (const Fault& fault : faults_) {
     if (!active(fault, cycle)) continue;
-    const auto channel = static_cast<std::size_t>(fault.channel);
     if (fault.kind == Kind::sensor_offset || fault.kind == Kind::sensor_drift) {
       const double since_s = static_cast<double>(cycle + 1 - fault.from_cycle) * period_s_;
       const double scale = fault.kind == Kind::sensor_drift ? since_s : growth(fault, cycle);
@@ -279,12 +278,12 @@ std::uint64_t FaultScript::spoil(std::uint64_t cycle, std::span<double> fresh,
       for (std::size_t i = 0; i < fresh.size(); ++i)
         if (hits(fault, i)) fresh[i] *= factor(fault, cycle);
     } else if (fault.kind == Fault::Kind::dead_sensor) {
-      fresh[channel] = last[channel];
-      missing |= std::uint64_t{1} << channel;
+      fresh[fault.channel] = last[fault.channel];
+      missing |= std::uint64_t{1} << fault.channel;
     } else if (fault.kind == Fault::Kind::stuck_sensor) {
-      fresh[channel] = last[channel];
+      fresh[fault.channel] = last[fault.channel];
     } else if (fault.kind == Fault::Kind::nan_sensor) {
-      fresh[channel] = std::numeric_limits<double>::quiet_NaN();
+      fresh[fault.channel] = std::numeric_limits<double>::quiet_NaN();
     }
   }
   return missing;

@@ -147,9 +147,8 @@ MotionControllerSpec motion_controller_spec(double sample_rate_hz,
   for (std::size_t i = 0; i < kRigidAxes; ++i) {
     AxisController& axis = spec.axes[i];
     if (axis.crossover_hz == 0.0) continue;
-    const auto row = static_cast<Eigen::Index>(i);
-    require_independent(sensor_jacobian, sensor_inverse, row, "sensors");
-    require_independent(actuator_jacobian, actuator_inverse, row, "actuators");
+    require_independent(sensor_jacobian, sensor_inverse, i, "sensors");
+    require_independent(actuator_jacobian, actuator_inverse, i, "actuators");
     if (axis.gain == 0.0)
       axis.gain = unit_crossover_gain(axis, axis_inertia[i], kRigidAxisNames[i]);
   }

@@ -104,8 +104,7 @@ nlohmann::ordered_json controller_view_json(const ControllerView& of, bool curve
   for (std::size_t k = 0; k < of.loops.size(); ++k) {
     Json loop = {{"name", of.loops[k]}};
     if (view.margins) add_margins(view.margins->loops[k], loop);
-    const auto row = static_cast<Eigen::Index>(k);
-    if (curves) add_curve(view.loop.row(row).transpose(), radius_of(view, row), loop);
+    if (curves) add_curve(view.loop.row(k).transpose(), radius_of(view, k), loop);
     out["loops"].push_back(std::move(loop));
   }
   return out;

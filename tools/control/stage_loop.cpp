@@ -90,14 +90,13 @@ class LoopBuilder {
     std::vector<std::string> names;
     std::vector<AxisController> axes;
     for (std::size_t a = 0; a < spec.axes.size(); ++a) {
-      const auto i = static_cast<Eigen::Index>(a);
-      const Usage loop{kRigidAxisNames.at(a), spec.sensor_decoupling.row(i).transpose(),
-                       spec.actuator_decoupling.col(i)};
+      const Usage loop{kRigidAxisNames.at(a), spec.sensor_decoupling.row(a).transpose(),
+                       spec.actuator_decoupling.col(a)};
       if (spec.axes[a].crossover_hz == 0.0 || !any_in_model(sensors_, loop.sensors) ||
           !any_in_model(actuators_, loop.actuators))
         continue;
       require_channels(loop);
-      kept.push_back(i);
+      kept.push_back(a);
       names.push_back(loop.name);
       axes.push_back(spec.axes[a]);
     }
