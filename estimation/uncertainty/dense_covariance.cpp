@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -40,6 +41,60 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
   return out;
 }
 
+/// Columns X_c of every channel, all of one width, and the weights between two channels.
+struct ChannelPairs {
+  Eigen::Index lines = 0;
+  std::function<SplitMatrix(Eigen::Index c, IndexRange lines)> columns;
+  /// W(c, d) on some lines, lines x 1; empty: zero.
+  std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, IndexRange lines)> between;
+};
+
+/// Adds the products of channel c and the following ones on a tile of lines.
+void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
+                 IndexRange lines, const std::vector<IndexRange>& ranges,
+                 std::vector<Eigen::MatrixXd>& out) {
+  const SplitMatrix& left = X[c];
+  SplitMatrix right;
+  Eigen::MatrixXd gram;
+  for (Eigen::Index d = c; d < std::ssize(X); ++d) {
+    const SplitMatrix weight = pairs.between(c, d, lines);
+    if (weight.cols() == 0) continue;
+    const auto w_re = weight.re.col(0).array();
+    const auto w_im = weight.im.col(0).array();
+    const SplitMatrix& other = X[d];
+    right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
+    right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
+    for (std::size_t r = 0; r < ranges.size(); ++r) {
+      const auto [first, n] = ranges[r];
+      gram.noalias() = left.re.middleCols(first, n).transpose() * right.re.middleCols(first, n);
+      gram.noalias() += left.im.middleCols(first, n).transpose() * right.im.middleCols(first, n);
+      const auto rows = Eigen::seqN(c, n, std::ssize(X));
+      const auto cols = Eigen::seqN(d, n, std::ssize(X));
+      out[r](rows, cols) += gram;
+      if (d != c) out[r](cols, rows) += gram.transpose();
+    }
+  }
+}
+
+/// sum_k Re{X_c^H W(c, d) X_d} of the columns in a range, for every range: element (c + n_c p, d + n_c q) belongs to
+/// its columns p and q, in the order of vec of channels x columns. W must be Hermitian.
+std::vector<Eigen::MatrixXd> pair_grams(const FitProblem& problem, const ChannelPairs& pairs,
+                                        const std::vector<IndexRange>& ranges) {
+  std::vector<Eigen::MatrixXd> out;
+  for (const IndexRange& range : ranges) {
+    const Eigen::Index n = problem.channels() * range.count;
+    out.emplace_back(Eigen::MatrixXd::Zero(n, n));
+  }
+  std::vector<SplitMatrix> X(problem.channels());
+  const auto channels = static_cast<int>(problem.channels());
+  for (const IndexRange lines : ranges_of(pairs.lines, kTileLines)) {
+    for_each_task(problem.threads, channels, [&](int c) { X[c] = pairs.columns(c, lines); });
+    for_each_task(problem.threads, channels,
+                  [&](int c) { add_channel(pairs, X, c, lines, ranges, out); });
+  }
+  return out;
+}
+
 /// Covariance of (a, b) from that of a, that of nu and that between a and nu; b = nu - Z a.
 Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
                        const Eigen::MatrixXd& cross, const Eigen::MatrixXd& Z) {
@@ -62,9 +117,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   ChannelPairs pairs;
-  pairs.channels = problem.channels();
   pairs.lines = noise.correlation.known() ? problem.size() : 0;
-  pairs.threads = problem.threads;
   pairs.columns = [&](Eigen::Index c, IndexRange lines) {
     const Eigen::MatrixXd& inverse = known.channels[c].equations_inverse;
     const auto& [F_re, F_im] = group_of[c]->F;
@@ -75,7 +128,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
   pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
     return c == d ? SplitMatrix{} : noise.correlation.of_channels(c, d, lines);
   };
-  std::vector<Eigen::MatrixXd> out = pair_grams(pairs, ranges);
+  std::vector<Eigen::MatrixXd> out = pair_grams(problem, pairs, ranges);
   for (Eigen::MatrixXd& matrix : out) matrix *= half;
   return out;
 }
@@ -155,9 +208,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
   const JointEquations equations(problem, *fit.matrices, fit.beta, fit.groups,
                                  residual(problem, fit.groups, fit.beta.B));
   ChannelPairs pairs;
-  pairs.channels = problem.channels();
   pairs.lines = problem.size();
-  pairs.threads = problem.threads;
   pairs.columns = [&](Eigen::Index c, IndexRange lines) {
     return group_of[c]->F.middle_rows(lines.first, lines.count);
   };
@@ -171,7 +222,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
     M.row(i) = M.col(i).transpose();
   }
   M.bottomRightCorner(M.rows() - globals, M.cols() - globals) =
-      pair_grams(pairs, {{0, problem.functions()}}).front();
+      pair_grams(problem, pairs, {{0, problem.functions()}}).front();
   return M;
 }
 

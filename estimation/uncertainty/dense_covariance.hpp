@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimation/problem/fit_options.hpp"
-#include "estimation/products/pair_grams.hpp"
+#include "estimation/problem/fit_problem.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
