@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/fail.hpp"
+#include "excitation/words/require.hpp"
 #include "hal/stage/pacer.hpp"
 
 namespace stageid {
@@ -37,11 +37,9 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
   const StageInfo& info = stage.info();
   const std::size_t actuators = info.actuators.size();
   const std::size_t sensors = info.sensors.size();
-  if (!(options.ramp_s >= 0.0) || !std::isfinite(options.ramp_s) || options.misses_allowed < 0 ||
-      !(options.jitter_s >= 0.0) || !(options.jitter_rms_s >= 0.0)) {
-    throw std::invalid_argument(
-        "loop: ramp_s, jitter_s, jitter_rms_s and misses_allowed must be 0 or more");
-  }
+  require(options.ramp_s >= 0.0 && std::isfinite(options.ramp_s) && options.misses_allowed >= 0 &&
+              options.jitter_s >= 0.0 && options.jitter_rms_s >= 0.0,
+          "loop: ramp_s, jitter_s, jitter_rms_s and misses_allowed must be 0 or more");
   if (static_cast<std::size_t>(controller.sensors()) != sensors ||
       static_cast<std::size_t>(controller.actuators()) != actuators)
     fail_request("loop: the controller has {} sensors and {} actuators, the stage {} and {}",
@@ -65,12 +63,10 @@ MeasurementLoop::MeasurementLoop(CyclicStage& stage, MotionController& controlle
 
 PreparedExcitation MeasurementLoop::prepare(const LoopExcitation& excitation) const {
   const Eigen::MatrixXd& period = excitation.period;
-  if (period.rows() == 0 || excitation.samples == 0 || !period.allFinite() ||
-      period.cols() != static_cast<Eigen::Index>(excitation.actuators.size())) {
-    throw std::invalid_argument(
-        "loop: the excitation must be finite, with at least one sample and one column per "
-        "actuator");
-  }
+  require(period.rows() > 0 && excitation.samples > 0 && period.allFinite() &&
+              period.cols() == std::ssize(excitation.actuators),
+          "loop: the excitation must be finite, with at least one sample and one column per "
+          "actuator");
   PreparedExcitation out;
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < period.cols(); ++c) {

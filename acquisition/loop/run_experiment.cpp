@@ -10,7 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -25,6 +24,7 @@
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_index.hpp"
 #include "excitation/multisine/random_stream.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 
@@ -423,10 +423,9 @@ std::uint64_t run_seed(std::uint64_t plan_seed, RunId run) noexcept {
 ExperimentResult run_experiment(const ExperimentPlan& plan, LimitedStage& stage,
                                 MotionController& controller, RunWriter& log,
                                 const RunExperimentOptions& options) {
-  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info())))
-    throw std::invalid_argument(
-        "experiment: the log was created for a different plan or stage; create it with "
-        "experiment_log_info()");
+  require(same_measurement(log.info(), experiment_log_info(plan, stage.info())),
+          "experiment: the log was created for a different plan or stage; create it with "
+          "experiment_log_info()");
   return Experiment(plan, stage, controller, log, options).perform();
 }
 

@@ -4,7 +4,6 @@
 
 #include <bit>
 #include <chrono>
-#include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "acquisition/loop/excited_actuators.hpp"
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_format.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -174,10 +174,9 @@ class ResidentExperiment {
 
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,
                                          RunWriter& log, const RunExperimentOptions& options) {
-  if (!same_measurement(log.info(), experiment_log_info(plan, stage.info())))
-    throw std::invalid_argument(
-        "experiment: the log was created for a different plan or stage; create it with "
-        "experiment_log_info()");
+  require(same_measurement(log.info(), experiment_log_info(plan, stage.info())),
+          "experiment: the log was created for a different plan or stage; create it with "
+          "experiment_log_info()");
   const auto samples = static_cast<std::uint64_t>(plan.samples_per_run());
   if (samples > stage.depth_samples())
     fail_request(

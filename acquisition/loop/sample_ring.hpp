@@ -6,8 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <stdexcept>
 #include <vector>
+
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 
@@ -22,8 +23,8 @@ class SampleRing {
   /// @throws std::invalid_argument if either is zero.
   SampleRing(std::size_t row_words, std::size_t capacity_rows)
       : row_words_(row_words), capacity_(std::bit_ceil(capacity_rows)) {
-    if (row_words == 0 || capacity_rows == 0)
-      throw std::invalid_argument("sample ring: rows and capacity must be at least 1");
+    require(row_words > 0 && capacity_rows > 0,
+            "sample ring: rows and capacity must be at least 1");
     words_.assign(row_words_ * capacity_, 0.0);
   }
 

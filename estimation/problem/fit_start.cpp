@@ -1,22 +1,16 @@
 #include "estimation/problem/fit_start.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
 #include "excitation/threads/worker_pool.hpp"
+#include "excitation/words/require.hpp"
 #include "frf/response/dc_line.hpp"
 
 namespace stageid {
 namespace {
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument(message);
-}
 
 void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
   int biproper = 0;
@@ -64,8 +58,8 @@ void check_start(const FrfEstimate& frf, const AdditiveModel& start, const FitOp
   require(!has_dc_line(frf), "fit: a line is at 0 Hz; remove it (without_dc_line)");
   if (options.hold != HoldModel::none)
     require(frf.sample_rate_hz > 0.0,
-            fmt::format("fit: hold {} needs a sample rate, but the FRF has none; use hold none",
-                        to_string(options.hold)));
+            "fit: hold {} needs a sample rate, but the FRF has none; use hold none",
+            to_string(options.hold));
   if (options.hold == HoldModel::exact)
     require(frf.frequency_hz.maxCoeff() < 0.5 * frf.sample_rate_hz,
             "fit: a line is at or above half the sample rate; choose a smaller band");
@@ -102,9 +96,9 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
   require(
       2 * problem.size() >= per_channel && 2 * problem.size() * problem.channels() >=
                                                problem.globals() + per_channel * problem.channels(),
-      fmt::format("fit: {} of {} are too few for {} parameters; choose fewer modes or a wider band",
-                  counted(problem.size(), "line"), counted(problem.channels(), "channel"),
-                  problem.globals() + per_channel * problem.channels()));
+      "fit: {} of {} are too few for {} parameters; choose fewer modes or a wider band",
+      counted(problem.size(), "line"), counted(problem.channels(), "channel"),
+      problem.globals() + per_channel * problem.channels());
   return problem;
 }
 

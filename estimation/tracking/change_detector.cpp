@@ -6,11 +6,11 @@
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "excitation/multisine/random_stream.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -65,9 +65,8 @@ ChangeDetector::ChangeDetector(const Eigen::MatrixXd& correlation, Eigen::Vector
     : freedom_(std::move(freedom)),
       reference_periods_(reference_periods),
       sums_(Eigen::ArrayXXd::Zero(correlation.rows(), kLongest + 1)) {
-  if (!correlation.allFinite() || !freedom_.allFinite())
-    throw std::invalid_argument(
-        "the scatter of the learned periods is not a number; check the recorded signals");
+  require(correlation.allFinite() && freedom_.allFinite(),
+          "the scatter of the learned periods is not a number; check the recorded signals");
   calibrate(correlation, false_alarms_per_period);
 }
 

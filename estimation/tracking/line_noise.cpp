@@ -3,7 +3,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <stdexcept>
+
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 
@@ -55,7 +56,7 @@ Eigen::MatrixXcd LineNoise::scatter_around(Eigen::Index k) const {
 
 LineNoise::LineNoise(const std::vector<Eigen::MatrixXcd>& residuals) {
   const auto periods = std::ssize(residuals);
-  if (periods < 4) throw std::invalid_argument("LineNoise: fewer than 4 periods");
+  require(periods >= 4, "LineNoise: fewer than 4 periods");
   n_y_ = residuals.front().rows();
   const Eigen::Index N = residuals.front().cols();
   variance_.resize(n_y_, N);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <stdexcept>
 #include <utility>
 
 #include "estimation/tracking/change_detector.hpp"
@@ -12,6 +11,7 @@
 #include "estimation/tracking/forgetting_filter.hpp"
 #include "estimation/tracking/tracked_response.hpp"
 #include "estimation/tracking/tracking_reference.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -125,19 +125,16 @@ TrackedPeriod ModelTracker::State::watch(const PeriodSpectra& period) {
 
 ModelTracker::ModelTracker(const AdditiveModel& model, const Eigen::VectorXd& frequency_hz,
                            const TrackerOptions& options) {
-  if (frequency_hz.size() < 2)
-    throw std::invalid_argument("fewer than 2 lines in the band of the model; nothing to track");
-  if (!(model.sample_rate_hz > 0.0))
-    throw std::invalid_argument("the model has no sample rate; tracking needs that of the data");
-  if (options.learning_periods < 4)
-    throw std::invalid_argument("learning needs at least 4 periods");
-  if (!(options.memory_periods >= 1.0))
-    throw std::invalid_argument(
-        "the memory must be at least one period; make it several periods long");
-  if (!(options.false_alarms_per_period > 0.0 && options.false_alarms_per_period <= 0.1))
-    throw std::invalid_argument(
-        "the rate of false alarms must be above 0 and at most 0.1 per period; choose one such as "
-        "1/year");
+  require(frequency_hz.size() >= 2,
+          "fewer than 2 lines in the band of the model; nothing to track");
+  require(model.sample_rate_hz > 0.0,
+          "the model has no sample rate; tracking needs that of the data");
+  require(options.learning_periods >= 4, "learning needs at least 4 periods");
+  require(options.memory_periods >= 1.0,
+          "the memory must be at least one period; make it several periods long");
+  require(options.false_alarms_per_period > 0.0 && options.false_alarms_per_period <= 0.1,
+          "the rate of false alarms must be above 0 and at most 0.1 per period; choose one such as "
+          "1/year");
   state_ = std::make_unique<State>(model, frequency_hz, options);
 }
 

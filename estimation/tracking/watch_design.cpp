@@ -6,11 +6,11 @@
 #include <cmath>
 #include <complex>
 #include <limits>
-#include <stdexcept>
 
 #include "estimation/tracking/change_detector.hpp"
 #include "estimation/tracking/change_naming.hpp"
 #include "estimation/tracking/free_motion.hpp"
+#include "excitation/words/require.hpp"
 
 namespace stageid {
 namespace {
@@ -104,7 +104,7 @@ InformativePower most_informative_power(const std::vector<Eigen::MatrixXd>& info
   std::vector<Index> wanted;
   for (Index i = 0; i < scale.size(); ++i)
     if (scale[i] > 0.0) wanted.push_back(i);
-  if (wanted.empty()) throw std::invalid_argument("no parameter has a scale; nothing to design");
+  require(!wanted.empty(), "no parameter has a scale; nothing to design");
   Eigen::ArrayXd w = Eigen::ArrayXd::Ones(std::ssize(wanted));
   w /= w.sum();
   Eigen::VectorXd lambda = Eigen::VectorXd::Ones(bounds.rows());
