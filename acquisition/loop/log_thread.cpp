@@ -1,14 +1,12 @@
 #include "acquisition/loop/log_thread.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-
 #include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
 
 #include "hal/stage/pacer.hpp"
+#include "hal/stage/real_time.hpp"
 
 namespace stageid {
 
@@ -59,9 +57,7 @@ std::string LogThread::error() const {
 }
 
 void LogThread::run(const std::stop_token& stop) noexcept {
-  // A real-time priority of the loop's caller must not be inherited for writing to a disk.
-  const sched_param normal{};
-  static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+  take_normal_priority();
   while (true) {
     // Read first, so that everything queued before it is still written.
     const bool stopping = stop.stop_requested();

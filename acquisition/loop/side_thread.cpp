@@ -1,10 +1,9 @@
 #include "acquisition/loop/side_thread.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-
 #include <chrono>
 #include <utility>
+
+#include "hal/stage/real_time.hpp"
 
 namespace stageid {
 
@@ -21,8 +20,7 @@ void SideThread::rethrow() {
 }
 
 void SideThread::run(const std::stop_token& stop) noexcept {
-  const sched_param normal{};
-  static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+  take_normal_priority();
   while (!stop.stop_requested()) {
     const Call call = call_.load(std::memory_order_acquire);
     if (call == nullptr) {

@@ -107,6 +107,11 @@ RealTime::~RealTime() {
   if (locked_) ::munlockall();
 }
 
+void take_normal_priority() noexcept {
+  const sched_param normal{};
+  static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+}
+
 std::vector<std::string> missing_for_real_time(const RealTimeOptions& options) {
   return std::async(std::launch::async, [&] { return RealTime(options).missing(); }).get();
 }

@@ -30,6 +30,9 @@ struct RealTimeOptions {
 /// /sys/kernel/realtime (empty if the file does not exist).
 bool is_preempt_rt(std::string_view version, std::string_view flag) noexcept;
 
+/// Gives the calling thread normal scheduling: what works beside the loop must not inherit its priority.
+void take_normal_priority() noexcept;
+
 /// During its lifetime, the creating thread is a real-time thread: SCHED_FIFO, pinned, wake-ups without timer
 /// slack, memory of the process locked. Pages are locked when first touched, so that unused parts of the
 /// threads' stacks are not.

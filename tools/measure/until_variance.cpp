@@ -1,7 +1,6 @@
 #include "tools/measure/until_variance.hpp"
 
 #include <fmt/format.h>
-#include <pthread.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
 #include "frf/response/confidence.hpp"
+#include "hal/stage/real_time.hpp"
 #include "tools/dashboard/live_response.hpp"
 
 namespace stageid {
@@ -27,8 +27,7 @@ UntilVariance::UntilVariance(std::filesystem::path log, FrfOptions options, doub
 
 std::string UntilVariance::enough() {
   std::thread worker([this] {
-    const sched_param normal{};
-    static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &normal));
+    take_normal_priority();
     try {
       look();
     } catch (const std::exception& error) {  // errors must not end the measurement
