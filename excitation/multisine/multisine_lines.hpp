@@ -14,8 +14,8 @@ namespace stageid {
 /// proportional to `shape`, or flat if it is empty.
 Eigen::VectorXd unit_rms_amplitude(const FrequencyGrid& grid, const Eigen::VectorXd& shape);
 
-/// One phase per line, independent and uniform on [0, 2 pi), then changed by `crest_iterations` of
-/// reduce_crest(). Size of the grid.
+/// One phase per line, independent and uniform on [0, 2 pi), then changed in `crest_iterations`
+/// that lower the peak. Size of the grid.
 Eigen::VectorXd multisine_phase_rad(const FrequencyGrid& grid, const Eigen::VectorXd& amplitude,
                                     std::uint64_t seed, int crest_iterations);
 

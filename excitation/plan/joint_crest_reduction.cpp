@@ -15,7 +15,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-// As in crest_reduction.cpp: low levels change the signal quickly and stall, high ones refine it.
+// As in multisine_lines.cpp: low levels change the signal quickly and stall, high ones refine it.
 constexpr double kFirstFraction = 0.7;
 constexpr double kLastFraction = 0.97;
 constexpr double kStep = 1.0;
