@@ -11,8 +11,7 @@
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
 
-namespace stageid {
-namespace test_arrow_system {
+namespace stageid::test_arrow_system {
 
 using test::DenseProblem;
 using test::measure_and_disturb;
@@ -254,5 +253,4 @@ TEST(FitStep, TheArrowWithDelaysSolvesItsOwnDenseEquations) {
     EXPECT_NEAR(step[i], expected[i], 1e-6 * std::abs(expected[i])) << i;
 }
 
-}  // namespace test_arrow_system
-}  // namespace stageid
+}  // namespace stageid::test_arrow_system

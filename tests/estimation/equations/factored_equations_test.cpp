@@ -13,8 +13,7 @@
 #include "tests/estimation/disturbed_problem.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_factored_equations {
+namespace stageid::test_factored_equations {
 
 using test::DenseProblem;
 
@@ -139,5 +138,4 @@ TEST(StackedTriangle, HasTheProductsOfAllMatrices) {
   EXPECT_TRUE(R.isUpperTriangular());
 }
 
-}  // namespace test_factored_equations
-}  // namespace stageid
+}  // namespace stageid::test_factored_equations

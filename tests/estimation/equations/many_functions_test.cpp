@@ -10,8 +10,7 @@
 #include "tests/estimation/disturbed_problem.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 
-namespace stageid {
-namespace test_many_functions {
+namespace stageid::test_many_functions {
 
 using test::DenseProblem;
 
@@ -77,5 +76,4 @@ TEST(HeldGlobals, HaveNoEquationsAndLeaveThoseOfTheOthers) {
   EXPECT_EQ(held.channel(0).ab(fit.held, Eigen::all).norm(), 0.0);
 }
 
-}  // namespace test_many_functions
-}  // namespace stageid
+}  // namespace stageid::test_many_functions

@@ -10,8 +10,7 @@
 #include "estimation/products/fraction_gram.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_sigma_equations {
+namespace stageid::test_sigma_equations {
 
 using Complex = std::complex<double>;
 
@@ -117,5 +116,4 @@ INSTANTIATE_TEST_SUITE_P(Axes, OnBothAxes, testing::Bool(), [](const auto& insta
   return instance.param ? "circle" : "imaginary";
 });
 
-}  // namespace test_sigma_equations
-}  // namespace stageid
+}  // namespace stageid::test_sigma_equations

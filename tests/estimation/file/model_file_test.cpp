@@ -12,8 +12,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_model_file {
+namespace stageid::test_model_file {
 
 using Json = nlohmann::ordered_json;
 using testing::AllOf;
@@ -318,5 +317,4 @@ TEST_F(ModelFile, NamesThatAreNotUtf8AreWrittenReadably) {
   EXPECT_NO_THROW((void)read_model(file_));
 }
 
-}  // namespace test_model_file
-}  // namespace stageid
+}  // namespace stageid::test_model_file

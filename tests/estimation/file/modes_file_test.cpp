@@ -8,8 +8,7 @@
 #include "estimation/model/cmif.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_modes_file {
+namespace stageid::test_modes_file {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -91,5 +90,4 @@ TEST_F(ModesFile, FilesThatCannotBeReadOrWritten) {
   EXPECT_THROW(write_modes(directory_ / "no" / "modes.json", {}), FileError);
 }
 
-}  // namespace test_modes_file
-}  // namespace stageid
+}  // namespace stageid::test_modes_file

@@ -16,8 +16,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_low_rank {
+namespace stageid::test_low_rank {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -278,5 +277,4 @@ TEST(LowRankSuspensionFit, ConvergesAlongPolesThatTheLinesHardlyDetermine) {
   }
 }
 
-}  // namespace test_low_rank
-}  // namespace stageid
+}  // namespace stageid::test_low_rank

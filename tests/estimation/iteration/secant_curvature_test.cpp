@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_secant_curvature {
+namespace stageid::test_secant_curvature {
 
 /// A quadratic cost with Hessian H, of which Gauss-Newton sees M.
 struct Valley {
@@ -61,5 +60,4 @@ TEST(SecantCurvature, ADirectionOfNegativeCurvatureIsNotLearned) {
   EXPECT_FALSE(curvature.step({}).has_value());
 }
 
-}  // namespace test_secant_curvature
-}  // namespace stageid
+}  // namespace stageid::test_secant_curvature

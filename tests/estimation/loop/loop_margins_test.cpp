@@ -9,8 +9,7 @@
 #include "tests/estimation/loop_cases.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_loop_margins {
+namespace stageid::test_loop_margins {
 
 using test::FreeMass;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -202,5 +201,4 @@ TEST(LoopView, AnUnstableLoopHasNoMargins) {
   EXPECT_LT(std::abs(view.loop(0, 0) + stage.loop_at(10.0)), 1e-9 * std::abs(view.loop(0, 0)));
 }
 
-}  // namespace test_loop_margins
-}  // namespace stageid
+}  // namespace stageid::test_loop_margins

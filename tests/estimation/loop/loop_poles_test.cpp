@@ -6,8 +6,7 @@
 
 #include "tests/estimation/loop_cases.hpp"
 
-namespace stageid {
-namespace test_loop_poles {
+namespace stageid::test_loop_poles {
 
 using test::FreeMass;
 
@@ -98,5 +97,4 @@ TEST(LoopPoles, ANegativeDelayIsRefused) {
   EXPECT_THROW(loop_poles(model, stage.controller()), std::invalid_argument);
 }
 
-}  // namespace test_loop_poles
-}  // namespace stageid
+}  // namespace stageid::test_loop_poles

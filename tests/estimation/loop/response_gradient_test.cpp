@@ -9,8 +9,7 @@
 #include "tests/estimation/loop_cases.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_response_gradient {
+namespace stageid::test_response_gradient {
 
 using test::parameters_of;
 using test::with_parameters;
@@ -96,5 +95,4 @@ TEST(LoopPoint, IsALoopOpenedAloneAndItsDerivative) {
   }
 }
 
-}  // namespace test_response_gradient
-}  // namespace stageid
+}  // namespace stageid::test_response_gradient

@@ -7,8 +7,7 @@
 
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_modal_assurance {
+namespace stageid::test_modal_assurance {
 
 using Complex = std::complex<double>;
 
@@ -98,5 +97,4 @@ TEST(PairModes, RefusesOtherChannels) {
                std::invalid_argument);
 }
 
-}  // namespace test_modal_assurance
-}  // namespace stageid
+}  // namespace stageid::test_modal_assurance

@@ -10,8 +10,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 
-namespace stageid {
-namespace test_mode_shapes {
+namespace stageid::test_mode_shapes {
 
 using Complex = std::complex<double>;
 
@@ -146,5 +145,4 @@ TEST(RigidBody, RefusesARankThatContradictsIt) {
   EXPECT_THROW(rigid_body(model), std::invalid_argument);
 }
 
-}  // namespace test_mode_shapes
-}  // namespace stageid
+}  // namespace stageid::test_mode_shapes

@@ -10,8 +10,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_residual_verdict {
+namespace stageid::test_residual_verdict {
 
 using testing::HasSubstr;
 
@@ -174,5 +173,4 @@ TEST(ResidualVerdict, WithoutWeightsOrLinesNothingIsJudged) {
   EXPECT_EQ(verdict.variance, ResidualVariance::none);
 }
 
-}  // namespace test_residual_verdict
-}  // namespace stageid
+}  // namespace stageid::test_residual_verdict

@@ -18,8 +18,7 @@
 #include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/state_space_response.hpp"
 
-namespace stageid {
-namespace test_sampled_state_space {
+namespace stageid::test_sampled_state_space {
 
 using Complex = std::complex<double>;
 using test::basis::kPeriod;
@@ -227,5 +226,4 @@ TEST(SampledStateSpace, RefusesWhatHasNoStateSpace) {
   EXPECT_THROW(sampled_state_space(model), std::invalid_argument);
 }
 
-}  // namespace test_sampled_state_space
-}  // namespace stageid
+}  // namespace stageid::test_sampled_state_space

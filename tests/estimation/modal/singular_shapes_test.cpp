@@ -4,8 +4,7 @@
 
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_singular_shapes {
+namespace stageid::test_singular_shapes {
 
 TEST(SingularShapes, SumUpToTheMatrix) {
   test::RandomNumbers random(3);
@@ -56,5 +55,4 @@ TEST(NumericalRank, CountsWhatIsAboveTheTolerance) {
   EXPECT_EQ(numerical_rank(Eigen::VectorXd::Zero(2), 0.0), 0);
 }
 
-}  // namespace test_singular_shapes
-}  // namespace stageid
+}  // namespace stageid::test_singular_shapes

@@ -12,8 +12,7 @@
 #include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/state_space_response.hpp"
 
-namespace stageid {
-namespace test_state_space {
+namespace stageid::test_state_space {
 
 using Complex = std::complex<double>;
 using testing::AllOf;
@@ -185,5 +184,4 @@ TEST(StateSpace, RefusesARankThatContradictsTheNumerators) {
   EXPECT_THAT([&] { state_space(model); }, refuses("residue_rank is 1"));
 }
 
-}  // namespace test_state_space
-}  // namespace stageid
+}  // namespace stageid::test_state_space

@@ -11,8 +11,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_validation {
+namespace stageid::test_validation {
 
 constexpr double kDelay = 1.37e-4;
 
@@ -320,5 +319,4 @@ TEST_F(ValidationOfAStage, OfAZeroResponseThereIsNoRelativeError) {
   EXPECT_TRUE(std::isnan(result.normalized_error));
 }
 
-}  // namespace test_validation
-}  // namespace stageid
+}  // namespace stageid::test_validation

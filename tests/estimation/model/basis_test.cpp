@@ -13,8 +13,7 @@
 #include "tests/estimation/basis_cases.hpp"
 #include "tests/support/models/model_reference.hpp"
 
-namespace stageid {
-namespace test_basis {
+namespace stageid::test_basis {
 
 using namespace test::basis;
 
@@ -360,5 +359,4 @@ TEST(Response, NeedsASampleRateForAHoldAndLinesBelowNyquist) {
   EXPECT_NO_THROW(evaluate_at(501.0, HoldModel::sinc)());
 }
 
-}  // namespace test_basis
-}  // namespace stageid
+}  // namespace stageid::test_basis

@@ -14,8 +14,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/state_space_response.hpp"
 
-namespace stageid {
-namespace test_certificates {
+namespace stageid::test_certificates {
 
 using Complex = std::complex<double>;
 using nlohmann::json;
@@ -237,5 +236,4 @@ TEST(Certificates, DefaultTolerancesEndNearTheStationaryPoint) {
   }
 }
 
-}  // namespace test_certificates
-}  // namespace stageid
+}  // namespace stageid::test_certificates

@@ -9,8 +9,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace stageid {
-namespace test_cmif_deviation {
+namespace stageid::test_cmif_deviation {
 
 /// A standard circular complex Gaussian, E|z|^2 = 1, by Box and Muller.
 std::complex<double> gaussian(std::mt19937_64& engine) {
@@ -76,5 +75,4 @@ TEST(CmifDeviation, RefusesAVarianceOfAnotherShapeAndWhiteningWithoutOne) {
   EXPECT_THROW(cmif_deviation(frf, CmifKind::whitened, variance), std::invalid_argument);
 }
 
-}  // namespace test_cmif_deviation
-}  // namespace stageid
+}  // namespace stageid::test_cmif_deviation

@@ -12,8 +12,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_cmif {
+namespace stageid::test_cmif {
 
 using testing::ElementsAre;
 
@@ -202,5 +201,4 @@ TEST(PickModes, KeepsTheMostProminentWhereThereAreTooMany) {
   EXPECT_TRUE(pick_modes(frf, prominent).empty());
 }
 
-}  // namespace test_cmif
-}  // namespace stageid
+}  // namespace stageid::test_cmif

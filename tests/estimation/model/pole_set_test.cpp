@@ -6,8 +6,7 @@
 
 #include <algorithm>
 
-namespace stageid {
-namespace test_pole_set {
+namespace stageid::test_pole_set {
 
 using Complex = std::complex<double>;
 
@@ -58,5 +57,4 @@ TEST(PoleSet, NothingBesideOneLeavesThePolesWhereTheyAre) {
     })) << p;
 }
 
-}  // namespace test_pole_set
-}  // namespace stageid
+}  // namespace stageid::test_pole_set

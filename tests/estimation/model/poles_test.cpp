@@ -8,8 +8,7 @@
 
 #include "estimation/model/basis.hpp"
 
-namespace stageid {
-namespace test_poles {
+namespace stageid::test_poles {
 
 using Complex = std::complex<double>;
 
@@ -63,5 +62,4 @@ TEST(Poles, DeviationsAreTheDifferencesOfTheRoots) {
   }
 }
 
-}  // namespace test_poles
-}  // namespace stageid
+}  // namespace stageid::test_poles

@@ -7,8 +7,7 @@
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 
-namespace stageid {
-namespace test_submodel_request {
+namespace stageid::test_submodel_request {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -91,5 +90,4 @@ TEST(SubmodelRequest, TheFitRefusesWhatHasAFault) {
   refused(structure, "below the lowest line, 5 Hz");
 }
 
-}  // namespace test_submodel_request
-}  // namespace stageid
+}  // namespace stageid::test_submodel_request

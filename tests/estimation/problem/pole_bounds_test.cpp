@@ -9,8 +9,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 
-namespace stageid {
-namespace test_pole_bounds {
+namespace stageid::test_pole_bounds {
 
 constexpr double kLowestLineHz = 20.0;
 
@@ -100,5 +99,4 @@ TEST(PoleBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
   EXPECT_EQ(found_from(1.9e-4, options), 20);
 }
 
-}  // namespace test_pole_bounds
-}  // namespace stageid
+}  // namespace stageid::test_pole_bounds

@@ -12,8 +12,7 @@
 #include "estimation/search/automatic_fit.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_search_limit {
+namespace stageid::test_search_limit {
 
 constexpr double kNoise = 0.002;
 constexpr double kTinyBudget_s = 1e-6;  // less than one evaluation
@@ -164,5 +163,4 @@ TEST(SearchLimit, AnInterruptKeepsTheBestModelSoFar) {
   }
 }
 
-}  // namespace test_search_limit
-}  // namespace stageid
+}  // namespace stageid::test_search_limit

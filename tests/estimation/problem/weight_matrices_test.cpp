@@ -11,8 +11,7 @@
 #include "estimation/problem/fit_problem.hpp"
 #include "tests/estimation/correlated_stage.hpp"
 
-namespace stageid {
-namespace test_weight_matrices {
+namespace stageid::test_weight_matrices {
 
 using test::correlated_noise;
 using test::CorrelatedNoise;
@@ -217,5 +216,4 @@ TEST_F(WeightMatrixRefusal, UsersThatWouldNotFitInMemory) {
                   testing::AllOf(testing::HasSubstr("2.9 GiB"), testing::HasSubstr("likelihood"))));
 }
 
-}  // namespace test_weight_matrices
-}  // namespace stageid
+}  // namespace stageid::test_weight_matrices

@@ -8,8 +8,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_weights {
+namespace stageid::test_weights {
 
 FrfEstimate small_frf() {
   test::DenseProblem problem;
@@ -191,5 +190,4 @@ TEST_F(WeightRefusal, UsersWeightsOfAnotherShapeOrThatAreNone) {
   expect_refused("one positive");
 }
 
-}  // namespace test_weights
-}  // namespace stageid
+}  // namespace stageid::test_weights

@@ -13,8 +13,7 @@
 #include "tests/estimation/disturbed_problem.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_line_sums {
+namespace stageid::test_line_sums {
 
 using test::DenseProblem;
 using test::measure_and_disturb;
@@ -185,5 +184,4 @@ TEST(WeightedProducts, SharesCoverEveryLineOfEveryChannelOnce) {
   }
 }
 
-}  // namespace test_line_sums
-}  // namespace stageid
+}  // namespace stageid::test_line_sums

@@ -12,8 +12,7 @@
 #include "estimation/products/weighted_products.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
 
-namespace stageid {
-namespace test_pair_reduction {
+namespace stageid::test_pair_reduction {
 
 using test::RandomNumbers;
 
@@ -206,5 +205,4 @@ TEST_F(ReductionTest, WhatWouldCancelIsMultipliedOut) {
   EXPECT_FALSE(is_direct(3, 4));
 }
 
-}  // namespace test_pair_reduction
-}  // namespace stageid
+}  // namespace stageid::test_pair_reduction

@@ -13,8 +13,7 @@
 #include "frf/response/hold_compensation.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_fit_request {
+namespace stageid::test_fit_request {
 
 using testing::HasSubstr;
 
@@ -287,5 +286,4 @@ TEST(FitRequest, TheRequestIsNamedWhole) {
   EXPECT_THAT(one, HasSubstr("\"hold\":\"exact\""));
 }
 
-}  // namespace test_fit_request
-}  // namespace stageid
+}  // namespace stageid::test_fit_request

@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_submodel_text {
+namespace stageid::test_submodel_text {
 
 using testing::HasSubstr;
 
@@ -53,5 +52,4 @@ TEST(SubmodelText, WhatIsWrongIsNamed) {
   wrong("n=4,f=120", "2 frequencies");
 }
 
-}  // namespace test_submodel_text
-}  // namespace stageid
+}  // namespace stageid::test_submodel_text

@@ -7,8 +7,7 @@
 
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_pole_relocation {
+namespace stageid::test_pole_relocation {
 
 using test::DenseProblem;
 
@@ -110,5 +109,4 @@ TEST(PoleRelocationShares, NothingAskedForNothingFound) {
   EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }
 
-}  // namespace test_pole_relocation
-}  // namespace stageid
+}  // namespace stageid::test_pole_relocation

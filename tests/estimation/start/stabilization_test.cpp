@@ -7,8 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace stageid {
-namespace test_stabilization {
+namespace stageid::test_stabilization {
 
 using Complex = std::complex<double>;
 constexpr double pi = std::numbers::pi;
@@ -117,5 +116,4 @@ TEST(Stabilization, RefusesOrdersThatTheLinesDoNotCarry) {
   EXPECT_NO_THROW(stabilization(frf, {.most_order = 198}));
 }
 
-}  // namespace test_stabilization
-}  // namespace stageid
+}  // namespace stageid::test_stabilization

@@ -9,8 +9,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_change_detector {
+namespace stageid::test_change_detector {
 
 constexpr int kReference = 32;
 
@@ -162,5 +161,4 @@ TEST(ChangeDetector, RefusesScoresWithoutVariance) {
                std::invalid_argument);
 }
 
-}  // namespace test_change_detector
-}  // namespace stageid
+}  // namespace stageid::test_change_detector

@@ -9,8 +9,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_forgetting_filter {
+namespace stageid::test_forgetting_filter {
 
 constexpr Eigen::Index kSize = 3;
 constexpr double kForgetting = 0.9;
@@ -111,5 +110,4 @@ TEST(ForgettingFilter, HasTheCovarianceOfRepeatedEstimates) {
       << ratio;
 }
 
-}  // namespace test_forgetting_filter
-}  // namespace stageid
+}  // namespace stageid::test_forgetting_filter

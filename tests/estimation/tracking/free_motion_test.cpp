@@ -6,8 +6,7 @@
 
 #include "tests/estimation/tracked_stage.hpp"
 
-namespace stageid {
-namespace test_free_motion {
+namespace stageid::test_free_motion {
 
 using test::LoopSpectra;
 using test::model_of;
@@ -55,5 +54,4 @@ TEST(FreeMotions, ContainTheMotionOfAFreeBody) {
   EXPECT_LT(left(spectrum, free_motions(response()).front()), 1e-10);
 }
 
-}  // namespace test_free_motion
-}  // namespace stageid
+}  // namespace stageid::test_free_motion

@@ -9,8 +9,7 @@
 
 #include "tests/estimation/tracked_stage.hpp"
 
-namespace stageid {
-namespace test_line_noise {
+namespace stageid::test_line_noise {
 
 constexpr Eigen::Index kOutputs = 2;
 constexpr Eigen::Index kLines = 20;
@@ -156,5 +155,4 @@ TEST(LineNoise, NeedsFourPeriods) {
   EXPECT_NO_THROW(LineNoise{noise.periods(4)});
 }
 
-}  // namespace test_line_noise
-}  // namespace stageid
+}  // namespace stageid::test_line_noise

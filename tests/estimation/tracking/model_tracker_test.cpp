@@ -15,8 +15,7 @@
 #include "estimation/tracking/tracked_response.hpp"
 #include "tests/estimation/tracked_stage.hpp"
 
-namespace stageid {
-namespace test_model_tracker {
+namespace stageid::test_model_tracker {
 
 using test::LoopSpectra;
 using test::model_of;
@@ -320,5 +319,4 @@ TEST(ModelTracker, RefusesWhatItCannotTrack) {
   EXPECT_NO_THROW(ModelTracker(model, lines_hz.head(2), {.learning_periods = 4}));
 }
 
-}  // namespace test_model_tracker
-}  // namespace stageid
+}  // namespace stageid::test_model_tracker

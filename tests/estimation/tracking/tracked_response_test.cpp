@@ -8,8 +8,7 @@
 
 #include "tests/estimation/tracked_stage.hpp"
 
-namespace stageid {
-namespace test_tracked_response {
+namespace stageid::test_tracked_response {
 
 using test::model_of;
 using test::StageProperties;
@@ -139,5 +138,4 @@ TEST(TrackedResponse, HasTheDerivativesOfFiniteDifferences) {
   }
 }
 
-}  // namespace test_tracked_response
-}  // namespace stageid
+}  // namespace stageid::test_tracked_response

@@ -7,8 +7,7 @@
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_covariance_monte_carlo {
+namespace stageid::test_covariance_monte_carlo {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -139,5 +138,4 @@ TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
   test::expect_honest(test::scatter_of(values), reported);
 }
 
-}  // namespace test_covariance_monte_carlo
-}  // namespace stageid
+}  // namespace stageid::test_covariance_monte_carlo

@@ -6,8 +6,7 @@
 #include "tests/support/models/cramer_rao_bound.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_cramer_rao {
+namespace stageid::test_cramer_rao {
 
 TEST(CramerRao, IsWhatMaximumLikelihoodReportsAtTheTruth) {
   test::RandomStageSpec spec;
@@ -41,5 +40,4 @@ TEST(CramerRao, IsWhatMaximumLikelihoodReportsAtTheTruth) {
   }
 }
 
-}  // namespace test_cramer_rao
-}  // namespace stageid
+}  // namespace stageid::test_cramer_rao

@@ -6,8 +6,7 @@
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_delay_deviation {
+namespace stageid::test_delay_deviation {
 
 using test::DenseProblem;
 
@@ -63,5 +62,4 @@ TEST(DelayDeviation, UnknownOfAGivenDelay) {
   EXPECT_EQ(fit.model.output_delay_std_s.size(), 0);
 }
 
-}  // namespace test_delay_deviation
-}  // namespace stageid
+}  // namespace stageid::test_delay_deviation

@@ -13,8 +13,7 @@
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_likelihood_fit {
+namespace stageid::test_likelihood_fit {
 
 using test::correlated_noise;
 using test::CorrelatedNoise;
@@ -273,5 +272,4 @@ TEST(LikelihoodFit, RefusesAMethodWithoutAMinimum) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("riv or gn")));
 }
 
-}  // namespace test_likelihood_fit
-}  // namespace stageid
+}  // namespace stageid::test_likelihood_fit

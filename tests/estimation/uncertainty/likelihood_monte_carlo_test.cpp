@@ -8,8 +8,7 @@
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_likelihood_monte_carlo {
+namespace stageid::test_likelihood_monte_carlo {
 
 using test::kRuns;
 using test::Measurement;
@@ -68,5 +67,4 @@ TEST(LikelihoodMonteCarlo, ScattersLessThanDiagonalWeightsAndAsMuchAsItSays) {
   }
 }
 
-}  // namespace test_likelihood_monte_carlo
-}  // namespace stageid
+}  // namespace stageid::test_likelihood_monte_carlo

@@ -10,8 +10,7 @@
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_low_rank_covariance {
+namespace stageid::test_low_rank_covariance {
 
 using test::kRuns;
 using test::RankOneStage;
@@ -142,5 +141,4 @@ TEST(LowRankCovariance, OfTheResponseIsRightWhereModesImitateEachOther) {
   EXPECT_NEAR(ratio, 1.0, 0.3);  // three standard errors
 }
 
-}  // namespace test_low_rank_covariance
-}  // namespace stageid
+}  // namespace stageid::test_low_rank_covariance

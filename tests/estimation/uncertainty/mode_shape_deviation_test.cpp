@@ -19,8 +19,7 @@
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_mode_shape_deviation {
+namespace stageid::test_mode_shape_deviation {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -252,5 +251,4 @@ TEST(DenseCovariance, SaysWhyThereIsNone) {
   EXPECT_NE(fit.decisions.back().find("no standard deviations"), std::string::npos);
 }
 
-}  // namespace test_mode_shape_deviation
-}  // namespace stageid
+}  // namespace stageid::test_mode_shape_deviation

@@ -12,8 +12,7 @@
 #include "tests/estimation/covariance_stage.hpp"
 #include "tests/estimation/delayed_fit_options.hpp"
 
-namespace stageid {
-namespace test_parameter_covariance {
+namespace stageid::test_parameter_covariance {
 
 using test::covariance_stage;
 using test::DenseProblem;
@@ -212,5 +211,4 @@ TEST_F(Covariance, IsNotComputedUnlessAsked) {
   EXPECT_FALSE(bare.model.submodels[1].natural_frequency_std_hz.has_value());
 }
 
-}  // namespace test_parameter_covariance
-}  // namespace stageid
+}  // namespace stageid::test_parameter_covariance

@@ -3,8 +3,7 @@
 
 #include "tests/support/models/zippered_fits.hpp"
 
-namespace stageid {
-namespace test_zippered_deviation {
+namespace stageid::test_zippered_deviation {
 
 constexpr double kSampleRateHz = 200.0;
 
@@ -25,5 +24,4 @@ TEST(ZipperedDeviation, IsThatOverSeeds) {
   EXPECT_GT(trials.correlated_lines, 4.0);
 }
 
-}  // namespace test_zippered_deviation
-}  // namespace stageid
+}  // namespace stageid::test_zippered_deviation

@@ -7,8 +7,7 @@
 #include "tests/hal/can/can_rig.hpp"
 #include "tests/support/process/error_message.hpp"
 
-namespace stageid {
-namespace test_can_bus_load {
+namespace stageid::test_can_bus_load {
 
 // Longest frames in microseconds, rounded, computed by a program that counts the bits of worst cases
 // (11-bit identifiers, 1 Mbit/s nominal).
@@ -68,5 +67,4 @@ TEST(CanBusLoad, EveryBusCarriesItsOwnOnly) {
   EXPECT_DOUBLE_EQ(loads[1].load, 1e3 * loads[1].cycle_s) << "heartbeats are on the first bus";
 }
 
-}  // namespace test_can_bus_load
-}  // namespace stageid
+}  // namespace stageid::test_can_bus_load

@@ -8,8 +8,7 @@
 
 #include "tests/hal/can/can_rig.hpp"
 
-namespace stageid {
-namespace test_can_c_header {
+namespace stageid::test_can_c_header {
 
 using testing::HasSubstr;
 
@@ -32,5 +31,4 @@ TEST(CanCHeader, AMissingLimitIsInfinite) {
               HasSubstr("/* s1 [m] */ HUGE_VAL }"));
 }
 
-}  // namespace test_can_c_header
-}  // namespace stageid
+}  // namespace stageid::test_can_c_header

@@ -9,8 +9,7 @@
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_can_clock {
+namespace stageid::test_can_clock {
 
 using test::CanRig;
 
@@ -151,5 +150,4 @@ TEST(CanClock, ANodeWithAClockNeedsTheWallClock) {
                std::invalid_argument);
 }
 
-}  // namespace test_can_clock
-}  // namespace stageid
+}  // namespace stageid::test_can_clock

@@ -9,8 +9,7 @@
 #include "hal/can/can_transport.hpp"
 #include "tests/hal/can/can_rig.hpp"
 
-namespace stageid {
-namespace test_can_dbc {
+namespace stageid::test_can_dbc {
 
 // Against the format itself: tests/vm/can_kernel_test.py reads recorded frames with this file alone.
 TEST(CanDbc, NamesEveryFrameAndChannel) {
@@ -59,5 +58,4 @@ TEST(CanTransport, TheWorstBusCounts) {
   EXPECT_STREQ(to_string(CanBusState::down), "interface down");
 }
 
-}  // namespace test_can_dbc
-}  // namespace stageid
+}  // namespace stageid::test_can_dbc

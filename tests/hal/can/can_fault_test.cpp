@@ -9,8 +9,7 @@
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_can_fault {
+namespace stageid::test_can_fault {
 
 using test::all_ok;
 using test::CanRig;
@@ -110,5 +109,4 @@ TEST(CanFaults, AreReadOrRefused) {
     EXPECT_THROW(parse_can_fault(text), std::invalid_argument) << text;
 }
 
-}  // namespace test_can_fault
-}  // namespace stageid
+}  // namespace stageid::test_can_fault

@@ -10,8 +10,7 @@
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_can_flood {
+namespace stageid::test_can_flood {
 
 using test::CanRig;
 using Host = test::CanHost;
@@ -77,5 +76,4 @@ TEST(CanFlood, TheNodesWatchdogLooksAtTheTimeAllTheSame) {
   EXPECT_EQ(stage.cause(), FaultCause::watchdog);
 }
 
-}  // namespace test_can_flood
-}  // namespace stageid
+}  // namespace stageid::test_can_flood

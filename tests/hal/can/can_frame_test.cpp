@@ -10,8 +10,7 @@
 #include "hal/can/can_layout.hpp"
 #include "tests/hal/can/can_rig.hpp"
 
-namespace stageid {
-namespace test_can_frame {
+namespace stageid::test_can_frame {
 
 CanFrame sealed(std::size_t payload_bytes) {
   CanFrame frame;
@@ -256,5 +255,4 @@ TEST(CanMessages, WhatIsOutOfRangeIsRefusedThoughItsCrcIsRight) {
   EXPECT_FALSE(decode_can_text(with_byte(encode_can_text("x", 0, 0), 4, 3), part, piece));
 }
 
-}  // namespace test_can_frame
-}  // namespace stageid
+}  // namespace stageid::test_can_frame

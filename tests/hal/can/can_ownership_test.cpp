@@ -14,8 +14,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/resident_bytes.hpp"
 
-namespace stageid {
-namespace test_can_ownership {
+namespace stageid::test_can_ownership {
 
 using test::CanRig;
 using Host = test::CanHost;
@@ -347,5 +346,4 @@ TEST(CanOwnership, AnArmedNodeWhoseHostFallsSilentIsFreeAgain) {
   EXPECT_EQ(host.exchange(), Outcome::ok);
 }
 
-}  // namespace test_can_ownership
-}  // namespace stageid
+}  // namespace stageid::test_can_ownership

@@ -10,8 +10,7 @@
 #include "tests/hal/can/can_rig.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_can_resident_stage {
+namespace stageid::test_can_resident_stage {
 
 using test::CanRig;
 
@@ -222,5 +221,4 @@ TEST(CanResidentStage, RefusesWhatDoesNotFit) {
   EXPECT_NO_THROW(stage->stop());
 }
 
-}  // namespace test_can_resident_stage
-}  // namespace stageid
+}  // namespace stageid::test_can_resident_stage

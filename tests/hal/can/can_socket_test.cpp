@@ -13,8 +13,7 @@
 
 #include "hal/stage/pacer.hpp"
 
-namespace stageid {
-namespace test_can_socket {
+namespace stageid::test_can_socket {
 
 /// A socket that receives what it sends to itself. The kernel stamps UDP as it stamps CAN.
 class Loopback {
@@ -121,5 +120,4 @@ TEST(CanArrival, TheControllersClockTakesTheJitterOfTheKernelAway) {
   }
 }
 
-}  // namespace test_can_socket
-}  // namespace stageid
+}  // namespace stageid::test_can_socket

@@ -9,8 +9,7 @@
 #include "tests/hal/can/can_host.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_can_stage {
+namespace stageid::test_can_stage {
 
 using test::all_ok;
 using test::CanRig;
@@ -262,5 +261,4 @@ TEST(CanStage, WhatTheWireCannotCarryStopsTheRun) {
   EXPECT_THAT(stage->trouble(), testing::HasSubstr("exceeds actuator_range_n"));
 }
 
-}  // namespace test_can_stage
-}  // namespace stageid
+}  // namespace stageid::test_can_stage

@@ -10,8 +10,7 @@
 #include "hal/stage/stage.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_can_zeromq {
+namespace stageid::test_can_zeromq {
 
 /// The node's socket.
 class Router {
@@ -95,5 +94,4 @@ TEST(ZeroMqCan, NothingIsKeptForANodeThatIsNotThere) {
   EXPECT_EQ(can.health(0).send_refused, 1U);
 }
 
-}  // namespace test_can_zeromq
-}  // namespace stageid
+}  // namespace stageid::test_can_zeromq

@@ -5,8 +5,7 @@
 
 #include "hal/modbus/modbus_stage.hpp"
 
-namespace stageid {
-namespace test_modbus_address {
+namespace stageid::test_modbus_address {
 
 ModbusAddress serial(int baud) {
   ModbusAddress address;
@@ -68,5 +67,4 @@ TEST(ModbusStageRate, MoreChannelsThanOneTransactionAreRefused) {
   EXPECT_THAT(making(info(10.0, 1, 57), {}), refuses(testing::HasSubstr("57 sensors")));
 }
 
-}  // namespace test_modbus_address
-}  // namespace stageid
+}  // namespace stageid::test_modbus_address

@@ -8,8 +8,7 @@
 
 #include "tests/hal/modbus/numbered_registers.hpp"
 
-namespace stageid {
-namespace test_modbus_answer {
+namespace stageid::test_modbus_answer {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -80,5 +79,4 @@ TEST_F(ModbusAnswer, GarbageGetsAReplyThatIsNoLongerThanAPdu) {
   }
 }
 
-}  // namespace test_modbus_answer
-}  // namespace stageid
+}  // namespace stageid::test_modbus_answer

@@ -15,8 +15,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"
 
-namespace stageid {
-namespace test_modbus_client {
+namespace stageid::test_modbus_client {
 
 using Pair = std::array<std::uint16_t, 2>;
 using testing::HasSubstr;
@@ -157,5 +156,4 @@ TEST(ModbusClient, AddressesAndTimesThatMakeNoSenseAreRefused) {
   EXPECT_NO_THROW(ModbusClient({}, {0.2, 0.2, 1e-3}));
 }
 
-}  // namespace test_modbus_client
-}  // namespace stageid
+}  // namespace stageid::test_modbus_client

@@ -7,8 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace stageid {
-namespace test_modbus_encoding {
+namespace stageid::test_modbus_encoding {
 
 TEST(ModbusEncoding, TheMoreSignificantWordComesFirst) {
   std::array<std::uint16_t, 4> r{};
@@ -70,5 +69,4 @@ TEST(ModbusEncoding, ARangeThatCannotBeScaledIsRefused) {
     EXPECT_THROW(static_cast<void>(count_scale(range)), std::invalid_argument) << range;
 }
 
-}  // namespace test_modbus_encoding
-}  // namespace stageid
+}  // namespace stageid::test_modbus_encoding

@@ -5,8 +5,7 @@
 
 #include <stdexcept>
 
-namespace stageid {
-namespace test_modbus_fault {
+namespace stageid::test_modbus_fault {
 
 using Kind = ModbusFault::Kind;
 
@@ -55,5 +54,4 @@ TEST(ModbusFault, IsOnForItsRequests) {
   EXPECT_FALSE(script.mentions(Kind::gravity));
 }
 
-}  // namespace test_modbus_fault
-}  // namespace stageid
+}  // namespace stageid::test_modbus_fault

@@ -13,8 +13,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"
 
-namespace stageid {
-namespace test_modbus_ownership {
+namespace stageid::test_modbus_ownership {
 
 namespace map = modbus_map;
 using test::ModbusBench;
@@ -225,5 +224,4 @@ TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
   EXPECT_EQ(bench.fake->commands.size(), 100U);
 }
 
-}  // namespace test_modbus_ownership
-}  // namespace stageid
+}  // namespace stageid::test_modbus_ownership

@@ -4,8 +4,7 @@
 
 #include <string_view>
 
-namespace stageid {
-namespace test_modbus_request_frame {
+namespace stageid::test_modbus_request_frame {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -96,5 +95,4 @@ TEST(ModbusRequestFrame, OnlyWhatMayBecomeARequestIsKept) {
   EXPECT_EQ(find_rtu_request(told, 1).bytes, told.size());
 }
 
-}  // namespace test_modbus_request_frame
-}  // namespace stageid
+}  // namespace stageid::test_modbus_request_frame

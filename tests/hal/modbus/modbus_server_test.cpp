@@ -20,8 +20,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 #include "tests/support/process/resident_bytes.hpp"
 
-namespace stageid {
-namespace test_modbus_server {
+namespace stageid::test_modbus_server {
 
 using Pair = std::array<std::uint16_t, 2>;
 using Bytes = std::vector<std::uint8_t>;
@@ -258,5 +257,4 @@ TEST(ModbusServer, OtherUnitsOnASerialLineDoNotDeafenTheNode) {
   close(line);
 }
 
-}  // namespace test_modbus_server
-}  // namespace stageid
+}  // namespace stageid::test_modbus_server

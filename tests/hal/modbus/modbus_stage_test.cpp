@@ -11,8 +11,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"
 
-namespace stageid {
-namespace test_modbus_stage {
+namespace stageid::test_modbus_stage {
 
 namespace map = modbus_map;
 using test::ModbusBench;
@@ -206,5 +205,4 @@ TEST(ModbusNode, RefusesWhatTheMapCannotShow) {
                std::invalid_argument);
 }
 
-}  // namespace test_modbus_stage
-}  // namespace stageid
+}  // namespace stageid::test_modbus_stage

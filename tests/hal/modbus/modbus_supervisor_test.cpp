@@ -10,8 +10,7 @@
 #include "tests/hal/modbus/modbus_bench.hpp"
 #include "tests/hal/modbus/numbered_registers.hpp"
 
-namespace stageid {
-namespace test_modbus_supervisor {
+namespace stageid::test_modbus_supervisor {
 
 using test::ModbusBench;
 using testing::HasSubstr;
@@ -135,5 +134,4 @@ TEST(ModbusSupervisor, TimesThatMakeNoSenseAreRefused) {
   EXPECT_THROW(ModbusSupervisor({}, {}, {0.1, 6.0, 5.0}), std::invalid_argument);
 }
 
-}  // namespace test_modbus_supervisor
-}  // namespace stageid
+}  // namespace stageid::test_modbus_supervisor

@@ -6,8 +6,7 @@
 #include <set>
 #include <string>
 
-namespace stageid {
-namespace test_node_state_machine {
+namespace stageid::test_node_state_machine {
 
 using State = NodeState;
 using Command = SupervisorCommand;
@@ -139,5 +138,4 @@ TEST(NodeStateMachine, NamesEveryCauseDifferently) {
   EXPECT_STREQ(to_string(static_cast<FaultCause>(200)), "unknown");
 }
 
-}  // namespace test_node_state_machine
-}  // namespace stageid
+}  // namespace stageid::test_node_state_machine

@@ -11,8 +11,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_stage_node {
+namespace stageid::test_stage_node {
 
 constexpr double kRate_hz = 1e3;
 constexpr std::int64_t kMs_ns = 1'000'000;
@@ -300,5 +299,4 @@ TEST(StageNode, GivesTheSamplesOfTheStageItself) {
   }
 }
 
-}  // namespace test_stage_node
-}  // namespace stageid
+}  // namespace stageid::test_stage_node

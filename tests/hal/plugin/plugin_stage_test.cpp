@@ -6,8 +6,7 @@
 
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_plugin_stage {
+namespace stageid::test_plugin_stage {
 
 auto loading(const char* library) {
   return [library] { const PluginStage stage({}, {library, {}}, 0.0); };
@@ -24,5 +23,4 @@ TEST(PluginStage, RefusesALibraryWithoutTheInterface) {
               test::refuses("has no function stageid_get_backend()"));
 }
 
-}  // namespace test_plugin_stage
-}  // namespace stageid
+}  // namespace stageid::test_plugin_stage

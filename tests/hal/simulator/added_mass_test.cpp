@@ -13,8 +13,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_added_mass {
+namespace stageid::test_added_mass {
 
 using Kind = SimulationSpec::Fault::Kind;
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -197,5 +196,4 @@ TEST(AddedMass, RefusesWhatHasNoMeaning) {
   EXPECT_TRUE(refuses(spec, "suspension_hz"));
 }
 
-}  // namespace test_added_mass
-}  // namespace stageid
+}  // namespace stageid::test_added_mass

@@ -12,8 +12,7 @@
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_allocation {
+namespace stageid::test_allocation {
 
 using Kind = SimulationSpec::Fault::Kind;
 
@@ -123,5 +122,4 @@ TEST_F(Allocation, AReplayedCycleHasNone) {
   EXPECT_EQ(counter.count(), 0U);
 }
 
-}  // namespace test_allocation
-}  // namespace stageid
+}  // namespace stageid::test_allocation

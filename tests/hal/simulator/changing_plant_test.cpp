@@ -10,8 +10,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_changing_plant {
+namespace stageid::test_changing_plant {
 
 using Fault = SimulationSpec::Fault;
 using Kind = Fault::Kind;
@@ -212,5 +211,4 @@ TEST(ChangingPlant, ARampIsTheIntegralOfTheChangingOscillator) {
   EXPECT_LT(largest_difference(run(bench, kCycles), expected), 0.025 * half_a_cycle);
 }
 
-}  // namespace test_changing_plant
-}  // namespace stageid
+}  // namespace stageid::test_changing_plant

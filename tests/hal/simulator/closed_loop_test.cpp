@@ -16,8 +16,7 @@
 #include "tests/hal/simulator/multisine_signal.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_closed_loop {
+namespace stageid::test_closed_loop {
 
 constexpr int kPeriod = 40000;  // 4 s at 10 kHz
 constexpr int kLines = 4000;    // odd ones, 0.25 to 1999.75 Hz
@@ -228,5 +227,4 @@ TEST_F(FrfNoise, LeavesEveryResonanceStandingOut) {
   }
 }
 
-}  // namespace test_closed_loop
-}  // namespace stageid
+}  // namespace stageid::test_closed_loop

@@ -11,8 +11,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_fault_script {
+namespace stageid::test_fault_script {
 
 using Kind = SimulationSpec::Fault::Kind;
 using test::Bench;
@@ -257,5 +256,4 @@ TEST_F(FaultTest, ComesInTheAskedRunOnly) {
   EXPECT_EQ(step(0.0, 0.0), Outcome::ok);
 }
 
-}  // namespace test_fault_script
-}  // namespace stageid
+}  // namespace stageid::test_fault_script

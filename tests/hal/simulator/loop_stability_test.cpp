@@ -7,8 +7,7 @@
 #include "tests/hal/simulator/closed_loop_model.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_loop_stability {
+namespace stageid::test_loop_stability {
 
 test::SimulatedSpec with_crossovers(double factor) {
   test::SimulatedSpec spec = test::silent_wafer_stage_spec();
@@ -66,5 +65,4 @@ TEST(LoopStability, SensitivityDoesNotDependOnUnits) {
   EXPECT_DOUBLE_EQ(largest_sensitivity(L.topLeftCorner(1, 1)), 2.0);
 }
 
-}  // namespace test_loop_stability
-}  // namespace stageid
+}  // namespace stageid::test_loop_stability

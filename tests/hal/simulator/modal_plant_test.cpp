@@ -15,8 +15,7 @@
 #include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_modal_plant {
+namespace stageid::test_modal_plant {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -296,5 +295,4 @@ TEST(ModalPlant, GoesOnFromItsStateWithARetunedMode) {
   EXPECT_EQ(retuned.coordinate(1), before);
 }
 
-}  // namespace test_modal_plant
-}  // namespace stageid
+}  // namespace stageid::test_modal_plant

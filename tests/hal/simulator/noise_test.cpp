@@ -7,8 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace stageid {
-namespace test_noise {
+namespace stageid::test_noise {
 
 std::vector<double> numbers(std::uint64_t seed, std::uint64_t stream, std::size_t blocks) {
   NormalSource source(seed, stream);
@@ -138,5 +137,4 @@ TEST(StageNoise, CanBeSilent) {
   EXPECT_EQ(noise.sensor_m()[1], 0.0);
 }
 
-}  // namespace test_noise
-}  // namespace stageid
+}  // namespace stageid::test_noise

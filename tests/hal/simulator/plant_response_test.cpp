@@ -11,8 +11,7 @@
 #include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_plant_response {
+namespace stageid::test_plant_response {
 
 using Complex = std::complex<double>;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -208,5 +207,4 @@ TEST(PlantResponse, AccelerationsAreExactThroughTheHold) {
       1e-12 * continuous.row(1).norm());
 }
 
-}  // namespace test_plant_response
-}  // namespace stageid
+}  // namespace stageid::test_plant_response

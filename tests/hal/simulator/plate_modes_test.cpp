@@ -7,8 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace stageid {
-namespace test_plate_modes {
+namespace stageid::test_plate_modes {
 
 // omega a^2 sqrt(rho h / D) of the completely free square plate, nu = 0.3: K. M. Liew, Y. Xiang and S. Kitipornchai,
 // J. Sound Vib. 163 (1993), and others, to the digits on which they agree.
@@ -101,5 +100,4 @@ TEST(PlateModes, RefuseWhatIsNoPlate) {
   EXPECT_THROW(PlateModes({1.0, 1.0, 0.3}, PlateModes::max_count() + 1), std::invalid_argument);
 }
 
-}  // namespace test_plate_modes
-}  // namespace stageid
+}  // namespace stageid::test_plate_modes

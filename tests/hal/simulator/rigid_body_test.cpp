@@ -9,8 +9,7 @@
 
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_rigid_body {
+namespace stageid::test_rigid_body {
 
 AxisController lead(double crossover_hz) {
   AxisController axis;
@@ -179,5 +178,4 @@ TEST(Units, ALoopInAmperesIsThatInNewtons) {
   EXPECT_EQ(motion.contradiction.size(), 0);
 }
 
-}  // namespace test_rigid_body
-}  // namespace stageid
+}  // namespace stageid::test_rigid_body

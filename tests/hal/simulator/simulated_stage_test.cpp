@@ -14,8 +14,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_simulated_stage {
+namespace stageid::test_simulated_stage {
 
 using Kind = SimulationSpec::Fault::Kind;
 
@@ -261,5 +260,4 @@ TEST(SimulatedStage, WantsRoomForEverySensor) {
   EXPECT_THROW(stage->start(0, inputs), std::invalid_argument);
 }
 
-}  // namespace test_simulated_stage
-}  // namespace stageid
+}  // namespace stageid::test_simulated_stage

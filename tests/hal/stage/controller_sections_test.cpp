@@ -13,8 +13,7 @@
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_controller_sections {
+namespace stageid::test_controller_sections {
 
 constexpr double kRateHz = 1000.0;
 
@@ -217,5 +216,4 @@ TEST(FeedForward, RisesOnceTheLoopIsClosedAndStays) {
   EXPECT_EQ(MotionController(open_spec(2, 1)).feed_forward_samples(), 0U);
 }
 
-}  // namespace test_controller_sections
-}  // namespace stageid
+}  // namespace stageid::test_controller_sections

@@ -11,8 +11,7 @@
 #include "tests/support/stages/stop_case.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_limit_guard {
+namespace stageid::test_limit_guard {
 
 using testing::HasSubstr;
 using Kind = SimulationSpec::Fault::Kind;
@@ -201,5 +200,4 @@ TEST(LimitGuard, RefusesAMotionThatDoesNotFit) {
   EXPECT_THROW(make([](RigidMotion& m) { m.contradiction.setZero(2, 2); }), std::invalid_argument);
 }
 
-}  // namespace test_limit_guard
-}  // namespace stageid
+}  // namespace stageid::test_limit_guard

@@ -10,8 +10,7 @@
 
 #include "tests/hal/stage/fake_stage.hpp"
 
-namespace stageid {
-namespace test_limited_stage {
+namespace stageid::test_limited_stage {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -288,5 +287,4 @@ TEST(LimitedStage, SaysThatNoLimitWasExceeded) {
   EXPECT_EQ(describe({}, {}), "no limit was exceeded");
 }
 
-}  // namespace test_limited_stage
-}  // namespace stageid
+}  // namespace stageid::test_limited_stage

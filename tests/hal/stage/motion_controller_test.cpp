@@ -11,8 +11,7 @@
 #include "tests/hal/measured_response.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_motion_controller {
+namespace stageid::test_motion_controller {
 
 AxisController full_axis() {
   AxisController axis;
@@ -170,5 +169,4 @@ TEST(MotionController, RefusesWhatMakesNoSense) {
   EXPECT_THROW(MotionController{spec}, std::invalid_argument);
 }
 
-}  // namespace test_motion_controller
-}  // namespace stageid
+}  // namespace stageid::test_motion_controller

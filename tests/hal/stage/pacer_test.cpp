@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_pacer {
+namespace stageid::test_pacer {
 
 // A clock cannot be stopped, so only order and phase are checked, which are independent of the machine's speed.
 constexpr double kRate_hz = 1000.0;
@@ -62,5 +61,4 @@ TEST(Pacer, PaceIsStageTimeOverWallTime) {
   EXPECT_EQ(pacer.wait().sample_ns - origin, kPeriod_ns / 4);
 }
 
-}  // namespace test_pacer
-}  // namespace stageid
+}  // namespace stageid::test_pacer

@@ -15,8 +15,7 @@
 #include "tests/hal/modbus/numbered_registers.hpp"
 #include "tests/support/process/docs_table.hpp"
 
-namespace stageid {
-namespace test_peer_status {
+namespace stageid::test_peer_status {
 
 namespace map = modbus_map;
 using test::CanRig;
@@ -302,5 +301,4 @@ INSTANTIATE_TEST_SUITE_P(
 // can_ownership_test.cpp and modbus_ownership_test.cpp test the rows that need more than one peer. can_stage_test.cpp
 // and can_fault_test.cpp test those of a bus, modbus_stage_test.cpp those of a link.
 
-}  // namespace test_peer_status
-}  // namespace stageid
+}  // namespace stageid::test_peer_status

@@ -11,8 +11,7 @@
 #include "hal/stage/pacer.hpp"
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_plant_watch {
+namespace stageid::test_plant_watch {
 
 using testing::HasSubstr;
 
@@ -167,5 +166,4 @@ TEST(PlantWatch, ConditionsThatNothingFulfilsAreRefused) {
   EXPECT_THROW(PlantWatch(supervisor, empty), std::invalid_argument);
 }
 
-}  // namespace test_plant_watch
-}  // namespace stageid
+}  // namespace stageid::test_plant_watch

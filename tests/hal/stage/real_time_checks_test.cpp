@@ -7,8 +7,7 @@
 
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_real_time_checks {
+namespace stageid::test_real_time_checks {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -86,5 +85,4 @@ TEST(RealTimeChecksHere, NothingIsKnownWithoutTheFiles) {
   EXPECT_THAT(real_time_obstacles(0, "/does/not/exist"), IsEmpty());
 }
 
-}  // namespace test_real_time_checks
-}  // namespace stageid
+}  // namespace stageid::test_real_time_checks

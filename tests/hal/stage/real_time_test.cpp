@@ -14,8 +14,7 @@
 
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_real_time {
+namespace stageid::test_real_time {
 
 bool this_kernel_is_rt() {
   utsname name{};
@@ -114,5 +113,4 @@ TEST(RealTime, RefusesWhatCannotBe) {
   EXPECT_THAT(asking(80, 100'000), test::refuses<std::invalid_argument>("100000"));
 }
 
-}  // namespace test_real_time
-}  // namespace stageid
+}  // namespace stageid::test_real_time

@@ -9,8 +9,7 @@
 
 #include "tests/hal/stage_bench.hpp"
 
-namespace stageid {
-namespace test_replay_stage {
+namespace stageid::test_replay_stage {
 
 struct Recorded {
   Eigen::MatrixXd u, y;
@@ -159,5 +158,4 @@ TEST(ReplayTest, RefusesBadArguments) {
   EXPECT_THROW(replay.start(0, inputs), std::invalid_argument);
 }
 
-}  // namespace test_replay_stage
-}  // namespace stageid
+}  // namespace stageid::test_replay_stage

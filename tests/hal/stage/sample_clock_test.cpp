@@ -6,8 +6,7 @@
 #include <cstdlib>
 #include <random>
 
-namespace stageid {
-namespace test_sample_clock {
+namespace stageid::test_sample_clock {
 
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr std::int64_t kLimit_ns = 20'000;
@@ -68,5 +67,4 @@ TEST(SampleClock, TheLimitFollowsFromTheBand) {
   EXPECT_NEAR(2.0 * 3.14159265358979 * 200.0 * jitter_s, 0.1, 1e-12);
 }
 
-}  // namespace test_sample_clock
-}  // namespace stageid
+}  // namespace stageid::test_sample_clock

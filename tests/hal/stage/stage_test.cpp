@@ -7,8 +7,7 @@
 #include <set>
 #include <utility>
 
-namespace stageid {
-namespace test_stage {
+namespace stageid::test_stage {
 
 TEST(Outcome, HasANameOfItsOwn) {
   std::set<std::string> names;
@@ -41,5 +40,4 @@ TEST(Stage, ValuesAreFiniteIfAllAre) {
     }
 }
 
-}  // namespace test_stage
-}  // namespace stageid
+}  // namespace stageid::test_stage

@@ -12,8 +12,7 @@
 #include "tools/config/config_schema.hpp"
 #include "tools/terminal/format_errors.hpp"
 
-namespace stageid {
-namespace test_config_reader {
+namespace stageid::test_config_reader {
 
 using testing::HasSubstr;
 
@@ -228,5 +227,4 @@ TEST(ConfigSchema, WritesTheKeysOfEqualGroupsOnce) {
             "keys:                        # settings (map of name: text; default {})\n");
 }
 
-}  // namespace test_config_reader
-}  // namespace stageid
+}  // namespace stageid::test_config_reader

@@ -13,8 +13,7 @@
 #include "tools/experiment/link_load.hpp"
 #include "tools/fleet/fleet_config.hpp"
 
-namespace stageid {
-namespace test_configs {
+namespace stageid::test_configs {
 
 const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR) / "configs";
 
@@ -215,5 +214,4 @@ TEST(Configs, TheMeasurementIsAnotherIfStageOrExcitationChange) {
   EXPECT_NE(quick.measurement_id, paper.measurement_id);
 }
 
-}  // namespace test_configs
-}  // namespace stageid
+}  // namespace stageid::test_configs

@@ -18,8 +18,7 @@
 #include "tests/support/stages/closed_loop.hpp"
 #include "tools/config/stage_expectation.hpp"
 
-namespace stageid {
-namespace test_controller_file {
+namespace stageid::test_controller_file {
 
 using test::MemoryLog;
 using testing::AllOf;
@@ -173,5 +172,4 @@ TEST_F(ControllerFileTest, WhatIsWrongIsSaidWithItsPlace) {
                FileError);
 }
 
-}  // namespace test_controller_file
-}  // namespace stageid
+}  // namespace stageid::test_controller_file

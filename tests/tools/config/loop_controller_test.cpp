@@ -17,8 +17,7 @@
 #include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 
-namespace stageid {
-namespace test_loop_controller {
+namespace stageid::test_loop_controller {
 
 using testing::HasSubstr;
 
@@ -204,5 +203,4 @@ TEST_F(LoopController, ABiasIsAFeedForwardWithinItsLimit) {
   EXPECT_THAT(error_of("controller:\n  " + matrices()), HasSubstr("bias_n: -41 N exceeds limit_n"));
 }
 
-}  // namespace test_loop_controller
-}  // namespace stageid
+}  // namespace stageid::test_loop_controller

@@ -8,8 +8,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_yaml_document {
+namespace stageid::test_yaml_document {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -126,5 +125,4 @@ TEST(YamlText, AFileOfMoreThanAMegabyteIsRefused) {
   EXPECT_THAT(error_of(std::string((1U << 20) + 1, ' ')), HasSubstr("longer than 1 MiB"));
 }
 
-}  // namespace test_yaml_document
-}  // namespace stageid
+}  // namespace stageid::test_yaml_document

@@ -11,8 +11,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tools/config/stage_config.hpp"
 
-namespace stageid {
-namespace test_stage_loop {
+namespace stageid::test_stage_loop {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -111,5 +110,4 @@ TEST(StageLoop, OfMatricesIsOneLoopPerActuatorThatTheyDrive) {
   expect_response(stage, model, loop);
 }
 
-}  // namespace test_stage_loop
-}  // namespace stageid
+}  // namespace stageid::test_stage_loop

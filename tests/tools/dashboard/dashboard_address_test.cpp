@@ -5,8 +5,7 @@
 
 #include <stdexcept>
 
-namespace stageid {
-namespace test_dashboard_address {
+namespace stageid::test_dashboard_address {
 
 TEST(DashboardAddress, APortAloneIsThisMachineOnly) {
   const DashboardAddress address = parse_dashboard_address("8080");
@@ -43,5 +42,4 @@ TEST(DashboardToken, IsLongAndNeverTheSame) {
   EXPECT_FALSE(same_token("", token));
 }
 
-}  // namespace test_dashboard_address
-}  // namespace stageid
+}  // namespace stageid::test_dashboard_address

@@ -18,8 +18,7 @@
 #include "hal/stage/stage.hpp"
 #include "tests/support/process/resident_bytes.hpp"
 
-namespace stageid {
-namespace test_dashboard_server {
+namespace stageid::test_dashboard_server {
 
 using namespace std::chrono_literals;
 
@@ -328,5 +327,4 @@ TEST_F(DashboardServerTest, FinishWaitsForNobodyForEver) {
   EXPECT_THAT(stays.read_until("0\r\n\r\n"), testing::HasSubstr("data: {}"));
 }
 
-}  // namespace test_dashboard_server
-}  // namespace stageid
+}  // namespace stageid::test_dashboard_server

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <thread>
 
-namespace stageid {
-namespace test_live_levels {
+namespace stageid::test_live_levels {
 
 /// Rows of two channels and a status word.
 std::vector<double> rows_of(const std::vector<std::pair<double, double>>& values) {
@@ -64,5 +63,4 @@ TEST(LiveLevels, NothingIsLostToWhoeverLooksAllTheTime) {
   EXPECT_EQ(seen, kRows);
 }
 
-}  // namespace test_live_levels
-}  // namespace stageid
+}  // namespace stageid::test_live_levels

@@ -5,8 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-namespace stageid {
-namespace test_live_traces {
+namespace stageid::test_live_traces {
 
 /// Samples of two channels, 0, 1, 2 ... and their negatives, and a status word.
 std::vector<double> rows_of(int first, int count) {
@@ -38,5 +37,4 @@ TEST(LiveTraces, KeepsTheLastSeconds) {
   EXPECT_EQ(told["high"].back(), 1233.0);
 }
 
-}  // namespace test_live_traces
-}  // namespace stageid
+}  // namespace stageid::test_live_traces

@@ -6,8 +6,7 @@
 #include <regex>
 #include <sstream>
 
-namespace stageid {
-namespace test_metrics {
+namespace stageid::test_metrics {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -66,5 +65,4 @@ TEST(Metrics, EveryLineIsOfTheFormat) {
   EXPECT_THAT(metrics_text("no JSON"), Not(HasSubstr("\nstageid_")));
 }
 
-}  // namespace test_metrics
-}  // namespace stageid
+}  // namespace stageid::test_metrics

@@ -9,8 +9,7 @@
 
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_database {
+namespace stageid::test_database {
 
 TEST(Database, NoMessageContainsAPassword) {
   EXPECT_EQ(shown_place("fleet:1@2.db"), "fleet:1@2.db");
@@ -41,5 +40,4 @@ TEST(Database, SeveralWritersMayCreateOneFileAtTheSameInstant) {
   for (const std::string& error : errors) EXPECT_EQ(error, "");
 }
 
-}  // namespace test_database
-}  // namespace stageid
+}  // namespace stageid::test_database

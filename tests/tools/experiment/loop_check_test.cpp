@@ -8,8 +8,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/experiment/exact_pilot.hpp"
 
-namespace stageid {
-namespace test_loop_check {
+namespace stageid::test_loop_check {
 
 StageConfig with_gain(StageConfig stage, double factor) {
   for (AxisController& axis : stage.spec.controller.axes) axis.gain *= factor;
@@ -62,5 +61,4 @@ TEST_F(LoopCheckTest, ALittleMarginIsADoubt) {
   EXPECT_THAT(check_loop(stage).doubt, testing::IsEmpty());
 }
 
-}  // namespace test_loop_check
-}  // namespace stageid
+}  // namespace stageid::test_loop_check

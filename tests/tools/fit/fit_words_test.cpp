@@ -7,8 +7,7 @@
 #include "estimation/model/cmif.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_fit_words {
+namespace stageid::test_fit_words {
 
 using Modes = ModesRequest::Kind;
 using Body = RigidBodyRequest::Kind;
@@ -111,5 +110,4 @@ TEST(FitWords, EveryWordThatIsNotOneIsRefused) {
   refused(&FitWords::method, "lm");
 }
 
-}  // namespace test_fit_words
-}  // namespace stageid
+}  // namespace stageid::test_fit_words

@@ -5,8 +5,7 @@
 
 #include "tests/tools/program_fixture.hpp"
 
-namespace stageid {
-namespace test_slow_direction {
+namespace stageid::test_slow_direction {
 
 class SlowDirection : public test::ProgramTest {};
 
@@ -21,5 +20,4 @@ TEST_F(SlowDirection, AFitWithASuspensionFarBelowTheLinesConverges) {
   }
 }
 
-}  // namespace test_slow_direction
-}  // namespace stageid
+}  // namespace stageid::test_slow_direction

@@ -16,8 +16,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/tools/program_fixture.hpp"
 
-namespace stageid {
-namespace test_weight_flag {
+namespace stageid::test_weight_flag {
 
 using Complex = std::complex<double>;
 
@@ -126,5 +125,4 @@ TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
   EXPECT_FALSE(std::filesystem::exists(at("model.json")));
 }
 
-}  // namespace test_weight_flag
-}  // namespace stageid
+}  // namespace stageid::test_weight_flag

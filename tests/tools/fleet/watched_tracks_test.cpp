@@ -11,8 +11,7 @@
 #include "tests/support/process/directory_test.hpp"
 #include "tests/tools/fleet/fleet_fixture.hpp"
 
-namespace stageid {
-namespace test_watched_tracks {
+namespace stageid::test_watched_tracks {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -109,5 +108,4 @@ TEST_F(WatchedTracksTest, RefusesOtherFilesAndStoresNothing) {
   EXPECT_FALSE(store_.database().prepare("SELECT 1 FROM stage").step());
 }
 
-}  // namespace test_watched_tracks
-}  // namespace stageid
+}  // namespace stageid::test_watched_tracks

@@ -5,8 +5,7 @@
 #include "tools/manual/manual_pages.hpp"
 #include "tools/manual/shell_completion.hpp"
 
-namespace stageid {
-namespace test_manual {
+namespace stageid::test_manual {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -73,5 +72,4 @@ TEST_F(Manual, ZshGetsDescriptionsAsText) {
   EXPECT_THAT(script, HasSubstr("next=('cut:Cuts '\\''it'\\'' at a\\b')"));
 }
 
-}  // namespace test_manual
-}  // namespace stageid
+}  // namespace stageid::test_manual

@@ -13,8 +13,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/steps/health_step.hpp"
 
-namespace stageid {
-namespace test_report_input {
+namespace stageid::test_report_input {
 
 using testing::ElementsAre;
 
@@ -134,5 +133,4 @@ TEST_F(ReportInputTest, AFileWithoutVerdictsIsTestedWhereThatCanBe) {
   EXPECT_FALSE(read_back(frf).nonlinearity.has_value());
 }
 
-}  // namespace test_report_input
-}  // namespace stageid
+}  // namespace stageid::test_report_input

@@ -12,8 +12,7 @@
 #include "tests/tools/report/synthetic_report.hpp"
 #include "tools/report/report_page.hpp"
 
-namespace stageid {
-namespace test_report_page {
+namespace stageid::test_report_page {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -256,5 +255,4 @@ TEST(Report, IsWrittenWholeOrNotAtAll) {
   std::filesystem::remove_all(directory);
 }
 
-}  // namespace test_report_page
-}  // namespace stageid
+}  // namespace stageid::test_report_page

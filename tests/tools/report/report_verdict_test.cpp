@@ -5,8 +5,7 @@
 
 #include "tests/tools/report/synthetic_report.hpp"
 
-namespace stageid {
-namespace test_report_verdict {
+namespace stageid::test_report_verdict {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -143,5 +142,4 @@ TEST(Verdict, AMeasurementWithoutModelIsNotJudged) {
   EXPECT_EQ(judge(data).level, Level::none);
 }
 
-}  // namespace test_report_verdict
-}  // namespace stageid
+}  // namespace stageid::test_report_verdict

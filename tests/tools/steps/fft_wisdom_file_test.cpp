@@ -16,8 +16,7 @@
 #include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_fft_wisdom_file {
+namespace stageid::test_fft_wisdom_file {
 
 using test::expect_error;
 
@@ -139,5 +138,4 @@ TEST_F(FftWisdomFileTest, AFolderThatTakesNoFileIsToldBeforeTheWork) {
   EXPECT_TRUE(std::filesystem::is_empty(directory_.path()));
 }
 
-}  // namespace test_fft_wisdom_file
-}  // namespace stageid
+}  // namespace stageid::test_fft_wisdom_file

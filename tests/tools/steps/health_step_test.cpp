@@ -16,8 +16,7 @@
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
 
-namespace stageid {
-namespace test_health_step {
+namespace stageid::test_health_step {
 
 using test::MemoryLog;
 using testing::AllOf;
@@ -255,5 +254,4 @@ TEST(DataHealth, FindingsSurviveTheProvenance) {
   EXPECT_TRUE(health_of("{\"health\": 3}").empty());
 }
 
-}  // namespace test_health_step
-}  // namespace stageid
+}  // namespace stageid::test_health_step

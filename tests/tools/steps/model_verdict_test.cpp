@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_model_verdict {
+namespace stageid::test_model_verdict {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -150,5 +149,4 @@ TEST(ModelVerdict, TrustsARecordingThatWasInterruptedAndResumed) {
   EXPECT_TRUE(judge_model(fitted_to_drifting_data(), {}, {}, {stopped, again}).trustworthy);
 }
 
-}  // namespace test_model_verdict
-}  // namespace stageid
+}  // namespace stageid::test_model_verdict

@@ -8,8 +8,7 @@
 #include "estimation/modal/validation.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
-namespace stageid {
-namespace test_truth_comparison {
+namespace stageid::test_truth_comparison {
 
 using Partners = std::vector<std::optional<std::size_t>>;
 
@@ -206,5 +205,4 @@ TEST(ModeRows, WithoutStandardDeviationNothingIsInStandardDeviations) {
   EXPECT_FALSE(rows[0].damping_deviation());
 }
 
-}  // namespace test_truth_comparison
-}  // namespace stageid
+}  // namespace stageid::test_truth_comparison

@@ -9,8 +9,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tools/terminal/exit_code.hpp"
 
-namespace stageid {
-namespace test_interrupt {
+namespace stageid::test_interrupt {
 
 /// Ends by the signal; a file is being written, and the function for the end writes another one.
 [[noreturn]] void end_while_writing(const test::TemporaryDirectory& directory) {
@@ -28,5 +27,4 @@ TEST(InterruptDeathTest, WhatIsDoneAtTheEndMayWaitForAnOutput) {
               "stageid: interrupted; nothing was written");
 }
 
-}  // namespace test_interrupt
-}  // namespace stageid
+}  // namespace stageid::test_interrupt

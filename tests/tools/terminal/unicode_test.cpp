@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_unicode {
+namespace stageid::test_unicode {
 
 TEST(Unicode, EncodingsHoldTheSameText) {
   const std::string text = "a\xC2\xB5\xE2\x82\xAC\xF0\x9F\x98\x80";  // one to four bytes
@@ -38,5 +37,4 @@ TEST(Unicode, TextThatIsNotUtf8IsLatin1) {
   EXPECT_EQ(utf8_of_text("m/s\xB2 \xC2\xB5"), "m/s\xC2\xB2 \xC3\x82\xC2\xB5");
 }
 
-}  // namespace test_unicode
-}  // namespace stageid
+}  // namespace stageid::test_unicode

@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace stageid {
-namespace test_track_history {
+namespace stageid::test_track_history {
 
 TEST(TrackHistory, KeepsAllOfAShortWatch) {
   TrackHistory history;
@@ -34,5 +33,4 @@ TEST(TrackHistory, CoversALongWatchEvenlyWithoutGrowing) {
   EXPECT_GE(times.back(), kPeriods - 2 * times[1]);
 }
 
-}  // namespace test_track_history
-}  // namespace stageid
+}  // namespace stageid::test_track_history

@@ -5,8 +5,7 @@
 
 #include "estimation/request/request_flags.hpp"
 
-namespace stageid {
-namespace test_workbench_edit {
+namespace stageid::test_workbench_edit {
 
 using Json = nlohmann::json;
 using Modes = ModesRequest::Kind;
@@ -104,5 +103,4 @@ TEST(WorkbenchEdit, TheControlsShowTheRequest) {
                             "delay": "", "rigid_body": "", "direct_term": "full"})"));
 }
 
-}  // namespace test_workbench_edit
-}  // namespace stageid
+}  // namespace stageid::test_workbench_edit

@@ -12,8 +12,7 @@
 #include "tools/steps/fit_step.hpp"
 #include "tools/workbench/model_request.hpp"
 
-namespace stageid {
-namespace test_fit_details {
+namespace stageid::test_fit_details {
 
 using Json = nlohmann::json;
 
@@ -88,5 +87,4 @@ TEST_F(FitDetailsTest, AControllerThatDoesNotFitIsTold) {
   EXPECT_NE(details->deviation.text, "");
 }
 
-}  // namespace test_fit_details
-}  // namespace stageid
+}  // namespace stageid::test_fit_details

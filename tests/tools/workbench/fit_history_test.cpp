@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_fit_history {
+namespace stageid::test_fit_history {
 
 FitState named(const std::string& what) {
   FitState state;
@@ -39,5 +38,4 @@ TEST(FitHistory, KeepsTheFirstAndTheNewest) {
   EXPECT_EQ(history.index(), FitHistory::kMost - 1);
 }
 
-}  // namespace test_fit_history
-}  // namespace stageid
+}  // namespace stageid::test_fit_history

@@ -7,8 +7,7 @@
 
 #include "estimation/request/request_flags.hpp"
 
-namespace stageid {
-namespace test_model_request {
+namespace stageid::test_model_request {
 
 Submodel mode(double frequency_hz, double damping_ratio, std::size_t numerators = 1) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
@@ -107,5 +106,4 @@ TEST(ModelRequest, RefusesRequestedSubmodels) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("--submodel")));
 }
 
-}  // namespace test_model_request
-}  // namespace stageid
+}  // namespace stageid::test_model_request

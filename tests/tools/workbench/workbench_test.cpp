@@ -11,8 +11,7 @@
 
 #include "tests/tools/program_fixture.hpp"
 
-namespace stageid {
-namespace test_workbench {
+namespace stageid::test_workbench {
 
 using namespace std::chrono_literals;
 using Json = nlohmann::json;
@@ -224,5 +223,4 @@ TEST_F(WorkbenchTest, NeedsAnFrfAndAModelOfIt) {
               testing::ThrowsMessage<std::invalid_argument>(HasSubstr("contains no FRF")));
 }
 
-}  // namespace test_workbench
-}  // namespace stageid
+}  // namespace stageid::test_workbench

@@ -15,8 +15,7 @@
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_model_code {
+namespace stageid::test_model_code {
 
 constexpr int kSamples = 400;
 
@@ -177,5 +176,4 @@ TEST(ModelCode, RefusesWhatCIsNotAbleToName) {
   EXPECT_THROW(model_code(early, "plant"), std::invalid_argument);
 }
 
-}  // namespace test_model_code
-}  // namespace stageid
+}  // namespace stageid::test_model_code

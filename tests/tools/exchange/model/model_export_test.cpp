@@ -10,8 +10,7 @@
 #include "acquisition/files/input_files.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_model_export {
+namespace stageid::test_model_export {
 
 AdditiveModel small_model() {
   AdditiveModel model;
@@ -95,5 +94,4 @@ TEST(ModelExport, LeavesNothingBesideItsFile) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
-}  // namespace test_model_export
-}  // namespace stageid
+}  // namespace stageid::test_model_export

@@ -11,8 +11,7 @@
 #include "tests/support/process/python_script.hpp"
 
 /// State space, modes and rigid body of an exported model, as another program reads them.
-namespace stageid {
-namespace test_model_hdf5 {
+namespace stageid::test_model_hdf5 {
 
 /// 2 x 3: a rigid body of rank 2, a mode of rank one with shapes and mass as written here, one with
 /// free residues B_0 + B_1 s, and a compliance.
@@ -171,5 +170,4 @@ TEST(ModelHdf5Content, WhatHasNoStateSpaceIsRefusedAndLeavesNothing) {
   EXPECT_THROW(write_model_hdf5(directory / "none" / "m.h5", exported_model(), {}, {}), FileError);
 }
 
-}  // namespace test_model_hdf5
-}  // namespace stageid
+}  // namespace stageid::test_model_hdf5
