@@ -17,8 +17,7 @@ class OutputFile {
   /// read and inputs are protected.
   explicit OutputFile(const std::filesystem::path& target);
   ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
+  OutputFile(OutputFile&&) = delete;
 
   const std::filesystem::path& path() const noexcept { return temporary_; }
 

@@ -27,8 +27,7 @@ class EventLog {
  public:
   /// Continues or creates `file`. @throws FileError if it cannot be opened.
   explicit EventLog(const std::filesystem::path& file);
-  EventLog(const EventLog&) = delete;
-  EventLog& operator=(const EventLog&) = delete;
+  EventLog(EventLog&&) = delete;
 
   void write(std::string_view event, const std::vector<EventField>& fields = {}) noexcept;
 

@@ -46,8 +46,7 @@ class JsonFile {
  public:
   /// @throws FileError, FormatError
   JsonFile(std::filesystem::path file, const std::string& format);
-  JsonFile(const JsonFile&) = delete;
-  JsonFile& operator=(const JsonFile&) = delete;
+  JsonFile(JsonFile&&) = delete;
   JsonNode root() const { return {file_, "/", value_}; }
 
  private:

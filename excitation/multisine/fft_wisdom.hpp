@@ -13,8 +13,7 @@ class FftWisdom {
   /// @throws std::logic_error if an FftWisdom exists already.
   explicit FftWisdom(const std::string& plans);
   ~FftWisdom();  ///< discards the timed plans; existing RealDfts keep theirs
-  FftWisdom(const FftWisdom&) = delete;
-  FftWisdom& operator=(const FftWisdom&) = delete;
+  FftWisdom(FftWisdom&&) = delete;
 
   /// All known plans: FFTW's wisdom with sorted entries.
   std::string text() const;

@@ -33,8 +33,7 @@ class SignalPredictor {
   /// @throws std::invalid_argument if the number of dense samples per period exceeds an int.
   explicit SignalPredictor(const FrequencyGrid& grid);
   ~SignalPredictor();
-  SignalPredictor(const SignalPredictor&) = delete;
-  SignalPredictor& operator=(const SignalPredictor&) = delete;
+  SignalPredictor(SignalPredictor&&) = delete;
 
   /// @param spectrum  R, axes x lines: coefficients of exp(j 2 pi l n / N) in the run
   /// @returns one entry per signal

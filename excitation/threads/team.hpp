@@ -36,8 +36,7 @@ class TeamFailed : public std::runtime_error {
 class Team {
  public:
   virtual ~Team() = default;
-  Team(const Team&) = delete;
-  Team& operator=(const Team&) = delete;
+  Team(Team&&) = delete;
 
   static const Team& one();
 

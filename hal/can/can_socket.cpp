@@ -123,8 +123,7 @@ std::int64_t CanArrivals::arrival_ns(msghdr& header) noexcept {
 struct SocketCan::Bus {
   explicit Bus(std::string name) : interface(std::move(name)), fd(open_socket(interface)) {}
   ~Bus() { close(fd); }
-  Bus(const Bus&) = delete;
-  Bus& operator=(const Bus&) = delete;
+  Bus(Bus&&) = delete;
 
   // @returns false for an error frame: it updates the bus state and has no data.
   bool take(const canfd_frame& raw, CanFrame& frame) noexcept {

@@ -15,8 +15,7 @@ class ZeroMqSocket {
  public:
   explicit ZeroMqSocket(int type);  ///< such as ZMQ_DEALER
   ~ZeroMqSocket();
-  ZeroMqSocket(const ZeroMqSocket&) = delete;
-  ZeroMqSocket& operator=(const ZeroMqSocket&) = delete;
+  ZeroMqSocket(ZeroMqSocket&&) = delete;
 
   void set(int option, int value) noexcept;
   void* get() const noexcept { return socket_; }

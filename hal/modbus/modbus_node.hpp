@@ -32,8 +32,7 @@ class ModbusNode final : public ModbusRegisters {
   /// no range in `limits`, or a fault needs a missing panel value.
   ModbusNode(StageNode& node, const StageLimits& limits, std::uint32_t boot_id,
              ModbusFaultScript* faults, double heartbeat_s = 1.0);
-  ModbusNode(const ModbusNode&) = delete;
-  ModbusNode& operator=(const ModbusNode&) = delete;
+  ModbusNode(ModbusNode&&) = delete;
 
   void begin_request(ModbusConnection from) override;
   void tick() override;

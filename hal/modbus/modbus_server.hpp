@@ -36,8 +36,7 @@ class ModbusServer {
   /// @throws StageError if the port is taken or the device cannot be opened.
   ModbusServer(const ModbusAddress& address, ModbusRegisters& registers, ModbusFaultScript* faults);
   ~ModbusServer();
-  ModbusServer(const ModbusServer&) = delete;
-  ModbusServer& operator=(const ModbusServer&) = delete;
+  ModbusServer(ModbusServer&&) = delete;
 
   /// Contains the selected port.
   const ModbusAddress& address() const noexcept { return address_; }

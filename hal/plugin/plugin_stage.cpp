@@ -64,8 +64,7 @@ struct PluginStage::Library {
         calls->stop == nullptr || calls->trouble == nullptr || calls->close == nullptr)
       fail("is incomplete; set every function of struct stageid_backend, and set size to its size");
   }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
+  Library(Library&&) = delete;
   ~Library() {
     if (stage == nullptr) return;
     calls->stop(stage);

@@ -44,8 +44,7 @@ class RealTime {
   /// @throws std::invalid_argument for a priority outside 1 to 99 or a missing processor.
   explicit RealTime(const RealTimeOptions& options);
   ~RealTime();
-  RealTime(const RealTime&) = delete;
-  RealTime& operator=(const RealTime&) = delete;
+  RealTime(RealTime&&) = delete;
 
   /// Unavailable settings with their remedies, one line each.
   const std::vector<std::string>& missing() const noexcept { return missing_; }

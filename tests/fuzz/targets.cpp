@@ -60,8 +60,7 @@ class ScratchFile {
     std::error_code ignored;
     fs::remove(path_, ignored);
   }
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
+  ScratchFile(ScratchFile&&) = delete;
   const fs::path& path() const { return path_; }
 
  private:

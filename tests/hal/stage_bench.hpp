@@ -43,8 +43,7 @@ class Driver {
       : u(stage.info().actuators.size()), y(stage.info().sensors.size()), stage_(stage) {
     inputs.y = y;
   }
-  Driver(const Driver&) = delete;
-  Driver& operator=(const Driver&) = delete;
+  Driver(Driver&&) = delete;
   void start(std::uint64_t run_seed = 1) { stage_.start(run_seed, inputs); }
   Outcome step(Deadline deadline = {}) {
     return stage_.exchange({inputs.cycle, u}, inputs, deadline);

@@ -98,8 +98,7 @@ class ModbusFront {
   }
   /// Ends the threads and closes the connections.
   ~ModbusFront() { stop_ = true; }
-  ModbusFront(const ModbusFront&) = delete;
-  ModbusFront& operator=(const ModbusFront&) = delete;
+  ModbusFront(ModbusFront&&) = delete;
 
   /// One line per connection.
   std::vector<std::string> places() const {

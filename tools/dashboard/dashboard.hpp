@@ -33,8 +33,7 @@ class Dashboard {
   Dashboard(const DashboardAddress& address, const ExperimentConfig& config,
             const ExperimentPlan& plan, const StageInfo& stage, const std::filesystem::path& log,
             int runs_before, std::optional<double> wanted_variance);
-  Dashboard(const Dashboard&) = delete;
-  Dashboard& operator=(const Dashboard&) = delete;
+  Dashboard(Dashboard&&) = delete;
 
   const std::string& url() const noexcept;
   /// Observers of the rows of the log. Valid during the lifetime of *this.

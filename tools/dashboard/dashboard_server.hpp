@@ -52,8 +52,7 @@ class DashboardServer {
   /// @throws StageError with cause and remedy if the address is not available.
   DashboardServer(const DashboardAddress& address, DashboardContent& content);
   ~DashboardServer();
-  DashboardServer(const DashboardServer&) = delete;
-  DashboardServer& operator=(const DashboardServer&) = delete;
+  DashboardServer(DashboardServer&&) = delete;
 
   /// URL for the browser, including the token.
   const std::string& url() const noexcept;

@@ -80,8 +80,7 @@ class Database {
   /// @param place a file, or a URL as of is_database_url()
   /// @throws FileError, FormatError naming the place; here and in all other functions
   Database(const std::filesystem::path& place, Access access);
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
+  Database(Database&&) = delete;
 
   /// See shown_place().
   const std::string& name() const noexcept { return name_; }
@@ -111,8 +110,7 @@ class Transaction {
  public:
   explicit Transaction(const Database& database);
   ~Transaction();
-  Transaction(const Transaction&) = delete;
-  Transaction& operator=(const Transaction&) = delete;
+  Transaction(Transaction&&) = delete;
   void commit();
 
  private:

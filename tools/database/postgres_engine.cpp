@@ -176,8 +176,7 @@ class PostgresStatement final : public StatementEngine {
     connection_.unused.push_back(statement_);
     if (connection_.pending == 0) connection_.free_unused();
   }
-  PostgresStatement(const PostgresStatement&) = delete;
-  PostgresStatement& operator=(const PostgresStatement&) = delete;
+  PostgresStatement(PostgresStatement&&) = delete;
 
   void start(std::span<const SqlValue> parameters) override {
     connection_.settle();

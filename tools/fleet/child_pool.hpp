@@ -22,8 +22,7 @@ class ChildPool {
  public:
   ChildPool();
   ~ChildPool();  ///< kills those that are running
-  ChildPool(const ChildPool&) = delete;
-  ChildPool& operator=(const ChildPool&) = delete;
+  ChildPool(ChildPool&&) = delete;
 
   std::size_t size() const noexcept { return running_.size(); }
   /// Starts this program with arguments. @throws FileError if the system cannot

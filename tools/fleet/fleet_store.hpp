@@ -65,8 +65,7 @@ class FleetStore {
   /// @param place a file, or the URL of a PostgreSQL database
   /// @param access create: also the file and the tables @throws FileError, FormatError
   FleetStore(const std::filesystem::path& place, Database::Access access);
-  FleetStore(const FleetStore&) = delete;
-  FleetStore& operator=(const FleetStore&) = delete;
+  FleetStore(FleetStore&&) = delete;
 
   const Database& database() const noexcept { return database_; }
   std::map<std::string, JobState> jobs() const;

@@ -58,8 +58,7 @@ class PrivateDirectory {
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }
-  PrivateDirectory(const PrivateDirectory&) = delete;
-  PrivateDirectory& operator=(const PrivateDirectory&) = delete;
+  PrivateDirectory(PrivateDirectory&&) = delete;
   const std::filesystem::path& path() const noexcept { return path_; }
 
  private:

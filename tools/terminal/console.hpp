@@ -57,8 +57,7 @@ class Progress {
   /// `unit` is that of the rate, e.g. "MB"; `scale` converts the numbers of update() to it.
   Progress(const Console& console, std::string label, std::string unit, double scale = 1.0);
   ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  Progress(Progress&&) = delete;
 
   /// `total` 0: unknown; then neither share nor remaining time are shown.
   void update(double done, double total, const std::string& note = "");

@@ -28,8 +28,7 @@ class ControlledStop {
  public:
   ControlledStop();
   ~ControlledStop();
-  ControlledStop(const ControlledStop&) = delete;
-  ControlledStop& operator=(const ControlledStop&) = delete;
+  ControlledStop(ControlledStop&&) = delete;
 };
 
 /// During its lifetime, a signal that ends the program calls the function first, from another thread.
@@ -37,8 +36,7 @@ class CleanedUpAtInterrupt {
  public:
   explicit CleanedUpAtInterrupt(std::function<void()> clean_up);
   ~CleanedUpAtInterrupt();
-  CleanedUpAtInterrupt(const CleanedUpAtInterrupt&) = delete;
-  CleanedUpAtInterrupt& operator=(const CleanedUpAtInterrupt&) = delete;
+  CleanedUpAtInterrupt(CleanedUpAtInterrupt&&) = delete;
 };
 
 /// Sets the text that a signal prints about partial results when it ends the program; default: "nothing was written".

@@ -36,8 +36,7 @@ class StageWatch {
  public:
   /// Reads the model. @throws FileError, FormatError; std::invalid_argument for a wrong rate of false alarms
   StageWatch(WatchOptions options, const Console& console);
-  StageWatch(const StageWatch&) = delete;
-  StageWatch& operator=(const StageWatch&) = delete;
+  StageWatch(StageWatch&&) = delete;
 
   /// Writes watch.h5 too.
   void write_tracks(std::filesystem::path file) { track_file_ = std::move(file); }

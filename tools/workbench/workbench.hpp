@@ -47,8 +47,7 @@ class Workbench {
   /// @throws as read_report_data() and DashboardServer; std::invalid_argument if there is no FRF
   explicit Workbench(const WorkbenchOptions& options);
   ~Workbench();
-  Workbench(const Workbench&) = delete;
-  Workbench& operator=(const Workbench&) = delete;
+  Workbench(Workbench&&) = delete;
 
   const std::string& url() const noexcept { return server_->url(); }
   /// Tells the pages that the program ends, and stops to serve. A running fit is not waited for. From any thread, once.

@@ -222,8 +222,7 @@ class ZeroMqStopRig {
     });
   }
   ~ZeroMqStopRig() { end(); }
-  ZeroMqStopRig(const ZeroMqStopRig&) = delete;
-  ZeroMqStopRig& operator=(const ZeroMqStopRig&) = delete;
+  ZeroMqStopRig(ZeroMqStopRig&&) = delete;
 
   std::unique_ptr<CanTransport> host_bus() { return std::make_unique<CutCan>(host_, cut_); }
   const CanSpec& can() const { return can_; }

@@ -29,8 +29,7 @@ class Loopback {
       ADD_FAILURE() << "no loopback";
   }
   ~Loopback() { close(fd_); }
-  Loopback(const Loopback&) = delete;
-  Loopback& operator=(const Loopback&) = delete;
+  Loopback(Loopback&&) = delete;
 
   int fd() const { return fd_; }
   void send() const { ASSERT_EQ(::send(fd_, "x", 1, 0), 1); }

@@ -39,8 +39,7 @@ class ServerThread {
     stop_ = true;
     thread_.join();
   }
-  ServerThread(const ServerThread&) = delete;
-  ServerThread& operator=(const ServerThread&) = delete;
+  ServerThread(ServerThread&&) = delete;
 
   /// The address for a client.
   ModbusAddress address() const {

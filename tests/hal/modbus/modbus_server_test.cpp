@@ -97,8 +97,7 @@ class Clients {
   ~Clients() {
     for (const int client : all) close(client);
   }
-  Clients(const Clients&) = delete;
-  Clients& operator=(const Clients&) = delete;
+  Clients(Clients&&) = delete;
   /// Uses descriptors from 1024 on, because libmodbus needs the lower ones.
   int add(int port) {
     const int low = raw_client(port);

@@ -13,8 +13,7 @@ class Hdf5Surgery {
  public:
   explicit Hdf5Surgery(const std::filesystem::path& file);
   ~Hdf5Surgery();
-  Hdf5Surgery(const Hdf5Surgery&) = delete;
-  Hdf5Surgery& operator=(const Hdf5Surgery&) = delete;
+  Hdf5Surgery(Hdf5Surgery&&) = delete;
 
   /// Sets one number of a dataset of real or complex (then its real part) numbers, by its place in
   /// C order.

@@ -22,8 +22,7 @@ class PtyPair {
     stop_ = true;
     thread_.join();
   }
-  PtyPair(const PtyPair&) = delete;
-  PtyPair& operator=(const PtyPair&) = delete;
+  PtyPair(PtyPair&&) = delete;
 
   const std::string& first() const { return ends_[0].name; }
   const std::string& second() const { return ends_[1].name; }
@@ -44,8 +43,7 @@ class PtyPair {
       close(slave);
       close(master);
     }
-    End(const End&) = delete;
-    End& operator=(const End&) = delete;
+    End(End&&) = delete;
     int master;
     int slave = -1;
     std::string name;

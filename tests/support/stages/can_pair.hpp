@@ -20,8 +20,7 @@ class CanPair {
  public:
   explicit CanPair(std::vector<std::string> names)
       : names_(std::move(names)), health_(names_.size()) {}
-  CanPair(const CanPair&) = delete;
-  CanPair& operator=(const CanPair&) = delete;
+  CanPair(CanPair&&) = delete;
 
   CanTransport& host() noexcept { return host_; }
   CanTransport& node() noexcept { return node_; }

@@ -37,8 +37,7 @@ class RawClient {
     good_ = ::connect(socket_, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0 && send(begin);
   }
   ~RawClient() { ::close(socket_); }
-  RawClient(const RawClient&) = delete;
-  RawClient& operator=(const RawClient&) = delete;
+  RawClient(RawClient&&) = delete;
   bool good() const { return good_; }
   /// False if the other end has hung up.
   bool send(const std::string& bytes) const {

@@ -27,8 +27,7 @@ class Mat73File {
   /// @param shown_as for errors @throws FileError, as the others do
   Mat73File(const std::filesystem::path& file, const std::filesystem::path& shown_as);
   ~Mat73File();
-  Mat73File(const Mat73File&) = delete;
-  Mat73File& operator=(const Mat73File&) = delete;
+  Mat73File(Mat73File&&) = delete;
 
   void add(const MatVariable& variable);
   /// @param head the bytes before the HDF5 part
