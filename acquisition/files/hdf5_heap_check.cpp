@@ -49,7 +49,7 @@ void check_window(const std::filesystem::path& file, std::string_view window, st
     const std::uint64_t size = little_endian(window.substr(at + 8, 8));
     const bool whole = size <= window.size() - at;
     const bool fits = size >= kHeader && size <= file_bytes - offset - at;
-    if (!fits || (whole && !objects_fit(window.substr(at, static_cast<std::size_t>(size)))))
+    if (!fits || (whole && !objects_fit(window.substr(at, size))))
       fail_format(file, "",
                   "the HDF5 file is damaged: the strings stored at byte {} overlap; copy it again "
                   "or recreate it",

@@ -95,7 +95,7 @@ std::string name_of(Hdf5Kind kind) {
 
 std::vector<hsize_t> shape_of(hid_t space) {
   const int rank = H5Sget_simple_extent_ndims(space);
-  std::vector<hsize_t> shape(static_cast<std::size_t>(std::max(rank, 0)));
+  std::vector<hsize_t> shape(std::max(rank, 0));
   if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
   return shape;
 }

@@ -60,7 +60,7 @@ void EventLog::append(std::string line) {
 std::vector<std::string> EventLog::latest(std::size_t most) const {
   const std::lock_guard lock(mutex_);
   const std::size_t count = std::min(most, latest_.size());
-  return {latest_.end() - static_cast<std::ptrdiff_t>(count), latest_.end()};
+  return {latest_.end() - count, latest_.end()};
 }
 
 std::string EventLog::error() const {

@@ -49,8 +49,8 @@ void check_row_range(const std::filesystem::path& file, const LogRun& run, std::
 
 void resize_samples(const LogInfo& info, std::uint64_t count, LogSamples& out) {
   const auto rows = static_cast<Eigen::Index>(count);
-  out.actuators.resize(rows, static_cast<Eigen::Index>(info.actuators.size()));
-  out.sensors.resize(rows, static_cast<Eigen::Index>(info.sensors.size()));
+  out.actuators.resize(rows, info.actuators.size());
+  out.sensors.resize(rows, info.sensors.size());
   out.marked.resize(rows);
 }
 

@@ -239,8 +239,7 @@ void SlogSource::read(std::uint64_t offset, void* to, std::size_t size) const {
 }
 
 void SlogSource::read_pieces(std::uint64_t from, std::uint64_t end, const Take& take) const {
-  std::vector<std::byte> piece(
-      static_cast<std::size_t>(std::min<std::uint64_t>(end - from, kScanBytes)));
+  std::vector<std::byte> piece(std::min<std::uint64_t>(end - from, kScanBytes));
   while (from < end) {
     const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(end - from, piece.size()));
     read(from, piece.data(), size);

@@ -83,7 +83,7 @@ Json submodel_to_json(const Submodel& s) {
 }
 
 std::vector<double> to_list(const Eigen::VectorXd& values, Eigen::Index size) {
-  if (values.size() == 0) return std::vector<double>(static_cast<std::size_t>(size), 0.0);
+  if (values.size() == 0) return std::vector<double>(size, 0.0);
   return {values.begin(), values.end()};
 }
 

@@ -114,8 +114,7 @@ std::vector<double> deviations_from_past(const std::vector<double>& values,
   std::vector<double> sizes;
   for (std::size_t i = kLeastPast; i < values.size(); ++i) {
     const std::size_t first = i - std::min(i, kPast);
-    std::vector<double> past(values.begin() + static_cast<std::ptrdiff_t>(first),
-                             values.begin() + static_cast<std::ptrdiff_t>(i));
+    std::vector<double> past(values.begin() + first, values.begin() + i);
     out[i] = values[i] - median(past);
     sizes.push_back(std::abs(out[i]));
   }

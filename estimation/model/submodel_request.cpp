@@ -36,8 +36,7 @@ std::string fault_of_start(const SubmodelRequest& request) {
   if (!zeta.empty() && pairs == 0) return "a real pole has no damping ratio; omit it";
   if (!std::ranges::all_of(zeta, [](double x) { return x > 0.0 && x <= 0.9; }))
     return "damping ratios must be above 0 and at most 0.9";
-  for (auto at = f.begin();
-       at != f.begin() + static_cast<std::ptrdiff_t>(std::min(pairs, f.size())); ++at)
+  for (auto at = f.begin(); at != f.begin() + std::min(pairs, f.size()); ++at)
     if (std::find(f.begin(), at, *at) != at)
       return fmt::format("two poles start at {} Hz, where they are indistinguishable; move one",
                          *at);

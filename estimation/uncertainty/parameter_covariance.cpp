@@ -286,9 +286,9 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   // The equations of a part are computed again: storing all of them would need more memory than the data.
   resize(problem, wanted.response, out);
   if (wanted.parts)
-    out.parts = std::make_shared<CovarianceParts>(CovarianceParts{
-        out.globals, inverse, out.residual_scale,
-        std::vector<ChannelCovariance>(static_cast<std::size_t>(problem.channels()))});
+    out.parts = std::make_shared<CovarianceParts>(
+        CovarianceParts{out.globals, inverse, out.residual_scale,
+                        std::vector<ChannelCovariance>(problem.channels())});
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   bool all_determined = true;
   for (Eigen::Index p = own.first; p < own.first + own.count && all_determined; ++p) {

@@ -73,7 +73,7 @@ std::vector<CanValueFrame> frames(const CanSpec& spec, std::vector<int> CanBusSp
     for (std::size_t at = 0; at < channels.size(); at += kCanValuesOfFrame) {
       require(list.size() < kLargestFrameCount,
               "can: too many frames for the available identifiers; use fewer buses");
-      const auto from = channels.begin() + static_cast<std::ptrdiff_t>(at);
+      const auto from = channels.begin() + at;
       const auto count = std::min(kCanValuesOfFrame, channels.size() - at);
       list.push_back({static_cast<std::uint16_t>(first_id + list.size()),
                       static_cast<std::uint8_t>(bus),

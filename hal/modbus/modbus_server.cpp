@@ -210,8 +210,7 @@ void ModbusServer::answer_next(Line& line) {
   line.closed |= request.status == FrameStatus::broken;
   // An incomplete TCP request remains in the buffer.
   const std::size_t taken = complete || address_.serial() ? request.bytes : 0;
-  line.received.erase(line.received.begin(),
-                      line.received.begin() + static_cast<std::ptrdiff_t>(taken));
+  line.received.erase(line.received.begin(), line.received.begin() + taken);
   line.more = complete && !line.received.empty();
   if (!line.unsent.empty()) return;
   if (line.received.empty() || line.more) {

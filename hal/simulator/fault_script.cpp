@@ -252,7 +252,7 @@ void FaultScript::amplify(std::uint64_t cycle, std::span<double> noise) const no
 
 void FaultScript::delay(std::uint64_t cycle, std::span<double> u) noexcept {
   const auto slot = [&](std::uint64_t n) {
-    return history_.begin() + static_cast<std::ptrdiff_t>((n % history_cycles_) * u.size());
+    return history_.begin() + (n % history_cycles_) * u.size();
   };
   std::copy(u.begin(), u.end(), slot(cycle));
   std::uint64_t samples = 0;

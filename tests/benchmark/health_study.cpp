@@ -122,7 +122,7 @@ int main(int argc, char** argv) {
   Study study;
   study.verbose = number(3, 0) != 0;
   study.only = argc > 4 ? argv[4] : "";
-  std::vector<PlantResult> results(static_cast<std::size_t>(plants));
+  std::vector<PlantResult> results(plants);
   for_each_task(worker_count(number(5, 0)), results.size(), [&](int, std::size_t i) {
     results[i] = study.of_plant(first + static_cast<int>(i));
   });

@@ -273,8 +273,7 @@ std::string study(const JudgementStage& stage, const stageid::FitRequest& reques
 void become(const std::string& plant, JudgementStage& stage) {
   if (plant != "suspended" && plant != "known")
     for (double& hz : stage.spec.plant.suspension_hz) hz = 0.0;
-  if (plant != "beyond")
-    stage.spec.plant.in_plane_modes.resize(static_cast<std::size_t>(stage.modes_in_band));
+  if (plant != "beyond") stage.spec.plant.in_plane_modes.resize(stage.modes_in_band);
   if (plant == "coloured") return;
   stage.noise.colour = stageid::NoiseColour::white;
   stage.noise.density = 0.0;

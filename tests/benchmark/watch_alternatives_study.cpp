@@ -94,7 +94,7 @@ class Bench {
     auto loop = make_loop(plan, of);
     loop.next();
     const int block = plan.experiments() * (1 + measured);
-    std::vector<std::vector<Eigen::MatrixXcd>> Z(static_cast<std::size_t>(plan.experiments()));
+    std::vector<std::vector<Eigen::MatrixXcd>> Z(plan.experiments());
     Trace trace;
     for (int p = 0; p < of.periods; ++p) {
       const int experiment = p % block / (1 + measured);

@@ -32,7 +32,7 @@ Input mutated(Input input, std::mt19937_64& random) {
   for (std::uint64_t change = 1 + random() % 8; change > 0; --change) {
     const std::size_t at = random() % std::min<std::size_t>(input.size(), 1 + random() % 100'000);
     const auto piece = static_cast<std::ptrdiff_t>(std::min(random() % 32, input.size() - at));
-    const auto place = input.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto place = input.begin() + at;
     switch (random() % 8) {
       case 0:
         input.erase(place, place + piece);

@@ -104,7 +104,7 @@ const std::string* same_group_before(const std::vector<SchemaEntry>& entries, st
                                      std::size_t end) {
   const std::size_t size = end - k;
   if (k < size || end_of_group(entries, k - size) != k) return nullptr;
-  const auto first = entries.begin() + static_cast<std::ptrdiff_t>(k - size);
+  const auto first = entries.begin() + (k - size);
   const auto same = [](const SchemaEntry& a, const SchemaEntry& b) {
     return std::tie(a.depth, a.key, a.type, a.range, a.default_value, a.required, a.help) ==
            std::tie(b.depth, b.key, b.type, b.range, b.default_value, b.required, b.help);
@@ -135,8 +135,7 @@ std::string schema_text(const std::vector<SchemaEntry>& entries) {
     const std::size_t end = end_of_group(entries, k);
     const std::string* like = end > k + 1 ? same_group_before(entries, k, end) : nullptr;
     if (like != nullptr) notes = {fmt::format("the keys of {}", *like)};
-    const std::string key =
-        std::string(static_cast<std::size_t>(2 * entry.depth), ' ') + entry.key + ":";
+    const std::string key = std::string(2 * entry.depth, ' ') + entry.key + ":";
     text += fmt::format("{:<28} # {} ({})\n", key, entry.help, fmt::join(notes, "; "));
     if (like != nullptr) k = end - 1;
   }

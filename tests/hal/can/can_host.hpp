@@ -65,8 +65,6 @@ inline std::vector<double> undisturbed_can_run(int samples) {
   return y;
 }
 
-inline std::vector<Outcome> all_ok(int count) {
-  return std::vector<Outcome>(static_cast<std::size_t>(count), Outcome::ok);
-}
+inline std::vector<Outcome> all_ok(int count) { return std::vector<Outcome>(count, Outcome::ok); }
 
 }  // namespace stageid::test

@@ -132,7 +132,7 @@ inline std::vector<std::complex<double>> unpacked_block16(
     std::string_view text, int order = 0, const std::vector<std::complex<double>>& base = {}) {
   const std::vector<std::uint8_t> bytes = unpacked(text);
   const std::size_t count = bytes.size() / 5;
-  const auto middle = bytes.begin() + static_cast<std::ptrdiff_t>(4 * count);
+  const auto middle = bytes.begin() + 4 * count;
   const auto words = numbers_of_planes<std::uint16_t>({bytes.begin(), middle});
   std::vector<std::complex<double>> out;
   int exponent = 0;

@@ -56,7 +56,7 @@ std::optional<TimeAxis> time_axis_of(const std::vector<double>& time_s) {
   std::vector<double> steps;
   for (std::size_t k = 1; k < time_s.size(); ++k) steps.push_back(time_s[k] - time_s[k - 1]);
   std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  const auto middle = sorted.begin() + sorted.size() / 2;
   std::nth_element(sorted.begin(), middle, sorted.end());
   const double step = *middle;
   if (!(step > 0.0)) return std::nullopt;
