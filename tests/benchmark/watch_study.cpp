@@ -103,8 +103,7 @@ struct Planted {
 };
 
 /// How far the estimates are behind ramps, in periods.
-class RampLag {
- public:
+struct RampLag {
   RampLag(const Request& request, double memory_periods)
       : ramp_(request.ramp), memory_(memory_periods) {}
 

@@ -61,8 +61,7 @@ struct OwnSimulatedStage {
   std::unique_ptr<SimulatedStage> own;
 };
 
-class Bench : private OwnSimulatedStage, public Driver {
- public:
+struct Bench : private OwnSimulatedStage, Driver {
   explicit Bench(const SimulatedSpec& spec) : OwnSimulatedStage{simulated(spec)}, Driver(*own) {}
   SimulatedStage& stage() { return *own; }
 };

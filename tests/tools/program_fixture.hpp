@@ -24,8 +24,7 @@ testing::AssertionResult same_bytes(const std::string& a, const std::string& b);
 std::map<std::string, std::string> snapshot(const std::filesystem::path& directory);
 
 /// A directory with copies of the small configurations, and the real program.
-class ProgramTest : public testing::Test {
- protected:
+struct ProgramTest : testing::Test {
   ProgramTest();
 
   std::filesystem::path at(const std::string& name) const { return directory_ / name; }

@@ -18,8 +18,7 @@ namespace stageid::test_file_kind {
 
 using testing::StartsWith;
 
-class FileKind : public testing::Test {
- protected:
+struct FileKind : testing::Test {
   std::string kind_of(std::string_view bytes) {
     std::ofstream(directory_ / "file", std::ios::binary) << bytes;
     return other_kind(directory_ / "file", "a cat");

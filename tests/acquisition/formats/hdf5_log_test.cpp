@@ -21,8 +21,7 @@ using testing::ThrowsMessage;
 
 using namespace test::foreign_log;
 
-class Hdf5Log : public testing::Test {
- protected:
+struct Hdf5Log : testing::Test {
   void write(const Foreign& foreign) {
     std::filesystem::remove(path_);
     Hdf5File file = Hdf5File::create(path_);

@@ -26,8 +26,7 @@ struct Row {
   SampleStatus status;
 };
 
-class MeasurementLoopTest : public ::testing::Test {
- protected:
+struct MeasurementLoopTest : ::testing::Test {
   MeasurementLoopTest() : controller_(analytic_controller(stage_.info())) {
     excitation_.period = Eigen::MatrixXd::Zero(kPeriod, 3);
     for (int n = 0; n < kPeriod; ++n) {

@@ -21,8 +21,7 @@ using testing::HasSubstr;
 constexpr std::uint64_t kSamples = 3 * test::kPlanPeriod;
 
 /// Counts the calls that it receives.
-class Counter final : public RunObserver {
- public:
+struct Counter final : RunObserver {
   void begin_run(const LogRun&) noexcept override { ++begun; }
   void rows(std::span<const double> rows, std::size_t) noexcept override { words += rows.size(); }
   void end_run(const LogRun& run) noexcept override { complete += run.complete ? 1 : 0; }
@@ -31,8 +30,7 @@ class Counter final : public RunObserver {
   std::size_t words = 0;
 };
 
-class RunExperimentEvents : public testing::Test {
- protected:
+struct RunExperimentEvents : testing::Test {
   void make_stage(Clock clock = Clock::virtual_time) {
     auto stage = std::make_unique<AnalyticStage>(2, 1, 1000.0, clock);
     stage->spoil_missing = false;

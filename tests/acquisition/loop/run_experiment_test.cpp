@@ -27,8 +27,7 @@ constexpr int kSensors = 2;
 constexpr int kPeriod = test::kPlanPeriod;
 constexpr std::uint64_t kSamples = 3 * kPeriod;
 
-class RunExperiment : public testing::Test {
- protected:
+struct RunExperiment : testing::Test {
   RunExperiment() {
     auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors);
     stage->noise = 1e-3;

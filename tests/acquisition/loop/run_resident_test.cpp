@@ -21,8 +21,7 @@ constexpr int kActuators = 3;
 constexpr int kSensors = 2;
 constexpr std::uint64_t kSamples = 300;
 
-class RunResident : public testing::Test {
- protected:
+struct RunResident : testing::Test {
   ExperimentResult measure(const RunExperimentOptions& options = {}) {
     SlogWriter log = SlogWriter::create(file_, experiment_log_info(plan_, stage_.info()));
     const ExperimentResult result = run_resident_experiment(plan_, stage_, log, options);

@@ -23,8 +23,7 @@ std::vector<std::string> lines_of(const std::filesystem::path& file) {
   return lines;
 }
 
-class EventLogTest : public testing::Test {
- protected:
+struct EventLogTest : testing::Test {
   test::TemporaryDirectory directory_;
   std::filesystem::path file_ = directory_ / "run.events.jsonl";
 };

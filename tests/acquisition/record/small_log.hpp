@@ -120,8 +120,7 @@ inline void write_small_log(const std::filesystem::path& file, std::size_t runs 
 }
 
 /// A test of a small log in a directory of its own.
-class SmallLogTest : public DirectoryTest {
- protected:
+struct SmallLogTest : DirectoryTest {
   SlogWriter create() const { return SlogWriter::create(file_, small_info()); }
   SlogWriter resume() const { return SlogWriter::resume(file_, small_info()); }
   /// A closed log with what write(log) writes.

@@ -10,8 +10,7 @@ namespace stageid::test_crc32c {
 
 using Function = std::uint32_t (*)(std::span<const std::byte>, std::uint32_t) noexcept;
 
-class Crc32c : public testing::TestWithParam<Function> {
- protected:
+struct Crc32c : testing::TestWithParam<Function> {
   static std::uint32_t of(const std::vector<std::byte>& bytes) { return GetParam()(bytes, 0); }
 };
 

@@ -174,8 +174,7 @@ TEST_F(SlogDamage, AScanInStepsFindsTheSame) {
 
 // Recover ------------------------------------------------------------------------------------
 
-class SlogRecover : public test::SmallLogTest {
- protected:
+struct SlogRecover : test::SmallLogTest {
   void SetUp() override {
     test::write_small_log(file_, 3, 9);
     good_ = test::bytes_of(file_);

@@ -61,8 +61,7 @@ AdditiveModel full_model() {
   return model;
 }
 
-class ModelFile : public testing::Test {
- protected:
+struct ModelFile : testing::Test {
   /// Reads a good file after an operation of a JSON patch.
   void expect_patch_refused(const std::string& operation, const std::string& place,
                             const std::string& what) {

@@ -13,8 +13,7 @@ namespace stageid::test_modes_file {
 using testing::AllOf;
 using testing::HasSubstr;
 
-class ModesFile : public testing::Test {
- protected:
+struct ModesFile : testing::Test {
   void expect_format_error(const std::string& text, const std::string& place,
                            const std::string& what) {
     std::ofstream(file_, std::ios::binary) << text;

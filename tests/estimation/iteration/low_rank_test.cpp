@@ -105,8 +105,7 @@ double second_singular_value(const Eigen::MatrixXd& B, Eigen::Index rank) {
   return values[rank] / values[0];
 }
 
-class LowRankFit : public testing::Test {
- protected:
+struct LowRankFit : testing::Test {
   LowRankFit() {
     test::RandomStageSpec spec;
     spec.least_modes = spec.most_modes = 7;

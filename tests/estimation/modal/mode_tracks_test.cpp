@@ -34,8 +34,7 @@ struct Scene {
 /// A stage whose modes drift over a year, with the season, with the temperature of the day, and at random. Of each
 /// pair of neighbours, one rises and one falls, so that they cross; modes are missed, some are spurious, whole days
 /// are missing, once for three weeks, and one mode jumps by 1 % after a repair.
-class Year {
- public:
+struct Year {
   Year(int modes, std::uint64_t seed, const Scene& scene = {}) : scene_(scene), engine_(seed) {
     for (int m = 0; m < modes; ++m) {
       hz_.push_back(60.0 * std::pow(1.13, m / 2) * (m % 2 == 0 ? 1.0 : 1.012));

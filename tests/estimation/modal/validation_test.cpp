@@ -40,8 +40,7 @@ FrfEstimate measured(const AdditiveModel& model, HoldModel hold) {
 }
 
 /// A stage, and its response through the exact hold.
-class ValidationOfAStage : public testing::Test {
- protected:
+struct ValidationOfAStage : testing::Test {
   AdditiveModel model = stage_model(HoldModel::exact);
   FrfEstimate frf = measured(model, HoldModel::exact);
 };

@@ -123,8 +123,7 @@ TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
   }
 }
 
-class WeightMatrixRefusal : public testing::Test {
- protected:
+struct WeightMatrixRefusal : testing::Test {
   WeightMatrixRefusal() {
     RandomNumbers random(1);
     frf_ = test::measured(problem_, correlated_noise(problem_, 0.01, 0.9), random);

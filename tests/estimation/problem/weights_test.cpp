@@ -139,8 +139,7 @@ TEST(Weights, OnlyTheRandomFactorIsSmoothed) {
   EXPECT_GT(ratio.minCoeff(), 0.4);
 }
 
-class WeightRefusal : public testing::Test {
- protected:
+struct WeightRefusal : testing::Test {
   void expect_refused(const std::string& part) {
     EXPECT_THAT([this] { (void)make_weights(frf_, options_); },
                 testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(part)));

@@ -101,8 +101,7 @@ TEST(FractionColumns, OfNumeratorsAloneHaveNoSquares) {
   EXPECT_EQ(bare.fractions.base, c.group.fractions.base.leftCols(17));
 }
 
-class ReductionTest : public testing::Test {
- protected:
+struct ReductionTest : testing::Test {
   void expect_sums(const Case& c, const std::vector<FractionColumn>& left,
                    const SplitMatrix& left_columns, const std::vector<FractionColumn>& right,
                    const SplitMatrix& right_columns, std::size_t least_reduced) {

@@ -72,8 +72,7 @@ void expect_uncertainty(const FitResult& fit, const Eigen::MatrixXcd& J, const E
     EXPECT_NEAR(fit.response_variance.reshaped()[r], expected[r], 1e-5 * expected[r]);
 }
 
-class Covariance : public testing::Test {
- protected:
+struct Covariance : testing::Test {
   FitResult fit(Weighting weighting) const {
     return fit_additive_model(frf_, problem_.model, options_with(weighting));
   }

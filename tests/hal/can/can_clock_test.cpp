@@ -18,8 +18,7 @@ constexpr double kDrift = 100e-6;
 constexpr double kOffset_ns = 3e12;
 
 /// The end of a node whose clock has another offset and is fast.
-class DriftingEnd final : public CanThrough {
- public:
+struct DriftingEnd final : CanThrough {
   using CanThrough::CanThrough;
   std::int64_t now_ns() const noexcept override {
     return std::llround(kOffset_ns + (1.0 + kDrift) * static_cast<double>(CanThrough::now_ns()));

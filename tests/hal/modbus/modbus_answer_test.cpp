@@ -12,8 +12,7 @@ namespace stageid::test_modbus_answer {
 
 using Bytes = std::vector<std::uint8_t>;
 
-class ModbusAnswer : public testing::Test {
- protected:
+struct ModbusAnswer : testing::Test {
   Bytes answer(const Bytes& request) {
     std::array<std::uint8_t, kLargestPdu> reply{};
     const std::size_t bytes = answer_request(request, 1, registers_, reply);

@@ -21,8 +21,7 @@ using Pair = std::array<std::uint16_t, 2>;
 using testing::HasSubstr;
 
 /// TCP (false) and RTU (true).
-class ModbusWire : public testing::TestWithParam<bool> {
- protected:
+struct ModbusWire : testing::TestWithParam<bool> {
   void serve(const std::vector<std::string>& faults) {
     script_ = ModbusFaultScript(test::modbus_faults(faults));
     server_ = std::make_unique<test::ServerThread>(registers_, &script_, GetParam());

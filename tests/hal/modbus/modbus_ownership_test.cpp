@@ -24,8 +24,7 @@ constexpr ModbusConnection kOwner = 1;
 constexpr ModbusConnection kOther = 2;
 
 /// The registers of a node without a server: requests are made one by one.
-class Registers : public testing::Test {
- protected:
+struct Registers : testing::Test {
   Registers() : bench_(std::make_unique<ModbusBench>()) { bench_->stop(); }
 
   ModbusException write(ModbusConnection from, int first, const std::vector<std::uint32_t>& pairs) {

@@ -86,8 +86,7 @@ TEST(ModbusServer, ASerialLineIsFoundAgainAfterHalfARequest) {
 }
 
 /// Sockets that are closed by the destructor.
-class Clients {
- public:
+struct Clients {
   Clients() {
     rlimit files{};
     getrlimit(RLIMIT_NOFILE, &files);

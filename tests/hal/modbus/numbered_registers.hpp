@@ -11,8 +11,7 @@
 namespace stageid::test {
 
 /// Accepts everything.
-class NoRegisters : public ModbusRegisters {
- public:
+struct NoRegisters : ModbusRegisters {
   void begin_request(ModbusConnection) override {}
   void tick() override {}
   ModbusException write(int, std::span<const std::uint16_t>) override { return {}; }
@@ -20,8 +19,7 @@ class NoRegisters : public ModbusRegisters {
 };
 
 /// Passes everything on. Another thread may exchange the registers.
-class RegistersThrough : public ModbusRegisters {
- public:
+struct RegistersThrough : ModbusRegisters {
   explicit RegistersThrough(ModbusRegisters& registers) : inner(&registers) {}
   void begin_request(ModbusConnection from) override { inner.load()->begin_request(from); }
   void tick() override { inner.load()->tick(); }

@@ -22,8 +22,7 @@ MotionControllerSpec controller() {
   return test::one_axis_controller(kRate_hz, 10.0, kGain_n_per_m);
 }
 
-class StageNodeTest : public testing::Test {
- protected:
+struct StageNodeTest : testing::Test {
   StageNodeTest() {
     auto fake = std::make_unique<test::FakeStage>(2, 1, kRate_hz);
     fake_ = fake.get();

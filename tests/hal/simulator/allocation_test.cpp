@@ -16,8 +16,7 @@ namespace stageid::test_allocation {
 
 using Kind = SimulationSpec::Fault::Kind;
 
-class Allocation : public testing::Test {
- protected:
+struct Allocation : testing::Test {
   void SetUp() override {
     if (!test::AllocationCounter::works()) GTEST_SKIP() << "malloc is not ours in this build";
   }
@@ -99,8 +98,7 @@ TEST_F(Allocation, ACycleAtALimitHasNone) {
   EXPECT_EQ(seen, 2000);
 }
 
-class OneRun final : public ReplaySource {
- public:
+struct OneRun final : ReplaySource {
   int runs() const override { return 1; }
   void load(int, Eigen::MatrixXd& u, Eigen::MatrixXd& y, Eigen::VectorXi& marked) override {
     u.setZero(2, 100);

@@ -157,8 +157,7 @@ double median(std::vector<double> values) {
 // Relative standard deviation of FRF entries from three periods on one axis. Let dY and dU be the differences between a
 // noisy and a noise-free run. dE = dY - G dU is then the open-loop noise at the sensors, and the error of the estimate
 // is dE / U (three periods: over sqrt 3).
-class FrfNoise : public testing::Test {
- protected:
+struct FrfNoise : testing::Test {
   FrfNoise() {
     const Eigen::MatrixXd excitation = excite({0});
     const Record silent = run(test::silent_wafer_stage_spec(), excitation, 2, 1);

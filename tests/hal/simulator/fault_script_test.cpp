@@ -26,8 +26,7 @@ test::SimulatedSpec with_fault(Kind kind, int channel, std::uint64_t from, std::
 }
 
 // Runs a faulty stage beside a healthy one with the same commands.
-class FaultTest : public testing::Test {
- protected:
+struct FaultTest : testing::Test {
   void begin(const test::SimulatedSpec& spec) {
     faulty_ = std::make_unique<Bench>(spec);
     healthy_ = std::make_unique<Bench>(with_fault(Kind::none, 0, 0));

@@ -92,8 +92,7 @@ TEST(MotionControllerSpec, LeavesAGivenGainAndOpenAxesAlone) {
   EXPECT_EQ(spec.axes[0].gain, 0.0);
 }
 
-class UncontrollableStage : public testing::Test {
- protected:
+struct UncontrollableStage : testing::Test {
   MotionControllerSpec build(const std::vector<Channel>& actuators,
                              const std::vector<Channel>& sensors, std::size_t closed,
                              double inertia) const {

@@ -25,8 +25,7 @@ StageLimits generous() {
   return limits;
 }
 
-class LimitedStageTest : public testing::Test {
- protected:
+struct LimitedStageTest : testing::Test {
   explicit LimitedStageTest(const StageLimits& limits = generous()) {
     auto fake = std::make_unique<test::FakeStage>(2, 3, 1e3);
     fake_ = fake.get();
@@ -209,8 +208,7 @@ StageLimits with_stuck_sensors() {
   return limits;
 }
 
-class StuckSensorTest : public LimitedStageTest {
- protected:
+struct StuckSensorTest : LimitedStageTest {
   StuckSensorTest() : LimitedStageTest(with_stuck_sensors()) { start(); }
   Outcome show(double y0, double y1, double y2) {
     fake_->measurement = {y0, y1, y2};
@@ -241,8 +239,7 @@ TEST_F(LimitedStageTest, ASensorMayStandStillIfNobodySaysHowLong) {
   for (int n = 0; n < 1000; ++n) ASSERT_EQ(give(0.0), Outcome::ok);
 }
 
-class UnlimitedStageTest : public LimitedStageTest {
- protected:
+struct UnlimitedStageTest : LimitedStageTest {
   UnlimitedStageTest() : LimitedStageTest(StageLimits{}) {}
 };
 

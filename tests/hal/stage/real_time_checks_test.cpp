@@ -15,8 +15,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 /// The files of a computer with two processors that is set up for real time on processor 1.
-class RealTimeChecks : public testing::Test {
- protected:
+struct RealTimeChecks : testing::Test {
   RealTimeChecks() {
     for (const char* cpu : {"cpu0", "cpu1"}) {
       write(cpu_file(cpu, "cpufreq/scaling_governor"), "performance");

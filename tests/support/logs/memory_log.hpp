@@ -23,8 +23,7 @@ inline ChannelList channels(const std::string& prefix, Eigen::Index count,
 }
 
 /// A log that lives in memory. Everything is public: tests spoil it on purpose.
-class MemoryLog : public LogReader {
- public:
+struct MemoryLog : LogReader {
   std::filesystem::path file = "memory.slog";
   LogInfo log_info;
   std::vector<LogRun> log_runs;

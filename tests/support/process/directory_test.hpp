@@ -7,8 +7,7 @@
 namespace stageid::test {
 
 /// A test with an empty directory of its own.
-class DirectoryTest : public testing::Test {
- protected:
+struct DirectoryTest : testing::Test {
   TemporaryDirectory directory_;
 };
 

@@ -25,8 +25,7 @@ NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
           std::vector<double>(rows.data(), rows.data() + rows.size())};
 }
 
-class Controllers : public ProgramTest {
- protected:
+struct Controllers : ProgramTest {
   /// The small experiment with another text from `controller:` on in its stage file.
   std::string with_controller(const std::string& file, const std::string& controller) const {
     const std::string stage = read_bytes(at("small_stage.yaml"));

@@ -13,8 +13,7 @@ namespace test_fft_plans_option {
 
 using testing::HasSubstr;
 
-class FftWisdomOption : public ProgramTest {
- protected:
+struct FftWisdomOption : ProgramTest {
   std::vector<std::string> frf(const std::string& output) const {
     return {"frf", "run.slog", "-o", output, "--fft-wisdom", "plans"};
   }

@@ -15,8 +15,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
-class Units : public ProgramTest {
- protected:
+struct Units : ProgramTest {
   Units() {
     std::string text = read_bytes(at("small_stage.yaml"));
     for (const char* name : {"a1", "a2", "a3"})

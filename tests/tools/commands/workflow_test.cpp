@@ -23,8 +23,7 @@ namespace test_workflow {
 using nlohmann::json;
 using testing::HasSubstr;
 
-class Workflow : public ProgramTest {
- protected:
+struct Workflow : ProgramTest {
   /// Writes FILE.yaml, a stage with this fault, and runs it into FILE.slog. @returns the information about that log
   json run_with_fault(const std::string& file, const std::string& fault, int exit_code,
                       const std::string& cause, const std::string& more = "",

@@ -55,8 +55,7 @@ std::string state_space_text() {
               c + "]\n  d: [" + d + "]\n");
 }
 
-class ControllerFileTest : public testing::Test {
- protected:
+struct ControllerFileTest : testing::Test {
   std::filesystem::path write(const std::string& text) const {
     const std::filesystem::path file = directory_ / "controller.yaml";
     std::ofstream(file) << text;

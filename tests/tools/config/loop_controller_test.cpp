@@ -36,8 +36,7 @@ NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
           std::vector<double>(values.begin(), values.end())};
 }
 
-class LoopController : public testing::Test {
- protected:
+struct LoopController : testing::Test {
   LoopController()
       : axes_(load_stage_config(kSmall).spec),
         controller_(axes_.controller),

@@ -9,8 +9,7 @@
 namespace stageid::test {
 namespace test_real_time_keys {
 
-class RealTimeKeysTest : public ProgramTest {
- protected:
+struct RealTimeKeysTest : ProgramTest {
   /// An experiment whose stage file ends with these lines.
   std::string with(const std::string& lines) const {
     return stage("rt.yaml", "noise:", lines + "\nnoise:");

@@ -19,8 +19,7 @@ namespace test_controller_view {
 using nlohmann::json;
 using testing::HasSubstr;
 
-class ControllerViewTest : public ProgramTest {
- protected:
+struct ControllerViewTest : ProgramTest {
   void make_model_with_covariance() const {
     make_frf();
     succeed({"fit", "frf.h5", "-o", "model.json", "--covariance", "covariance.h5", "--rigid-body",

@@ -64,8 +64,7 @@ class RawClient {
 /// A request that never ends.
 const std::string kEndless = "GET / HTTP/1.1\r\nX: ";
 
-class DashboardServerTest : public testing::Test {
- protected:
+struct DashboardServerTest : testing::Test {
   DashboardServerTest() {
     content_.page = "<p>page</p>";
     content_.abort = [this] { ++aborts_; };

@@ -23,8 +23,7 @@ using testing::HasSubstr;
 using testing::Not;
 using Json = nlohmann::json;
 
-class LimitedPlanTest : public ProgramTest {
- protected:
+struct LimitedPlanTest : ProgramTest {
   LimitedPlanTest() {
     for (const char* file : {"small_stage_pilot.yaml", "small_stage_limits.yaml"})
       write_bytes(at(file), replaced(read_bytes(std::filesystem::path(STAGEID_SOURCE_DIR) /

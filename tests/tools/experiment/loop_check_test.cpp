@@ -15,8 +15,7 @@ StageConfig with_gain(StageConfig stage, double factor) {
   return stage;
 }
 
-class LoopCheckTest : public testing::Test {
- protected:
+struct LoopCheckTest : testing::Test {
   LoopCheckTest()
       : config_(load_experiment_config(std::filesystem::path(STAGEID_SOURCE_DIR) /
                                        "configs/experiment/small_stage_limits.yaml")) {

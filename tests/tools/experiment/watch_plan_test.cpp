@@ -13,8 +13,7 @@ namespace test_watch_plan {
 
 using Json = nlohmann::json;
 
-class WatchPlanTest : public ProgramTest {
- protected:
+struct WatchPlanTest : ProgramTest {
   WatchPlanTest() { make_model(); }
   Json design(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments = {"design", config_,  "--watch",  "model.json",

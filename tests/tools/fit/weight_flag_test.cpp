@@ -27,8 +27,7 @@ void write_weights(const std::filesystem::path& path, const std::vector<double>&
   file.close();
 }
 
-class WeightFile : public testing::Test {
- protected:
+struct WeightFile : testing::Test {
   void write_matrices(const std::vector<Complex>& values) {
     Hdf5File file = Hdf5File::create(path_);
     file.write_complex("/weight_matrices", {4, 6, 6}, values.data());

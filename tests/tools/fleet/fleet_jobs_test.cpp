@@ -12,8 +12,7 @@
 namespace stageid {
 namespace {
 
-class FleetJobsTest : public testing::Test {
- protected:
+struct FleetJobsTest : testing::Test {
   std::filesystem::path write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
     return folder_ / name;

@@ -11,8 +11,7 @@ namespace {
 
 using test::identification;
 
-class FleetPageTest : public testing::Test {
- protected:
+struct FleetPageTest : testing::Test {
   std::string page() {
     pair_fleet(store_);
     return fleet_page(store_, {{}, "", "", folder_ / "fleet.html"});

@@ -34,8 +34,7 @@ std::vector<Identification> small_fleet(int stages) {
   return out;
 }
 
-class FleetPairingTest : public testing::Test {
- protected:
+struct FleetPairingTest : testing::Test {
   FleetStore store_of(const std::string& name, const std::vector<Identification>& all) const {
     const std::filesystem::path place = test::store_place(folder_, name);
     FleetStore store(place, Database::Access::create);

@@ -20,8 +20,7 @@ using test::identification;
 using namespace std::chrono_literals;
 using States = std::map<std::string, JobState>;
 
-class FleetStoreTest : public testing::Test {
- protected:
+struct FleetStoreTest : testing::Test {
   FleetStore open() const { return {test::store_place(folder_), Database::Access::create}; }
   test::TemporaryDirectory folder_;
 };

@@ -16,8 +16,7 @@ namespace stageid::test_watched_tracks {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-class WatchedTracksTest : public test::DirectoryTest {
- protected:
+struct WatchedTracksTest : test::DirectoryTest {
   /// Half an hour of learning, then a value each half hour; the changes grow by 1e-4 each time.
   void write_tracks(int periods, const std::string& kind = "frequency",
                     const std::string& started_utc = "2026-03-04T23:00:00Z") const {

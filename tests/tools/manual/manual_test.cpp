@@ -11,8 +11,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class Manual : public testing::Test {
- protected:
+struct Manual : testing::Test {
   Manual() {
     app_.name("prog");
     app_.footer("Exit codes: 0 done");

@@ -59,8 +59,7 @@ unsigned png_width(const std::string& bytes) {
   return value;
 }
 
-class Plot : public ProgramTest {
- protected:
+struct Plot : ProgramTest {
   ReportData read(bool with_model) const {
     ReportInput input;
     input.frf = at("frf.h5");

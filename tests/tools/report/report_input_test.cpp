@@ -30,8 +30,7 @@ FrfEstimate response() {
   return frf;
 }
 
-class ReportInputTest : public testing::Test {
- protected:
+struct ReportInputTest : testing::Test {
   ReportData read_back(const FrfEstimate& frf) const {
     write_frf(directory_ / "frf.h5", frf);
     return read_report_data(report_input({directory_.path()}));

@@ -15,8 +15,7 @@ namespace test_damaged_data {
 
 using Operation = std::function<void(Hdf5Surgery&)>;
 
-class DamagedData : public ProgramTest {
- protected:
+struct DamagedData : ProgramTest {
   void make_hdf5_log() const {
     make_log();
     succeed({"log", "convert", "run.slog", "-o", "whole.h5"});

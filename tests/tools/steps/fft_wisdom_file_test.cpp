@@ -38,8 +38,7 @@ std::string with_fingerprint(const std::string& wisdom) {
   return "stageid-fft-wisdom 1 " + fingerprint_of(wisdom) + "\n" + wisdom;
 }
 
-class FftWisdomFileTest : public testing::Test {
- protected:
+struct FftWisdomFileTest : testing::Test {
   std::string make() const {
     FftWisdomFile wisdom(file_);
     RealDft dft(kLength);

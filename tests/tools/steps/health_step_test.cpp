@@ -102,8 +102,7 @@ TEST(DataHealth, AnActuatorThatMovesByItselfHasNotChangedPlacesWithOneThatStands
   }
 }
 
-class RecordingFault : public ::testing::Test {
- protected:
+struct RecordingFault : ::testing::Test {
   std::vector<Finding> findings_of(const MemoryLog& log) const {
     return check_health(read_health_record({&log}, {}),
                         nominal_stage(request_.configured, request_.configured.plant));

@@ -16,8 +16,7 @@ namespace stageid::test_fit_details {
 
 using Json = nlohmann::json;
 
-class FitDetailsTest : public test::ProgramTest {
- protected:
+struct FitDetailsTest : test::ProgramTest {
   /// What the workbench makes of the request of model.json.
   std::shared_ptr<const FitDetails> of_fit(const StageConfig* stage) const {
     const FrfEstimate frf = read_frf(at("frf.h5"));

@@ -17,8 +17,7 @@ using namespace std::chrono_literals;
 using Json = nlohmann::json;
 using testing::HasSubstr;
 
-class WorkbenchTest : public test::ProgramTest {
- protected:
+struct WorkbenchTest : test::ProgramTest {
   void open(bool write, std::vector<std::filesystem::path> inputs = {}) {
     WorkbenchOptions options;
     options.inputs = std::move(inputs);

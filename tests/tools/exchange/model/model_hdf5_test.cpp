@@ -43,8 +43,7 @@ AdditiveModel exported_model() {
   return model;
 }
 
-class ModelHdf5 : public test::PythonScriptTest {
- protected:
+struct ModelHdf5 : test::PythonScriptTest {
   ModelHdf5() : PythonScriptTest("h5py, numpy as np, scipy.signal") {}
 
   void write(const AdditiveModel& model, const std::optional<DrivingPoint>& point = {}) const {
