@@ -134,9 +134,11 @@ class FleetTest(unittest.TestCase):
         command = [self.program, "--verbosity", "quiet", "fleet", "fleet.yaml", "--workers", "1"]
         killed = subprocess.Popen(command, cwd=self.work, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         children = pathlib.Path(f"/proc/{killed.pid}/task/{killed.pid}/children")
-        while not children.read_text():
+        self.addCleanup(killed.kill)
+        while not children.read_text():  # stopped first: else the job could be done before the signal arrives
+            killed.send_signal(signal.SIGCONT)
             time.sleep(0.001)
-        os.kill(killed.pid, signal.SIGSTOP)
+            killed.send_signal(signal.SIGSTOP)
         other = subprocess.Popen(command, cwd=self.work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         while self.done() < LOGS - 1:
             time.sleep(0.01)
