@@ -25,6 +25,7 @@ constexpr double kSkewStep = 0.5;
 
 /// One line after the errors found so far have been undone.
 struct Line {
+  const LineRecord* record = nullptr;
   double omega_rad_s = 0.0;
   bool known = true;   // whether the controller is known here
   Eigen::MatrixXcd F;  // -C, n_u x n_y
@@ -98,6 +99,7 @@ class Search {
     const std::vector<Index> excited = excited_actuators(record.info, record.axes);
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
+      lines_[k].record = &record.lines[k];
       lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
       lines_[k].known =
           frequency_hz >= nominal.controller_from_hz && frequency_hz <= nominal.controller_to_hz;
@@ -153,10 +155,10 @@ class Search {
   double unexplained_motion() const {
     double unexplained = 0.0;
     double controlled = 0.0;
-    for (std::size_t k = 0; k < lines_.size(); ++k) {
-      if (!lines_[k].known) continue;
-      const Eigen::MatrixXcd& Z = record_.lines[k].Z;
-      const Eigen::MatrixXcd by_controller = lines_[k].F * Z.topRows(record_.n_y());
+    for (const Line& line : lines_) {
+      if (!line.known) continue;
+      const Eigen::MatrixXcd& Z = line.record->Z;
+      const Eigen::MatrixXcd by_controller = line.F * Z.topRows(record_.n_y());
       unexplained += record_.scatter(Z.bottomRows(record_.n_u()) - by_controller).trace().real();
       controlled += record_.scatter(by_controller).trace().real();
     }
@@ -165,10 +167,9 @@ class Search {
 
  private:
   void refresh() {
-    for (std::size_t k = 0; k < lines_.size(); ++k) {
-      const Eigen::MatrixXcd& Z = record_.lines[k].Z;
-      lines_[k].Y = record_.mean(Z.topRows(record_.n_y()));
-      lines_[k].U = record_.mean(Z.bottomRows(record_.n_u()));
+    for (Line& line : lines_) {
+      line.Y = record_.mean(line.record->Z.topRows(record_.n_y()));
+      line.U = record_.mean(line.record->Z.bottomRows(record_.n_u()));
     }
     total_ = 0.0;
     for (Bend& bend : bends_) {
@@ -176,8 +177,7 @@ class Search {
         return Eigen::MatrixXcd(line.U - line.R - line.F * line.Y);
       });
       bend.variance = record_.variance_of_mean(bent(bend, [this](const Line& line) {
-        const Eigen::MatrixXcd& Z =
-            record_.lines[static_cast<std::size_t>(&line - lines_.data())].Z;
+        const Eigen::MatrixXcd& Z = line.record->Z;
         return Eigen::MatrixXcd(Z.bottomRows(record_.n_u()) - line.F * Z.topRows(record_.n_y()));
       }));
       Eigen::VectorXd others = Eigen::VectorXd::Constant(record_.n_u(), 1e-300);

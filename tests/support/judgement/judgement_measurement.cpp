@@ -122,6 +122,8 @@ class Loop {
 
   void push() {
     force_ = u_.cwiseProduct(gain_);
+    if (plan_.actuator_limit_n > 0.0)
+      force_ = force_.cwiseMax(-plan_.actuator_limit_n).cwiseMin(plan_.actuator_limit_n);
     quantize(force_, plan_.actuator_quantum_n);
     force_ += Eigen::Map<const Eigen::VectorXd>(noise_.force_n(), force_.size());
     const double shape = 1.0 / std::sqrt(stage_.spec.plant.mass_kg);

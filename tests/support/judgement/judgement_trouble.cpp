@@ -10,9 +10,10 @@ namespace stageid::test {
 namespace {
 
 constexpr std::array<const char*, kTroubles> kNames = {
-    "clean",      "dac_step",       "adc_step",        "cubic",        "friction",
-    "slow_noise", "mode_drift",     "lost_sample",     "late_channel", "unexcited_axis",
-    "unsettled",  "late_reference", "setpoint_motion", "wrong_map",    "changed_run"};
+    "clean",           "dac_step",       "adc_step",    "cubic",
+    "friction",        "slow_noise",     "mode_drift",  "lost_sample",
+    "late_channel",    "unexcited_axis", "unsettled",   "late_reference",
+    "setpoint_motion", "wrong_map",      "changed_run", "saturation"};
 
 /// The force on the heave that goes with its motion at the crossover: what keeps the loop stable.
 double loop_force(const JudgementStage& stage) {
@@ -90,6 +91,11 @@ TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
     case Trouble::dac_step:
       plan.actuator_quantum_n = share * stage.level_n;
       plan.right_causes = distortion;
+      break;
+    case Trouble::saturation:
+      plan.actuator_limit_n =
+          stage.level_n * std::exp(random.uniform(std::log(1.2), std::log(3.0)));
+      plan.right_causes = {"saturated", "limit", "distort", "nonlinear"};
       break;
     case Trouble::adc_step:
       plan.sensor_quantum_m = stage.spec.simulation.sensor_noise_m * random.uniform(2.0, 20.0);

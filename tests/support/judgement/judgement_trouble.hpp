@@ -27,9 +27,10 @@ enum class Trouble : std::uint8_t {
   late_reference,  ///< the excitation is recorded late
   setpoint_motion,
   wrong_map,
-  changed_run  ///< the stage differs in one run, or from one run on
+  changed_run,  ///< the stage differs in one run, or from one run on
+  saturation    ///< the amplifiers limit the force below the recorded commands
 };
-inline constexpr int kTroubles = 15;
+inline constexpr int kTroubles = 16;
 const char* to_string(Trouble trouble) noexcept;
 std::optional<Trouble> trouble_of(const std::string& name) noexcept;
 
@@ -41,6 +42,7 @@ struct TroublePlan {
   std::vector<std::string> right_causes;
   // at the stage
   double actuator_quantum_n = 0.0;
+  double actuator_limit_n = 0.0;  ///< 0: none
   double sensor_quantum_m = 0.0;
   double cubic_n_m3 = 0.0;  ///< on the rigid heave
   double friction_n = 0.0;
