@@ -29,8 +29,9 @@ std::vector<Finding> to_findings(const std::vector<ActuatorStep>& steps,
     const std::string& name = actuators.name(s.actuator);
     const std::string figure =
         fmt::format("{:.4g} {}, {}", s.step, actuators.unit(s.actuator), to_string(s.rounding));
-    if (!findings.empty() && findings.back().figure == figure) {
-      findings.back().channel += " " + name;
+    const auto same = std::ranges::find(findings, figure, &Finding::figure);
+    if (same != findings.end()) {
+      same->channel += " " + name;
       continue;
     }
     const bool limited = s.rounding == Rounding::limited;
