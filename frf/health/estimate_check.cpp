@@ -166,15 +166,19 @@ std::vector<Finding> check_experiment_noise(const FrfEstimate& frf,
   // Noise has random phases on neighbouring lines, a limit cycle has not.
   if (frf.experiment_noise_ratio > kLimitCycle && mostly_unsettled(frf.nonlinearity)) {
     finding.severity = Severity::fault;
-    finding.cause = start_known ? Cause::limit_cycle : Cause::unsettled;
-    finding.what = start_known
-                       ? "the loop oscillates by itself in some experiments: a limit cycle, as "
-                         "coarse steps of the command or friction cause"
-                       : "not settled: some experiments contain motion that does not repeat and is "
-                         "not noise, as the transient of the start";
-    finding.remedy = start_known ? kRemedyOfLimitCycle
-                                 : "use --method lpm, or measure again with one more of periods "
-                                   "and transient_periods";
+    finding.cause = Cause::limit_cycle;
+    finding.what =
+        "the loop oscillates by itself in some experiments: a limit cycle, as coarse steps of the "
+        "command or friction cause";
+    finding.remedy = kRemedyOfLimitCycle;
+    if (!start_known) {
+      finding.cause = Cause::unsettled;
+      finding.what =
+          "not settled: some experiments contain motion that does not repeat and is not noise, as "
+          "the transient of the start";
+      finding.remedy =
+          "use --method lpm, or measure again with one more of periods and transient_periods";
+    }
   }
   return {finding};
 }

@@ -15,8 +15,8 @@ namespace stageid {
 /// and any correlation of the sensors. So the regression over the runs gives c, and the scatter of X_r around it gives
 /// an F test with one and R - 1 complex degrees of freedom. Noise with a memory longer than a period (a disturbed
 /// lightly damped mode) correlates W with the noise of B, for an AR(1) process by at most 0.45 (limit of a long
-/// memory). Therefore 0.6 over B's power relative to the noise is subtracted from |c|. (0.6, because B's own noise is up to
-/// 1.6 times what the scatter predicts.)
+/// memory). Therefore 0.6 over B's power relative to the noise is subtracted from |c|. (0.6, because B's own noise is
+/// up to 1.6 times what the scatter predicts.)
 ///
 /// Test 2, with at least three periods: the power of the first period against that of the last, both relative to the
 /// periods between them. For noise, which may be reversed in time, both have the same distribution. F with one complex
@@ -27,8 +27,8 @@ namespace stageid {
 /// start that rings, W has any ratio to B, but V is 2/P of W, where a transient leaves less. The nearer of the two is
 /// taken. If less than 2 % decays in a period, the finding is a drift, too.
 ///
-/// Where test 2 finds a decay but one c explains less than half of W along B, the motion is not that of a linear system: a limit
-/// cycle that comes to rest.
+/// Where test 2 finds a decay but one c explains less than half of W along B, the motion is not that of a linear
+/// system: a limit cycle that comes to rest.
 ///
 /// From W = c B follows q: c = (q - mean q^2...q^P) / (1 - mean q...q^P). The transient in the mean of the used
 /// periods, relative to its noise and over all runs, sensors and lines of the window, bounds the shift of every

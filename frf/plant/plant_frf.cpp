@@ -397,14 +397,15 @@ bool is_suspicious(const FrfEstimate& frf) {
   return false;
 }
 
-/// By how much the realizations scatter less or more, as they do if the steps are really there or not: on average over lines
+/// By how much the realizations scatter less, as they do if the steps are really there, or more: on average over lines
 /// and channels.
 double scatter_ratio(const FrfEstimate& with_steps, const FrfEstimate& without) {
   const Eigen::ArrayXXd ratio = with_steps.total_variance.array() / without.total_variance.array();
   return ratio.isFinite().all() ? std::exp(ratio.max(kRounding).log().mean()) : HUGE_VAL;
 }
 
-/// Moves limits, equal ones together, to where the realizations scatter least: the search finds them within a few percent.
+/// Moves limits, equal ones together, to where the realizations scatter least: the search finds them within a few
+/// percent.
 void refine_limits(const std::vector<const LogReader*>& logs, const FrfOptions& options,
                    EarlierEstimate& earlier, FrfEstimate& frf) {
   std::set<double> limits;
