@@ -1,38 +1,19 @@
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <cmath>
 
 #include "estimation/equations/residue_factors.hpp"
-#include "estimation/iteration/fit_iteration.hpp"
-#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/iteration/descent.hpp"
 #include "estimation/problem/residual.hpp"
-#include "estimation/problem/search_limit.hpp"
 
 namespace stageid {
 namespace {
 
-class LowRankIteration {
+class LowRankIteration : public Descent {
  public:
   LowRankIteration(const FitProblem& problem, FitParameters& beta, ResidueFactors& factors,
                    const FitOptions& options)
-      : problem_(problem),
-        beta_(beta),
-        factors_(factors),
-        options_(options),
-        bounds_(problem, beta) {}
-
-  IterationResult run() {
-    project();
-    result_.cost.push_back(result_.end_cost);
-    while (iterate_once() && result_.iterations < options_.max_iterations) {
-    }
-    if (result_.message.empty())
-      result_.end_here(FitStatus::iteration_limit,
-                       fmt::format("stopped after {} iterations", result_.iterations));
-    result_.message.insert(0, "residues of given rank: ");
-    bounds_.drop_delays(result_.frozen);
-    return std::move(result_);
+      : Descent(problem, beta, options), factors_(factors) {
+    signal_cost_ = signal_cost(problem);
   }
 
  private:
@@ -42,7 +23,7 @@ class LowRankIteration {
   }
 
   /// Projects the unconstrained numerators, weighted by their inverse variances.
-  void project() {
+  bool begin() override {
     const ArrowSystem system = equations(beta_);
     Eigen::MatrixXd weight(problem_.channels(), problem_.functions());
     const Eigen::MatrixXd unit =
@@ -55,7 +36,8 @@ class LowRankIteration {
     weight /= weight.maxCoeff();
     factors_.project(beta_, weight);
     factors_.write_numerators(beta_);
-    result_.end_cost = cost_of(beta_);
+    cost_ = cost_of(beta_);
+    return true;
   }
 
   static Eigen::VectorXd solve(const Eigen::MatrixXd& N, const Eigen::VectorXd& g, double damping,
@@ -69,29 +51,20 @@ class LowRankIteration {
     return scale.cwiseProduct(scaled.ldlt().solve(rhs));
   }
 
-  /// @returns whether to continue.
-  bool iterate_once() {
-    if (options_.limit && options_.limit->reached())
-      return result_.end(options_.limit->status(), options_.limit->message());
+  bool improve() override {
     const ArrowSystem system = equations(beta_);
-    N_ = factors_.reduced_matrix(beta_, system);
-    g_ = factors_.reduced_gradient(beta_, system);
-    if (!N_.allFinite())
-      return result_.end(FitStatus::singular, "the residue factors are singular");
-    result_.frozen = bounds_.leaning(beta_, g_.head(problem_.globals()));
-    const double squares = 2.0 * static_cast<double>(problem_.size()) * result_.end_cost;
-    result_.gradient = scaled_gradient(N_, g_, result_.frozen, squares);
-    const double data = static_cast<double>(problem_.size() * problem_.channels());
-    result_.deviations =
-        std::sqrt(std::abs(solve(N_, g_, 0.0, result_.frozen).dot(g_)) * data / squares);
-    if (result_.gradient < options_.gradient_tolerance ||
-        result_.deviations < options_.deviation_tolerance)
-      return result_.end_here(FitStatus::gradient_small, "converged");
-    if (damping_.descend(
-            [&](double damping) { return attempt(solve(N_, g_, damping, result_.frozen)); }))
-      return true;
-    return result_.end_without_step();
+    const Eigen::MatrixXd N = factors_.reduced_matrix(beta_, system);
+    const Eigen::VectorXd g = factors_.reduced_gradient(beta_, system);
+    if (!N.allFinite()) return end(FitStatus::singular, "the residue factors are singular");
+    result_.frozen = bounds_.leaning(beta_, g.head(problem_.globals()));
+    const auto step_of = [&](double damping) { return solve(N, g, damping, result_.frozen); };
+    if (!may_continue(scaled_gradient(N, g, result_.frozen, squares()),
+                      std::abs(step_of(0.0).dot(g))))
+      return false;
+    return descend(step_of) || end_without_step();
   }
+
+  void conclude() override { result_.message.insert(0, "residues of given rank: "); }
 
   double cost_of(const FitParameters& beta) const {
     return residual_cost(problem_, evaluate_groups(problem_, beta, false), beta.B);
@@ -107,13 +80,7 @@ class LowRankIteration {
     factors.write_numerators(beta);
   }
 
-  bool attempt(const Eigen::VectorXd& step) {
-    return bounds_.try_to_jump(problem_, beta_, step,
-                               [this](const Eigen::VectorXd& part) { return take(part); });
-  }
-
-  /// @returns false if the step does not lower the cost
-  bool take(const Eigen::VectorXd& step) {
+  bool take(const Eigen::VectorXd& step) override {
     if (!step.allFinite()) return false;
     FitParameters trial = stepped(problem_, beta_, step.head(problem_.globals()));
     if (!bounds_.stabilize(beta_, trial)) return false;
@@ -121,27 +88,18 @@ class LowRankIteration {
     factors.step(step);
     factors.write_numerators(trial);
     double cost = cost_of(trial);
-    if (!(cost < result_.end_cost)) {
+    if (!(cost < cost_)) {
       follow(trial, factors);
       cost = cost_of(trial);
     }
-    if (!(cost < result_.end_cost)) return false;
+    if (!(cost < cost_)) return false;
     beta_ = std::move(trial);
     factors_ = std::move(factors);
-    result_.accept(cost, options_);
-    result_.end_cost = cost;
+    accept(cost);
     return true;
   }
 
-  const FitProblem& problem_;
-  FitParameters& beta_;
   ResidueFactors& factors_;
-  const FitOptions& options_;
-  PoleBounds bounds_;
-  IterationResult result_;
-  Eigen::MatrixXd N_;
-  Eigen::VectorXd g_;
-  Damping damping_;
 };
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "estimation/model/model_structure.hpp"
 #include "estimation/model/poles.hpp"
 #include "estimation/problem/fit_start.hpp"
-#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/problem/parameter_bounds.hpp"
 #include "estimation/problem/residual.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/problem/weight_matrices.hpp"
@@ -193,7 +193,7 @@ double keep_finite(const FrfEstimate& frf, const FitProblem& problem, const FitP
 
 std::vector<std::size_t> held_submodels(const FitProblem& problem, const FitParameters& beta,
                                         const std::vector<Eigen::Index>& frozen) {
-  const PoleBounds bounds(problem, beta);
+  const ParameterBounds bounds(problem, beta);
   std::vector<std::size_t> out;
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < beta.a.size(); ++i) {

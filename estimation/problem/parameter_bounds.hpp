@@ -11,12 +11,12 @@ namespace stageid {
 ///
 /// A pole far below or above the lines appears only as a slope or a constant. The data do not determine its
 /// frequency, which would drift; it is held at the bound and not counted as an unknown.
-class PoleBounds {
+class ParameterBounds {
  public:
   /// Natural frequencies from a quarter of the lowest line (or that of the lowest mode of the start) to ten times the
   /// highest line, or nearly Nyquist with the exact hold; damping ratios in [1e-5, 0.9]. Poles of requested submodels
   /// (SubmodelRole) may be as low as 1/300 of the lowest line, and real poles are not bounded by Nyquist.
-  PoleBounds(const FitProblem& problem, const FitParameters& start);
+  ParameterBounds(const FitProblem& problem, const FitParameters& start);
 
   /// Moves all poles of `beta` into their bounds, a mode at most a third away from `before`; unstable poles of a start are
   /// reflected.

@@ -9,7 +9,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
 
-namespace stageid::test_pole_bounds {
+namespace stageid::test_parameter_bounds {
 
 constexpr double kLowestLineHz = 20.0;
 
@@ -36,7 +36,7 @@ FitResult fit_from(const FrfEstimate& frf, double first_hz) {
   return fit_additive_model(frf, start, {});
 }
 
-TEST(PoleBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
+TEST(ParameterBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
   const FitResult fit = fit_from(response_of(121.0, -0.002), 120.5);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_NEAR(fit.model.submodels[1].damping_ratio(), 1e-5, 1e-8);
@@ -45,7 +45,7 @@ TEST(PoleBounds, AModeThatWouldBeUnstableIsHeldAtTheSmallestDamping) {
   EXPECT_NEAR(fit.model.submodels[2].natural_frequency_hz(), 301.0, 0.1);
 }
 
-TEST(PoleBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
+TEST(ParameterBounds, AModeFarBelowTheLinesIsHeldThereWithoutADeviation) {
   // From a start inside the lines towards 1 Hz, which is seen as a slope only.
   const FitResult fit = fit_from(response_of(1.0, 0.02), 30.0);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
@@ -88,7 +88,7 @@ int found_from(double delay_s, const FitOptions& given) {
 }
 
 // A direct term answers one sample later as soon as the delay exceeds a whole number of samples.
-TEST(PoleBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
+TEST(ParameterBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
   FitOptions options;
   options.hold = HoldModel::exact;
   options.weighting = Weighting::noise_variance;
@@ -99,4 +99,4 @@ TEST(PoleBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
   EXPECT_EQ(found_from(1.9e-4, options), 20);
 }
 
-}  // namespace stageid::test_pole_bounds
+}  // namespace stageid::test_parameter_bounds

@@ -1,4 +1,4 @@
-#include "estimation/problem/pole_bounds.hpp"
+#include "estimation/problem/parameter_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ double delay_in_samples(const FitProblem& problem, const FitParameters& beta,
 
 }  // namespace
 
-PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start)
+ParameterBounds::ParameterBounds(const FitProblem& problem, const FitParameters& start)
     : held_(problem.held) {
   const double lowest_line = problem.lines.omega_rad_s.minCoeff();
   const double highest_line = problem.lines.omega_rad_s.maxCoeff();
@@ -63,8 +63,8 @@ PoleBounds::PoleBounds(const FitProblem& problem, const FitParameters& start)
   }
 }
 
-void PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
-                                Eigen::VectorXd& a) const {
+void ParameterBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
+                                     Eigen::VectorXd& a) const {
   // A step that moves it too far is shortened, not refused: one mode must not stop all the others.
   constexpr double kMost = kLargestMove * kLargestMove;
   const double here = std::abs(before[1]);
@@ -82,7 +82,7 @@ void PoleBounds::stabilize_mode(std::size_t i, const Eigen::VectorXd& before,
   a[0] = 2.0 * root * std::clamp(damping / (2.0 * root), kSmallestDamping, kLargestDamping);
 }
 
-Complex PoleBounds::contained(std::size_t i, Complex pole) const {
+Complex ParameterBounds::contained(std::size_t i, Complex pole) const {
   const double size = std::abs(pole);
   if (pole.imag() == 0.0)
     return -std::clamp(size, lowest_rad_s_[i], std::max(highest_real_rad_s_, lowest_rad_s_[i]));
@@ -92,7 +92,7 @@ Complex PoleBounds::contained(std::size_t i, Complex pole) const {
   return {-damping * kept, std::copysign(other * kept, pole.imag())};
 }
 
-bool PoleBounds::stabilize_poles(std::size_t i, Eigen::VectorXd& a) const {
+bool ParameterBounds::stabilize_poles(std::size_t i, Eigen::VectorXd& a) const {
   if (!a.allFinite() || a[a.size() - 1] == 0.0) return false;
   std::vector<Complex> poles = roots(a);
   bool moved = false;
@@ -108,7 +108,7 @@ bool PoleBounds::stabilize_poles(std::size_t i, Eigen::VectorXd& a) const {
   return a.allFinite();
 }
 
-bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) const {
+bool ParameterBounds::stabilize(const FitParameters& before, FitParameters& beta) const {
   for (std::size_t i = 0; i < beta.a.size(); ++i) {
     Eigen::VectorXd& a = beta.a[i];
     if (a.size() == 2) {
@@ -120,8 +120,8 @@ bool PoleBounds::stabilize(const FitParameters& before, FitParameters& beta) con
   return true;
 }
 
-std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
-                                              const Eigen::VectorXd& descent) const {
+std::vector<Eigen::Index> ParameterBounds::leaning(const FitParameters& beta,
+                                                   const Eigen::VectorXd& descent) const {
   std::vector<Eigen::Index> out = held_;
   out.insert(out.end(), held_delays_.begin(), held_delays_.end());
   Eigen::Index p = 0;
@@ -146,9 +146,9 @@ std::vector<Eigen::Index> PoleBounds::leaning(const FitParameters& beta,
   return out;
 }
 
-std::vector<Eigen::Index> PoleBounds::stop_at_jump(const FitProblem& problem,
-                                                   const FitParameters& here,
-                                                   Eigen::VectorXd& step) const {
+std::vector<Eigen::Index> ParameterBounds::stop_at_jump(const FitProblem& problem,
+                                                        const FitParameters& here,
+                                                        Eigen::VectorXd& step) const {
   if (problem.lines.hold != HoldModel::exact || problem.delays() == 0) return {};
   const FitParameters beyond = stepped(problem, here, step.head(problem.globals()));
   double part = 1.0;  // of the step
@@ -170,8 +170,8 @@ std::vector<Eigen::Index> PoleBounds::stop_at_jump(const FitProblem& problem,
   return passed;
 }
 
-std::optional<Eigen::VectorXd> PoleBounds::step_over_jump(const FitProblem& problem,
-                                                          const FitParameters& here) const {
+std::optional<Eigen::VectorXd> ParameterBounds::step_over_jump(const FitProblem& problem,
+                                                               const FitParameters& here) const {
   if (problem.lines.hold != HoldModel::exact || problem.delay != DelayModel::estimate)
     return std::nullopt;
   const double samples = delay_in_samples(problem, here, 0);
@@ -182,13 +182,13 @@ std::optional<Eigen::VectorXd> PoleBounds::step_over_jump(const FitProblem& prob
   return step;
 }
 
-void PoleBounds::drop_delays(std::vector<Eigen::Index>& frozen) const {
+void ParameterBounds::drop_delays(std::vector<Eigen::Index>& frozen) const {
   std::erase_if(frozen, [this](Eigen::Index p) {
     return std::ranges::find(held_delays_, p) != held_delays_.end();
   });
 }
 
-bool PoleBounds::at_bound(std::size_t i, const Eigen::VectorXd& a) const {
+bool ParameterBounds::at_bound(std::size_t i, const Eigen::VectorXd& a) const {
   const std::vector<Complex> poles = roots(a);
   return std::ranges::any_of(poles, [&](Complex pole) {
     const double size = std::abs(pole);
