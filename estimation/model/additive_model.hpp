@@ -74,8 +74,10 @@ struct Submodel {
   std::vector<PoleEstimate> poles = {};
 
   SubmodelRole role = SubmodelRole::searched;
-  bool frequency_held = false;                      ///< a mode with fixed a_2
-  bool damping_held = false;                        ///< a mode with fixed a_1
+  bool frequency_held = false;  ///< a mode with fixed a_2
+  bool damping_held = false;    ///< a mode with fixed a_1
+  /// The held values are a guess, so what others owe to them is unknown too: the covariance counts them as free.
+  bool is_guess = false;
   std::vector<Eigen::MatrixXd> numerator_std = {};  ///< per entry of numerator; empty: unknown
 
   int order() const noexcept { return static_cast<int>(denominator.size()) - 1; }  ///< n

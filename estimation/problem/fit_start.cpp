@@ -120,6 +120,15 @@ FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& st
   return beta;
 }
 
+void drop_guesses(const AdditiveModel& model, std::vector<Eigen::Index>& globals) {
+  Eigen::Index first = 0;
+  for (const Submodel& s : model.submodels) {
+    const Eigen::Index next = first + s.order();
+    if (s.is_guess) std::erase_if(globals, [&](Eigen::Index p) { return p >= first && p < next; });
+    first = next;
+  }
+}
+
 void fill_submodels(const FitProblem& problem, const FitParameters& beta, AdditiveModel& model) {
   Eigen::Index f = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {

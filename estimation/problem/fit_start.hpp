@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "estimation/problem/fit_problem.hpp"
 
 namespace stageid {
@@ -17,6 +19,9 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
 /// The values of the start; estimated delays start from its delays if it has any.
 FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,
                               const FitOptions& options);
+
+/// Removes the coefficients of poles that are held at a guess (Submodel::is_guess) from globals of a fit of this model.
+void drop_guesses(const AdditiveModel& model, std::vector<Eigen::Index>& globals);
 
 /// Writes denominators, numerators and delays into a model with the structure of the problem.
 void fill_submodels(const FitProblem& problem, const FitParameters& beta, AdditiveModel& model);

@@ -272,6 +272,8 @@ FitResult fit_additive_model(const FrfEstimate& frf, const AdditiveModel& start,
   result.cost = iteration.cost;
   result.deviations = iteration.deviations;
   result.held = held_submodels(problem, beta, iteration.frozen);
+  drop_guesses(result.model, problem.held);  // from here on, for the covariance
+  drop_guesses(result.model, iteration.frozen);
   result.frozen = iteration.frozen;
   fill_model(frf, options, problem, beta, result);
   fill_record(options, iteration, relative_rms, result);

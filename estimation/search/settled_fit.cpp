@@ -45,7 +45,8 @@ Simpler with_held(const AdditiveModel& model, std::size_t i, const std::string& 
   Simpler out{model,
               fmt::format("held the pole at {:.6g} Hz, which the data need but do not determine {}",
                           model.submodels[i].natural_frequency_hz(), doubt)};
-  out.model.submodels[i].frequency_held = out.model.submodels[i].damping_held = true;
+  Submodel& s = out.model.submodels[i];
+  s.frequency_held = s.damping_held = s.is_guess = true;
   return out;
 }
 

@@ -36,6 +36,7 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
       make_problem(frf, result.model, options,
                    out.matrices ? SharedMatrix<Eigen::MatrixXd>::kept(out.matrices->marginal())
                                 : make_weights(frf, options));
+  drop_guesses(result.model, out.problem.held);
   out.beta = make_parameters(out.problem, result.model, options);
   out.groups = evaluate_groups(out.problem, out.beta, true);
   return out;

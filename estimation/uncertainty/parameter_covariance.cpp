@@ -377,7 +377,7 @@ void fill_deviations(const FitProblem& problem, const ParameterCovariance& covar
   Eigen::Index f = 0;
   for (Submodel& s : model.submodels) {
     const Eigen::Index order = s.order();
-    if (s.is_mode()) {
+    if (s.is_mode() && !s.is_guess) {
       const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
       const double a1 = s.denominator[1];
       const double a2 = s.denominator[2];
@@ -387,7 +387,7 @@ void fill_deviations(const FitProblem& problem, const ParameterCovariance& covar
       if (C(1, 1) > 0.0) s.natural_frequency_std_hz = std::sqrt(std::max(0.0, df.dot(C * df)));
       if (C(1, 1) > 0.0 && C(0, 0) > 0.0)
         s.damping_ratio_std = std::sqrt(std::max(0.0, dz.dot(C * dz)));
-    } else if (order > 0) {
+    } else if (!s.is_mode() && order > 0) {
       const Eigen::MatrixXd C = covariance.globals.block(first, first, order, order);
       if (C.diagonal().minCoeff() > 0.0) s.poles = pole_estimates(s.coefficients(), C);
     }

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimation/search/fit_additive_model.hpp"
@@ -208,6 +209,42 @@ TEST_F(Covariance, IsNotComputedUnlessAsked) {
   EXPECT_EQ(bare.response_variance.size(), 0);
   EXPECT_TRUE(bare.model.submodels[1].numerator_std.empty());
   EXPECT_FALSE(bare.model.submodels[1].natural_frequency_std_hz.has_value());
+}
+
+// A pole that the fit holds at a guess is not known better than a free one, so what others owe to it stays uncertain.
+TEST(ParameterCovariance, AGuessedPoleCountsAsUnknown) {
+  const DenseProblem problem = covariance_stage();
+  test::RandomNumbers random(3);
+  const FrfEstimate frf = noisy_frf(random, problem, problem.W.cwiseInverse());
+  const FitOptions options = options_with(Weighting::noise_variance);
+  const FitResult free = fit_additive_model(frf, problem.model, options);
+  ASSERT_TRUE(free.trustworthy()) << free.message();
+  const auto held = [&](bool is_guess) {
+    AdditiveModel model = free.model;
+    Submodel& mode = model.submodels.back();  // one of a close pair
+    mode.frequency_held = mode.damping_held = true;
+    mode.is_guess = is_guess;
+    return fit_additive_model(frf, model, options);
+  };
+  const FitResult guessed = held(true);
+  const FitResult known = held(false);
+  double least = 1.0;
+  for (std::size_t i = 0; i < free.model.submodels.size(); ++i) {
+    const Submodel& one = free.model.submodels[i];
+    const Submodel& other = guessed.model.submodels[i];
+    for (std::size_t m = 0; m < one.numerator_std.size(); ++m) {
+      EXPECT_LT((other.numerator_std[m] - one.numerator_std[m]).norm(),
+                1e-5 * one.numerator_std[m].norm());
+      least = std::min(
+          least, (known.model.submodels[i].numerator_std[m].array() / one.numerator_std[m].array())
+                     .minCoeff());
+    }
+    if (!one.is_mode()) continue;
+    EXPECT_EQ(other.natural_frequency_std_hz.has_value(), i + 1 < free.model.submodels.size());
+    if (!other.natural_frequency_std_hz) continue;
+    EXPECT_NEAR(*other.natural_frequency_std_hz / one.natural_frequency_std_hz.value(), 1.0, 1e-5);
+  }
+  EXPECT_LT(least, 0.95);  // it matters here
 }
 
 }  // namespace stageid::test_parameter_covariance
