@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -19,9 +20,10 @@ namespace {
 
 // times the variance: the error of the model is then as large as the noise
 constexpr double kAllowed = 2.0;
-constexpr double kByChance = 1e-3;   // probability that any part of a right model is not explained
-constexpr Eigen::Index kRun = 32;    // lines judged together
-constexpr double kRounding = 1e-20;  // of the power of a line: no measurement is more exact
+constexpr double kByChance = 1e-3;  // probability that any part of a right model is not explained
+constexpr Eigen::Index kRun = 32;   // lines judged together
+constexpr double kRounding =
+    1e-20;  // of the power of a channel on a line: no measurement is more exact
 
 /// Sums over one part of the data.
 struct Part {
@@ -46,7 +48,9 @@ class Parts {
   Parts(const FrfEstimate& frf, double dof)
       : frf_(frf),
         dof_(dof),
-        rounding_(kRounding * frf.response.colwise().squaredNorm().transpose()) {
+        rounding_(kRounding * frf.response.colwise().squaredNorm().transpose()),
+        share_(frf.response.rowwise().squaredNorm()) {
+    share_ /= std::max(share_.sum(), std::numeric_limits<double>::min());
     parts_.push_back({});
     for (const std::string& name : frf.outputs.names) parts_.push_back({"output " + name});
     for (const std::string& name : frf.inputs.names) parts_.push_back({"input " + name});
@@ -65,7 +69,8 @@ class Parts {
                 const Eigen::Ref<const Eigen::VectorXd>& weights) {
     for (Eigen::Index r = 0; r < residual.size(); ++r) {
       if (!counts(variance[r], weights.size() > 0 ? weights[r] : 1.0)) continue;
-      const double ratio = std::norm(residual[r]) / (variance[r] + rounding_[k]);
+      const double ratio =
+          std::norm(residual[r]) / (variance[r] + rounding_[k] * share_[first_channel + r]);
       const double scaled = ratio / kAllowed;
       const double t = dof_ > 0.0 ? dof_ * std::log1p(scaled / dof_) : scaled;
       for (const std::size_t p : parts_of(first_channel + r, k)) parts_[p].add(t, ratio);
@@ -158,6 +163,7 @@ class Parts {
   const FrfEstimate& frf_;
   double dof_;
   Eigen::VectorXd rounding_;  // of every line
+  Eigen::VectorXd share_;     // of every channel: they may have different units
   std::vector<Part> parts_;
   std::vector<bool> seen_;
 };

@@ -173,4 +173,16 @@ TEST(ResidualVerdict, WithoutWeightsOrLinesNothingIsJudged) {
   EXPECT_EQ(verdict.variance, ResidualVariance::none);
 }
 
+// 1e-10 m beside 1 N: the rounding of the large channels says nothing about the small one.
+TEST(ResidualVerdict, AChannelOfSmallNumbersIsJudgedLikeTheOthers) {
+  FrfEstimate frf = noise(11, 400, 0);
+  for (Eigen::Index u = 0; u < kInputs; ++u) {
+    frf.response.row(kOutputs * u) *= 1e-10;
+    frf.noise_variance.row(kOutputs * u) *= 1e-20;
+  }
+  EXPECT_NEAR(judge(frf).chi_square, 1.0, 0.1);
+  for (Eigen::Index u = 0; u < kInputs; ++u) frf.response.row(kOutputs * u) *= 3.0;
+  EXPECT_THAT(judge(frf).reason, HasSubstr("output z1"));
+}
+
 }  // namespace stageid::test_residual_verdict
