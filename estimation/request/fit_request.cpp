@@ -156,23 +156,29 @@ class FitDefaults {
           delay.delay_s, 0.5 / spacing_hz, spacing_hz);
   }
 
-  /// With one realization, the variance by periods does not include nonlinear distortion. With that weighting, the
-  /// distortion would be fitted by modes. @returns true if the lines scatter by more than that variance.
+  /// The scatter of neighbouring lines, where the variance is unknown, or where that by periods does not include
+  /// nonlinear distortion, because there is one realization: modes would fit the distortion. @returns whether it is used
   bool weigh_by_scatter() {
     FrfEstimate& frf = setup_.frf;
-    if (frf.noise_variance.size() == 0 || frf.realizations > 1) return false;
+    const bool unknown = frf.noise_variance.size() == 0;
+    if (unknown ? frf.total_variance.size() > 0 : frf.realizations > 1) return false;
     LineScatter scatter = line_scatter(frf, request_.threads);
-    if (!scatter.shows_distortion()) return false;
+    if (unknown ? scatter.variance.size() == 0 : !scatter.shows_distortion()) return false;
     if (lines_are_coarse(frf, scatter, request_.threads)) {
-      warn(
-          "weighting by period-to-period variance. The line-to-line scatter is larger, but the "
-          "lines are too coarse to separate distortion from resonances: halve the spacing or "
-          "measure several realizations");
+      if (!unknown)
+        warn(
+            "weighting by period-to-period variance. The line-to-line scatter is larger, but the "
+            "lines are too coarse to separate distortion from resonances: halve the spacing or "
+            "measure several realizations");
       return false;
     }
     frf.total_variance = std::move(scatter.variance);
     frf.total_dof = scatter.dof;
     setup_.options.weighting = Weighting::total_variance;
+    if (unknown) {
+      note("weighting: the scatter of neighbouring lines, the response has no variances");
+      return true;
+    }
     warn(fmt::format(
         "weighting by the scatter of neighbouring lines, {:.3g} times the period-to-period "
         "variance (median): the plant appears nonlinear, and one realization is too few to measure "
