@@ -8,16 +8,40 @@
 
 namespace stageid {
 
-double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
-  const double data = frf.independent_numbers();
-  return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
-         static_cast<double>(fit.parameters) * std::log(data);
-}
-
 namespace {
 
-/// In units of 2 ln(likelihood): ln(data) per parameter (BIC), and 2 ln(lines) for the choice of the frequency among
-/// the lines. Without it, the best of thousands of places would be accepted even if none is right.
+/// What so many parameters gain by fitting noise, kClearly standard deviations above the mean.
+double most_by_noise(double parameters) {
+  return parameters + kClearly * std::sqrt(2.0 * parameters);
+}
+
+/// In units of 2 ln(likelihood). Poles and B_0 of the modes: ln(data) each (BIC). The other parts belong to a structure
+/// that is one of a few, not the best of many, so each is right if noise cannot gain as much: the B_1 of all modes, a
+/// direct term, a rigid body, the delays. With ln(data) for each of the hundreds of parameters of many channels, a part
+/// would be left out that shifts the modes by several of their standard deviations.
+double cost_of_parameters(const AdditiveModel& model, double channels, double parameters,
+                          double data) {
+  double of_modes = 0.0;
+  double of_damping = 0.0;
+  double of_others = 0.0;
+  double cost = 0.0;
+  for (const Submodel& s : model.submodels) {
+    const double numerators = channels * static_cast<double>(s.numerator.size());
+    if (is_searched_mode(s)) {
+      of_modes += 2.0 + channels;
+      of_damping += numerators - channels;
+    } else {
+      of_others += s.order() + numerators;
+      cost += most_by_noise(s.order() + numerators);
+    }
+  }
+  const double of_delays = parameters - of_modes - of_damping - of_others;
+  if (of_delays < 0.0) return parameters * std::log(data);  // residues of given ranks
+  return cost + of_modes * std::log(data) + most_by_noise(of_damping) + most_by_noise(of_delays);
+}
+
+/// Also 2 ln(lines) for the choice of the frequency among the lines. Without it, the best of thousands of places would
+/// be accepted even if none is right.
 double cost_of_mode(double parameters, double data, double lines) {
   return parameters * std::log(data) + 2.0 * std::log(lines);
 }
@@ -28,6 +52,13 @@ double in_squares(double squares, double cost, double data) {
 }
 
 }  // namespace
+
+double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
+  const double data = frf.independent_numbers();
+  return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
+         cost_of_parameters(fit.model, static_cast<double>(frf.response.rows()),
+                            static_cast<double>(fit.parameters), data);
+}
 
 double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters) {
   const auto lines = static_cast<double>(frf.lines());
@@ -49,23 +80,26 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
     : lines_(static_cast<double>(frf.lines())),
+      channels_(static_cast<double>(frf.response.rows())),
       data_(frf.independent_numbers()),
-      parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) *
-                                    static_cast<double>(frf.response.rows())),
+      parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) * channels_),
       rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}
 
 double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
 }
 
-double ModeWorth::cost_of_one() const { return cost_of_mode(parameters_of_mode_, data_, lines_); }
+double ModeWorth::cost_of_one() const {
+  const double searched = 2.0 + channels_;
+  return cost_of_mode(searched, data_, lines_) + most_by_noise(parameters_of_mode_ - searched);
+}
 
 double ModeWorth::criterion(const FitResult& fit) const {
   return data_ * std::log(squares(fit)) + penalty(fit.model, fit.parameters);
 }
 
 double ModeWorth::penalty(const AdditiveModel& model, Eigen::Index parameters) const {
-  return static_cast<double>(parameters) * std::log(data_) +
+  return cost_of_parameters(model, channels_, static_cast<double>(parameters), data_) +
          2.0 * count_modes(model) * std::log(lines_);
 }
 
@@ -79,8 +113,7 @@ double ModeWorth::price(const FitResult& fit) const {
 }
 
 double ModeWorth::most_by_chance(const FitResult& fit) const {
-  return squares(fit) / data_ *
-         (parameters_of_mode_ + kClearly * std::sqrt(2.0 * parameters_of_mode_));
+  return squares(fit) / data_ * most_by_noise(parameters_of_mode_);
 }
 
 double ModeWorth::deviation_tolerance() const { return std::sqrt(0.01 * cost_of_one()); }

@@ -21,9 +21,10 @@ double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parame
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
                                  const Eigen::MatrixXd& weights, const Team& team);
 
-/// Whether a mode is worth its parameters: an extended Bayesian information criterion (Chen and Chen, Biometrika 95
-/// (2008) 759) with unknown scale of the variances. With correct variances it decides like the criterion with known
-/// variance; if the model cannot be right, it does not fit its errors.
+/// Whether a mode or a structure is worth its parameters: an extended Bayesian information criterion (Chen and Chen,
+/// Biometrika 95 (2008) 759) with unknown scale of the variances; the parameters of a structure cost what noise may gain
+/// with them. With correct variances it decides like the criterion with known variance; if the model cannot be right, it
+/// does not fit its errors.
 class ModeWorth {
  public:
   /// @param weights n_c x N, of the fits that are compared
@@ -58,6 +59,7 @@ class ModeWorth {
   double penalty(const AdditiveModel& model, Eigen::Index parameters) const;
 
   double lines_ = 0.0;
+  double channels_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers
   double parameters_of_mode_ = 0.0;
   double rounding_ = 0.0;  ///< of sum W |E|^2
