@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "estimation/modal/residual_verdict.hpp"
+#include "estimation/modal/line_correlation.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/search_advice.hpp"
@@ -171,16 +171,22 @@ class PoleSearch {
   FitResult found_;
 };
 
+/// Lines that share their noise: with fewer for an independent one, deviations would change by less than a fifth.
+constexpr double kAlike = 1.5;
+
+ModelBlockResponse response_of(const FitResult& result, const FrfEstimate& frf) {
+  return [&](const ResponseBlock& block) {
+    return response(result.model, frf.frequency_hz.segment(block.first_line, block.lines),
+                    result.model.hold, block.first_channel, block.channels);
+  };
+}
+
 /// Why the residual is clearly larger than noise and known distortion, with advice; else nothing.
 std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOptions& options,
                                          ModeNumber number, bool cut_short,
                                          const FitResult& result) {
-  const auto model = [&](const ResponseBlock& block) {
-    return response(result.model, frf.frequency_hz.segment(block.first_line, block.lines),
-                    result.model.hold, block.first_channel, block.channels);
-  };
-  const ResidualVerdict verdict =
-      judge_residual(frf, model, *options.user_weights, options.threads, {}, options.team);
+  const ResidualVerdict verdict = judge_residual(
+      frf, response_of(result, frf), *options.user_weights, options.threads, {}, options.team);
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);
@@ -194,6 +200,27 @@ std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOption
   if (!cut_short) reason = with_advice(std::move(reason), frf, options, result, number, false);
   if (reason.what == verdict.reason) reason.what += ": the model does not explain the data";
   return reason;
+}
+
+/// The fit again, with the residual's lines counted as fewer independent ones if its noise is alike on neighbouring
+/// lines: what looks like a mode then costs more, and all deviations are larger.
+std::optional<FitResult> fit_with_fewer_lines(const FrfEstimate& frf,
+                                              const RequestedStructure& structure,
+                                              const ModeSelection& selection,
+                                              const FitOptions& options, const FitResult& result) {
+  if (!weighs_by_variance(options.weighting) || !options.uncertainty) return std::nullopt;
+  const double correlated = lines_per_independent(
+      frf, response_of(result, frf),
+      options.weighting == Weighting::total_variance ? frf.total_variance : frf.noise_variance);
+  if (correlated < kAlike * frf.correlated_lines) return std::nullopt;
+  FrfEstimate counted = frf;
+  counted.correlated_lines = correlated;
+  FitResult again = structured_fit(counted, structure, selection, options);
+  again.decisions.insert(again.decisions.begin(),
+                         fmt::format("the noise is alike on neighbouring lines: of {:.3g} lines, "
+                                     "one counts; deviations are {:.3g} times larger",
+                                     correlated, std::sqrt(correlated)));
+  return again;
 }
 
 }  // namespace
@@ -249,6 +276,10 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   }
   evidence.unexplained = why_unexplained(
       frf, options, evidence.number, evidence.limit.has_value() || ended_by_limit(result), result);
+  if (!evidence.unexplained && !evidence.limit)
+    if (std::optional<FitResult> again =
+            fit_with_fewer_lines(frf, structure, selection, asked, result))
+      return *std::move(again);
   judge(frf, evidence, result);
   if (options.uncertainty) fill_shape_deviations(frf, options, result);
   if (options.covariance) fill_covariance(frf, options, result);

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "estimation/modal/residual_verdict.hpp"
+
+namespace stageid {
+
+/// Of so many neighbouring lines of a residual, one is independent: 1 + 2 sum rho(lag), with the real part rho of the
+/// autocorrelation over the lines, up to the first lag where it is not clearly positive. The noise of lines is alike
+/// where they were interpolated, smoothed, or computed from a record padded with zeros. At least 1.
+/// @param variance n_c x N of the noise; empty: 1 is returned
+double lines_per_independent(const FrfEstimate& frf, const ModelBlockResponse& model,
+                             const Eigen::MatrixXd& variance);
+
+}  // namespace stageid
