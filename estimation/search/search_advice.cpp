@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/model/cmif.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
@@ -22,8 +23,6 @@
 namespace stageid {
 namespace {
 
-constexpr double kMostOfCost = 0.5;  // one end of the band has more than the rest
-constexpr double kSmallEnd = 0.25;   // of the lines
 constexpr double kMoreBudget = 4.0;  // factor for the next budget to try
 constexpr double kNoiseOnly = 2.0;   // |G|^2 over its variance: the response is below the noise
 constexpr double kMostLines = 0.5;
@@ -154,24 +153,26 @@ void advise_structure(const FrfEstimate& frf, const FitOptions& options, const F
   if (!places.empty()) reason.what += ": modes are missing at " + places;
 }
 
-/// The band without its worse end, if the smaller part of the lines has the larger part of the cost.
-void advise_band(const FrfEstimate& frf, const FitOptions& trial, const FitResult& fit,
-                 FitReason& reason) {
-  const Eigen::VectorXd squares =
-      squares_of_lines(frf, fit.model, trial.user_weights, *trial.workers().team);
-  const auto end = static_cast<Eigen::Index>(kSmallEnd * static_cast<double>(frf.lines()));
-  const double most = kMostOfCost * squares.sum();
-  const Eigen::Index last = frf.lines() - 1;
-  if (end < 1) return;
-  const auto advise = [&](double low_hz, double high_hz, const char* which) {
-    reason.flags = fmt::format("--band {:.6g} {:.6g}", low_hz, high_hz);
-    reason.remedy = fmt::format("The {} quarter of the lines causes most of the cost: try {}",
-                                which, reason.flags);
-  };
-  if (squares.head(end).sum() > most)
-    advise(frf.frequency_hz[end], frf.frequency_hz[last], "lowest");
-  else if (squares.tail(end).sum() > most)
-    advise(frf.frequency_hz[0], frf.frequency_hz[last - end], "highest");
+/// If the complex conjugate of the response fits clearly better from the same start.
+std::string of_reversed_time(const FrfEstimate& frf, const FitOptions& trial,
+                             const AdditiveModel& model) {
+  AdditiveModel start = model;
+  std::erase_if(start.submodels, is_searched_mode);
+  for (const ModeCandidate& mode : pick_modes(frf))
+    start.submodels.push_back(mode_submodel(frf, structure_of(model), mode));
+  const FitResult as_measured = fit_additive_model(frf, start, trial);
+  FrfEstimate reversed = frf;
+  reversed.response = frf.response.conjugate();
+  start.input_delay_s *= -1.0;
+  start.output_delay_s *= -1.0;
+  const FitResult fit = fit_additive_model(reversed, start, trial);
+  if (fit.status() == FitStatus::singular ||
+      !(2.0 * fit.model.fit.cost < as_measured.model.fit.cost))
+    return {};
+  return fmt::format(
+      "The complex conjugate of the response fits better (squared residual {:.6g} instead of "
+      "{:.6g}): the recorder may use the other sign of time, or the plant is unstable",
+      fit.model.fit.cost, as_measured.model.fit.cost);
 }
 
 }  // namespace
@@ -187,10 +188,12 @@ FitReason with_advice(FitReason reason, const FrfEstimate& frf, const FitOptions
   with_deviations.uncertainty = true;
   with_deviations.response_variance = false;
   const FitResult same = fit_additive_model(frf, fit.model, with_deviations);
+  if (!cut_short) reason.remedy = of_reversed_time(frf, trial, same.model);
+  if (!reason.remedy.empty()) return reason;
   advise_structure(frf, options, trial, same, number, cut_short, reason);
-  if (reason.flags.empty()) advise_band(frf, trial, same, reason);
   if (reason.flags.empty())
-    reason.remedy = "No other structure fits better: give the number of modes with --modes N";
+    reason.remedy =
+        "No other structure fits better: look there for disturbed lines or a disturbed channel";
   return reason;
 }
 

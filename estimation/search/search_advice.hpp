@@ -8,10 +8,10 @@ namespace stageid {
 
 /// Adds to a reason the request that would fit the data better. Determined by trial, in this order:
 ///   channels whose response is noise on most lines        -> exclude them
+///   the complex conjugate fits better                     -> a warning
 ///   one refit of the model per alternative structure, and one with the modes that the residual shows
 ///                                                         -> the one of least BIC, if better than the model itself
-///   one end of the band has most of the residual          -> the band without it
-///   otherwise                                             -> request a number of modes
+///   otherwise                                             -> look at the data
 /// @param number how the number of modes was determined; if by a search, more modes are not advised
 /// @param cut_short the search ended early: then neither
 FitReason with_advice(FitReason reason, const FrfEstimate& frf, const FitOptions& options,
