@@ -219,6 +219,17 @@ TEST(StartTransient, AStrongStartIsTestedAgainstWhatTheRunsDifferBy) {
   }
 }
 
+// What is gone after one used period scatters the periods as noise does, so the deviations contain it, however large it was.
+TEST(StartTransient, AFastDecayShiftsByTheSameDeviationsHoweverStrong) {
+  const auto figure = [](double start) {
+    const std::vector<Finding> found =
+        of_change([start](int p) { return start * std::pow(0.02, p); }, 1);
+    return found.size() == 1 ? found[0].figure : "";
+  };
+  EXPECT_NE(figure(1e4), "");
+  EXPECT_EQ(figure(1e4), figure(1e6));
+}
+
 // A mode that rings below the first line does no harm to the others, but a loop that oscillates there does.
 TEST(StartTransient, AtAnEndOfTheLinesOnlyALimitCycleIsAFault) {
   for (const bool cycle : {false, true})
