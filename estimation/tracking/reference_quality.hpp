@@ -8,7 +8,7 @@ namespace stageid {
 struct ReferenceQuality {
   /// Mean square of the constant residual, relative to noise alone: 1 for an exact model, by sensor.
   Eigen::VectorXd chi_square;
-  /// rms of the constant residual over that of the output, without noise.
+  /// rms over the lines of the constant residual relative to the output, without noise.
   Eigen::VectorXd relative_error;
   /// The same of the model itself, without tracked changes.
   Eigen::VectorXd model_error;

@@ -209,11 +209,18 @@ void TrackingReference::judge(const PeriodSpectra& mean) {
   const Eigen::VectorXd white = whitened(residual_);
   const Eigen::MatrixXd squares = white.cwiseAbs2().reshaped(n_y, white.size() / n_y);
   quality_.chi_square = periods_ * squares.rowwise().mean();
-  const Eigen::ArrayXd noise =
-      residual_.rowwise().squaredNorm().array() / quality_.chi_square.array().max(1.0);
+  const Eigen::ArrayXXd noise =
+      residual_.cwiseAbs2().array().colwise() / quality_.chi_square.array().max(1.0);
+  // Line by line, so that a resonance counts as well as the rigid body, whose response may be a thousand times larger;
+  // lines on which noise hides the response count little.
+  const Eigen::ArrayXXd power = mean.Y.cwiseAbs2().array() + noise;
+  const Eigen::ArrayXd of_noise = (noise / power).rowwise().sum();
+  const Eigen::ArrayXd of_response = (static_cast<double>(noise.cols()) - 2.0 * of_noise).max(1.0);
+  // Three standard deviations of the sum over the lines.
+  const Eigen::ArrayXd chance = 3.0 / std::sqrt(static_cast<double>(noise.cols())) * of_noise;
   const auto relative = [&](const Eigen::MatrixXcd& e) -> Eigen::VectorXd {
-    const Eigen::ArrayXd excess = e.rowwise().squaredNorm().array() - noise;
-    return (excess.max(0.0) / mean.Y.rowwise().squaredNorm().array()).sqrt();
+    const Eigen::ArrayXd excess = (e.cwiseAbs2().array() / power).rowwise().sum() - of_noise;
+    return (excess > chance).select((excess / of_response).sqrt(), 0.0);
   };
   quality_.relative_error = relative(residual_);
   quality_.model_error = relative(residual(mean, response_.at(Eigen::VectorXd::Zero(x_.size()))));

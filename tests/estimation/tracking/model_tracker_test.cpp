@@ -135,6 +135,14 @@ TEST(ModelTracker, AWrongResidueShowsInTheReferenceAndCausesNoAlarms) {
   EXPECT_LT(w.tracker.reference().relative_error[1], 0.3);
 }
 
+// A resonance is a small part of the power of the response, and a large one of what the model is for.
+TEST(ModelTracker, AModeElsewhereIsALargeErrorOfTheModel) {
+  Watched w(3);
+  w.become([](StageProperties& stage) { stage.frequency_hz[3] *= 1.1; });
+  w.watch(32);
+  EXPECT_GT(w.tracker.reference().model_error.maxCoeff(), 0.2);
+}
+
 TEST(ModelTracker, TheErrorOfTheModelIsThatBeforeTrackedChanges) {
   Watched w(3);
   w.become([](StageProperties& stage) { stage.sensor_gain[1] = 1.4; });
