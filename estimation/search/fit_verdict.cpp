@@ -121,6 +121,21 @@ void add_late(const ChannelList& channels, const Eigen::VectorXd& delay_s,
   }
 }
 
+/// If the one estimated delay is clearly negative.
+std::string acausal_delay(const FitResult& fit) {
+  const AdditiveModel& model = fit.model;
+  if (fit.delay != DelayModel::estimate || model.input_delay_std_s.size() == 0) return {};
+  const double delay_s = model.mean_delay_s();
+  const double least_s =
+      std::max(kClearly * model.input_delay_std_s[0],
+               model.sample_rate_hz > 0.0 ? kLeastSamples / model.sample_rate_hz : 0.0);
+  if (!(delay_s < -least_s)) return {};
+  return fmt::format(
+      "the delay is negative, {:.4g} us: the outputs come before the inputs. Check the timing of "
+      "the recorder, and use --hold none if the inputs were measured rather than held",
+      1e6 * delay_s);
+}
+
 }  // namespace
 
 double pole_doubt(const FitResult& fit, std::size_t submodel) {
@@ -228,6 +243,8 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
     fit.model.fit.distrust(*evidence.limit);
   }
   if (!evidence.late_channels.empty()) tell(evidence.late_channels);
+  if (!evidence.overestimated.empty()) tell(evidence.overestimated);
+  if (const std::string why = acausal_delay(fit); !why.empty()) tell(why);
   if (evidence.unexplained) {
     fit.decisions.push_back(evidence.unexplained->text());
     fit.findings.insert(fit.findings.begin(), evidence.unexplained->text());

@@ -35,6 +35,7 @@ struct FitEvidence {
   std::optional<FitReason> limit = {};  ///< the search was interrupted or reached its budget
   std::string late_channels = {};
   std::optional<FitReason> unexplained = {};  ///< by noise and known distortion
+  std::string overestimated = {};             ///< variances
 };
 
 /// The largest standard deviation of a pole: of its damping ratio relative to itself, or of its frequency relative to

@@ -182,11 +182,9 @@ ModelBlockResponse response_of(const FitResult& result, const FrfEstimate& frf) 
 }
 
 /// Why the residual is clearly larger than noise and known distortion, with advice; else nothing.
-std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOptions& options,
-                                         ModeNumber number, bool cut_short,
-                                         const FitResult& result) {
-  const ResidualVerdict verdict = judge_residual(
-      frf, response_of(result, frf), *options.user_weights, options.threads, {}, options.team);
+std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const ResidualVerdict& verdict,
+                                         const FitOptions& options, ModeNumber number,
+                                         bool cut_short, const FitResult& result) {
   const bool by_weights = verdict.variance != ResidualVariance::total ||
                           (options.weighting != Weighting::noise_variance &&
                            options.weighting != Weighting::likelihood);
@@ -200,6 +198,19 @@ std::optional<FitReason> why_unexplained(const FrfEstimate& frf, const FitOption
   if (!cut_short) reason = with_advice(std::move(reason), frf, options, result, number, false);
   if (reason.what == verdict.reason) reason.what += ": the model does not explain the data";
   return reason;
+}
+
+/// If the residual is less than half of what the variances predict.
+std::string why_overestimated(const FrfEstimate& frf, const ResidualVerdict& verdict,
+                              const FitResult& result) {
+  const double free = 1.0 - static_cast<double>(result.parameters) /
+                                (2.0 * static_cast<double>(frf.response.size()));
+  const double ratio = verdict.chi_square / (verdict.expected * std::max(free, 0.0));
+  if (!verdict.explained || !(ratio < 0.5)) return {};
+  return fmt::format(
+      "the residual is only {:.2g} of what the variances predict: they are too large, and the "
+      "deviations are about {:.2g} times too large",
+      ratio, 1.0 / std::sqrt(ratio));
 }
 
 /// The fit again, with the residual's lines counted as fewer independent ones if its noise is alike on neighbouring
@@ -274,8 +285,12 @@ FitResult structured_fit(const FrfEstimate& frf, const RequestedStructure& struc
   if (options.limit->was_interrupted() && !evidence.limit) {
     evidence.limit = FitReason{FitStatus::interrupted, options.limit->message()};
   }
-  evidence.unexplained = why_unexplained(
-      frf, options, evidence.number, evidence.limit.has_value() || ended_by_limit(result), result);
+  const ResidualVerdict residual = judge_residual(
+      frf, response_of(result, frf), *options.user_weights, options.threads, {}, options.team);
+  evidence.unexplained =
+      why_unexplained(frf, residual, options, evidence.number,
+                      evidence.limit.has_value() || ended_by_limit(result), result);
+  evidence.overestimated = why_overestimated(frf, residual, result);
   if (!evidence.unexplained && !evidence.limit)
     if (std::optional<FitResult> again =
             fit_with_fewer_lines(frf, structure, selection, asked, result))

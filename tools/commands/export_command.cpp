@@ -64,6 +64,19 @@ Eigen::VectorXd lines_of(const ExportFlags& flags, const AdditiveModel& model) {
                      : frf.frequency_hz;
 }
 
+/// Also of an unstable mode: a simulation or an observer with it runs away.
+void warn_if_doubtful(const AdditiveModel& model, const std::filesystem::path& file,
+                      Console& console) {
+  if (!model.fit.trustworthy())
+    console.warning("{}: the fit is not to be trusted: {}", file.string(),
+                    model.fit.why().front().what);
+  for (const Submodel& s : model.submodels)
+    if (s.is_mode() && s.damping_ratio() < 0.0)
+      return console.warning(
+          "{}: the mode at {:.6g} Hz is unstable (damping ratio {:.3g}); do not simulate the model",
+          file.string(), s.natural_frequency_hz(), s.damping_ratio());
+}
+
 /// The loop of the model with the controller of a stage file.
 void export_controller_view(const ExportFlags& flags, Console& console) {
   if (!flags.driving_point.empty())
@@ -75,6 +88,7 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   if (frequency_hz.size() == 0)
     fail_request("{}: the model does not contain its band; define the lines with --frf FRF",
                  flags.input.string());
+  warn_if_doubtful(model, flags.input, console);
   const StageConfig stage = load_stage_config(flags.stage);
   Eigen::MatrixXd covariance;
   if (!flags.covariance.empty()) covariance = read_covariance(flags.covariance, model);
@@ -94,21 +108,11 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
       flags.stage.string());
 }
 
-/// A simulation or an observer with such a mode runs away.
-void warn_if_unstable(const AdditiveModel& model, const std::filesystem::path& file,
-                      Console& console) {
-  for (const Submodel& s : model.submodels)
-    if (s.is_mode() && s.damping_ratio() < 0.0)
-      return console.warning(
-          "{}: the mode at {:.6g} Hz is unstable (damping ratio {:.3g}); do not simulate the model",
-          file.string(), s.natural_frequency_hz(), s.damping_ratio());
-}
-
 void export_from_model(const ExportFlags& flags, Console& console) {
   require_export_format(flags.output);
   require_no_input(flags.output, {flags.input, flags.frf});
   const AdditiveModel model = read_model(flags.input);
-  warn_if_unstable(model, flags.input, console);
+  warn_if_doubtful(model, flags.input, console);
   ExportedResponse exported;
   exported.frequency_hz = lines_of(flags, model);
   std::optional<DrivingPoint> driving_point;
