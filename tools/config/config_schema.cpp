@@ -6,85 +6,22 @@
 #include <algorithm>
 #include <tuple>
 
-#include "tools/config/number_range.hpp"
-
 namespace stageid {
 namespace {
 
 class SchemaCollector final : public ConfigVisitor {
  public:
-  void number(const char* key, double& value, const NumberRule& rule, Presence presence,
-              const char* help) override {
-    add(key, "number", fmt::format("{}", value), presence, help, describe_range(rule), rule.unit);
-  }
-  void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
-               CountRule count, Presence presence, const char* help) override {
-    add(key, fmt::format("list of numbers, {}", describe_count(count)),
-        fmt::format("[{}]", fmt::join(values, ", ")), presence, help, describe_range(rule),
-        rule.unit);
-  }
-  void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
-               Presence presence, const char* help) override {
-    add(key, "whole number", fmt::format("{}", value), presence, help, describe_range(low, high));
-  }
-  void text(const char* key, std::string& value, Presence presence, const char* help) override {
-    add(key, "text", value, presence, help);
-  }
-  void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
-             const char* help) override {
-    add(key, fmt::format("list of texts, {}", describe_count(count)),
-        fmt::format("[{}]", fmt::join(values, ", ")), presence, help);
-  }
-  void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
-              Presence presence, const char* help) override {
-    add(key, fmt::format("{}{}", names.size() > 1 ? "one of " : "", fmt::join(names, ", ")),
-        names.at(index), presence, help);
-  }
-  void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
-                const char* help) override {
-    const std::string numbers =
-        value.numbers.empty() ? "" : fmt::format("{}", value.numbers.front());
-    // The range is included in the form.
-    add(key, describe_forms(rule), value.word.empty() ? numbers : value.word, presence, help, "",
-        rule.rule.unit);
-  }
-  void named_numbers(const char* key, std::vector<std::pair<std::string, double>>&,
-                     const NumberRule& rule, Presence presence, const char* help) override {
-    add(key, "map of name: number", "{}", presence, help, describe_range(rule), rule.unit);
-  }
-  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>&,
-                   Presence presence, const char* help) override {
-    add(key, "map of name: text", "{}", presence, help);
-  }
-  void group(const char* key, const Describe& describe, Presence presence,
-             const char* help) override {
-    add(key, "map", "", presence, help);
-    descend(describe);
-  }
-  void group_or_text(const char* key, const Describe& describe, std::string&, Presence presence,
-                     const char* help) override {
-    add(key, "map or text", "", presence, help);
-    descend(describe);
-  }
-  void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
-             const char* help) override {
-    add(key, fmt::format("list of maps, {}", describe_count(count)), "[]", presence, help);
-    descend(describe_item);
-  }
   void require(bool, const char*, const std::string&) override {}
-
   std::vector<SchemaEntry> take() { return std::move(entries_); }
 
  private:
-  void add(const char* key, std::string type, std::string default_value, Presence presence,
-           const char* help, std::string range = {}, std::string_view unit = {}) {
-    const bool required = presence == Presence::required;
-    entries_.push_back({depth_, key, std::move(type), std::string(unit), std::move(range),
-                        required ? "" : std::move(default_value), required, help});
-  }
-  void descend(const Describe& describe) {
+  void visit(const Key& key, const std::function<void(const ConfigValue&)>&) override {
+    const bool required = key.presence == Presence::required;
+    entries_.push_back({depth_, key.key, key.type, std::string(key.unit), key.range,
+                        required ? "" : key.default_value, required, key.help});
+    if (key.inner == nullptr) return;
     ++depth_;
-    describe(*this);
+    (*key.inner)(*this);
     --depth_;
   }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "excitation/words/words.hpp"
+#include "tools/config/yaml_document.hpp"
 
 namespace stageid {
 
@@ -55,6 +56,9 @@ struct FlexibleRule {
   NumberRule rule = {};  ///< of every number
 };
 
+/// The value of a key in a file.
+struct ConfigValue;
+
 /// The single description of a configuration: functions `describe(ConfigVisitor&, Config&)` name every key once. A
 /// reader fills the values from a file; a schema printer prints type, unit, range and default, the initial value.
 class ConfigVisitor {
@@ -62,38 +66,55 @@ class ConfigVisitor {
   using Describe = std::function<void(ConfigVisitor&)>;
   virtual ~ConfigVisitor() = default;
 
-  virtual void number(const char* key, double& value, const NumberRule& rule, Presence presence,
-                      const char* help) = 0;
-  virtual void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
-                       CountRule count, Presence presence, const char* help) = 0;
-  virtual void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
-                       Presence presence, const char* help) = 0;
-  virtual void text(const char* key, std::string& value, Presence presence, const char* help) = 0;
-  virtual void texts(const char* key, std::vector<std::string>& values, CountRule count,
-                     Presence presence, const char* help) = 0;
+  void number(const char* key, double& value, const NumberRule& rule, Presence presence,
+              const char* help);
+  void numbers(const char* key, std::vector<double>& values, const NumberRule& rule,
+               CountRule count, Presence presence, const char* help);
+  void integer(const char* key, std::int64_t& value, std::int64_t low, std::int64_t high,
+               Presence presence, const char* help);
+  void text(const char* key, std::string& value, Presence presence, const char* help);
+  void texts(const char* key, std::vector<std::string>& values, CountRule count, Presence presence,
+             const char* help);
   /// `index` into `names`.
-  virtual void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
-                      Presence presence, const char* help) = 0;
-  virtual void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule,
-                        Presence presence, const char* help) = 0;
+  void choice(const char* key, std::size_t& index, const std::vector<std::string>& names,
+              Presence presence, const char* help);
+  void flexible(const char* key, FlexibleValue& value, const FlexibleRule& rule, Presence presence,
+                const char* help);
   /// A map with arbitrary names as keys.
-  virtual void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
-                             const NumberRule& rule, Presence presence, const char* help) = 0;
-  virtual void named_texts(const char* key,
-                           std::vector<std::pair<std::string, std::string>>& values,
-                           Presence presence, const char* help) = 0;
+  void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values,
+                     const NumberRule& rule, Presence presence, const char* help);
+  void named_texts(const char* key, std::vector<std::pair<std::string, std::string>>& values,
+                   Presence presence, const char* help);
   /// A map with described keys.
-  virtual void group(const char* key, const Describe& describe, Presence presence,
-                     const char* help) = 0;
+  void group(const char* key, const Describe& describe, Presence presence, const char* help);
   /// A map with described keys, or a text.
-  virtual void group_or_text(const char* key, const Describe& describe, std::string& text,
-                             Presence presence, const char* help) = 0;
+  void group_or_text(const char* key, const Describe& describe, std::string& text,
+                     Presence presence, const char* help);
   /// A list of maps; `describe_item` is called once per item.
-  virtual void items(const char* key, const Describe& describe_item, CountRule count,
-                     Presence presence, const char* help) = 0;
+  void items(const char* key, const Describe& describe_item, CountRule count, Presence presence,
+             const char* help);
   /// A rule between values: unless `holds`, reports an error at `key`. Ignored for a schema.
   virtual void require(bool holds, const char* key, const std::string& message) = 0;
+
+ protected:
+  struct Key {
+    const char* key;
+    Presence presence;
+    const char* help;
+    std::string type;
+    std::string default_value;
+    std::string range = {};
+    std::string_view unit = {};
+    const Describe* inner = nullptr;  ///< of a map, or of each item
+  };
+  /// Calls take() with the value if the file has one.
+  virtual void visit(const Key& key, const std::function<void(const ConfigValue&)>& take) = 0;
 };
+
+/// Fills a configuration from a document. Every key must be known, every required key must be present, and every value
+/// must have its type and range.
+/// @throws FormatErrors, each "FILE:LINE:COLUMN: problem; remedy".
+void read_config(const YamlDocument& document, const ConfigVisitor::Describe& describe);
 
 /// choice() among the words of an enumeration.
 template <HasWords Enum>

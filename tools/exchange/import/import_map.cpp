@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "acquisition/files/counted.hpp"
-#include "tools/config/config_reader.hpp"
+#include "tools/config/config_visitor.hpp"
 
 namespace stageid {
 namespace {

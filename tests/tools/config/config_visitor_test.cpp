@@ -1,4 +1,4 @@
-#include "tools/config/config_reader.hpp"
+#include "tools/config/config_visitor.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "tools/config/config_schema.hpp"
 #include "tools/terminal/format_errors.hpp"
 
-namespace stageid::test_config_reader {
+namespace stageid::test_config_visitor {
 
 using testing::HasSubstr;
 
@@ -227,4 +227,4 @@ TEST(ConfigSchema, WritesTheKeysOfEqualGroupsOnce) {
             "keys:                        # settings (map of name: text; default {})\n");
 }
 
-}  // namespace stageid::test_config_reader
+}  // namespace stageid::test_config_visitor
