@@ -3,12 +3,24 @@
 #include <fftw3.h>
 
 #include <algorithm>
+#include <mutex>
 #include <new>
 
-#include "excitation/multisine/fft_planner.hpp"
 #include "excitation/words/require.hpp"
 
 namespace stageid {
+namespace {
+
+/// FFTW's planner has global state and allows one thread at a time; plans may be executed concurrently.
+std::mutex& planner_lock() {
+  static std::mutex lock;
+  return lock;
+}
+
+/// FFTW_MEASURE would select algorithms by timing, and the bytes of results would change from run to run.
+constexpr unsigned kPlanning = FFTW_ESTIMATE;
+
+}  // namespace
 
 RealDft::RealDft(int length)
     : length_(length), real_(nullptr, &fftw_free), half_(nullptr, &fftw_free) {
@@ -19,15 +31,15 @@ RealDft::RealDft(int length)
   half_.reset(reinterpret_cast<std::complex<double>*>(half));
   if (!real_ || !half_) throw std::bad_alloc();
   {
-    const std::lock_guard guard(fft_planner().lock);
-    forward_.reset(fftw_plan_dft_r2c_1d(length, real_.get(), half, fft_planner().flags));
-    inverse_.reset(fftw_plan_dft_c2r_1d(length, half, real_.get(), fft_planner().flags));
+    const std::lock_guard guard(planner_lock());
+    forward_.reset(fftw_plan_dft_r2c_1d(length, real_.get(), half, kPlanning));
+    inverse_.reset(fftw_plan_dft_c2r_1d(length, half, real_.get(), kPlanning));
   }
   if (!forward_ || !inverse_) throw std::bad_alloc();
 }
 
 void RealDft::Destroy::operator()(fftw_plan_s* plan) const {
-  const std::lock_guard guard(fft_planner().lock);
+  const std::lock_guard guard(planner_lock());
   fftw_destroy_plan(plan);
 }
 

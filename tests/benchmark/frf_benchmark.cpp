@@ -4,18 +4,14 @@
 //
 // spectra_of_30_channels over fftw_alone_30_channels is the share of FFTW's own rate: the same
 // transforms by the best plan that FFTW finds by timing, without copies, and nothing done with them.
-// Argument 1 of the former: with plans from `frf --fft-wisdom`.
 #include <benchmark/benchmark.h>
 #include <fftw3.h>
 
 #include <numeric>
-#include <optional>
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/run_steps.hpp"
-#include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/closed_loop.hpp"
-#include "tools/steps/fft_wisdom_file.hpp"
 
 namespace stageid {
 namespace {
@@ -95,9 +91,6 @@ void spectra_of_30_channels(benchmark::State& state) {
   std::vector<int> lines;
   for (int line = 1; line < 8000; line += 2) lines.push_back(line);
   Eigen::MatrixXcd spectra(kChannels, static_cast<Eigen::Index>(lines.size()));
-  const test::TemporaryDirectory directory;
-  std::optional<FftWisdomFile> timed;
-  if (state.range(0) == 1) timed.emplace(directory / "wisdom");
   RealDft dft(kPeriod);
   for (auto _ : state) {
     line_spectra(samples, channels, lines, 0, dft, spectra);
@@ -105,7 +98,7 @@ void spectra_of_30_channels(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * kChannels * kPeriod);
 }
-BENCHMARK(spectra_of_30_channels)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(spectra_of_30_channels)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// Argument 0: one channel again and again, from the cache; 1: the 30 channels, from memory.
 void fftw_alone_30_channels(benchmark::State& state) {

@@ -20,7 +20,6 @@
 #include "frf/statistics/order_statistic.hpp"
 #include "tools/commands/command_line.hpp"
 #include "tools/fit/frf_quality.hpp"
-#include "tools/steps/fft_wisdom_file.hpp"
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -71,7 +70,6 @@ struct FrfFlags {
   std::vector<std::filesystem::path> logs;
   std::filesystem::path output;
   std::filesystem::path stage;
-  std::filesystem::path fft_wisdom;
   bool no_health = false;
   FrfOptions options;
   std::vector<int> realizations;  ///< counted from 1, unlike those of `options`
@@ -93,14 +91,8 @@ void estimate_response(const FrfFlags& flags, Console& console) {
         "--delay");
   require_writable(flags.output, flags.logs);
   require_frf_ending(flags.output);
-  if (!flags.fft_wisdom.empty() && console.team->size() > 1)
-    fail_request(
-        "--fft-wisdom: each process would time its own plans; omit it, or use one process");
-  std::optional<FftWisdomFile> wisdom;
-  if (!flags.fft_wisdom.empty()) wisdom.emplace(flags.fft_wisdom);
   options.team = console.team;
   FrfStep step = estimate_frf(flags.logs, options, {!flags.no_health, flags.stage}, console);
-  if (wisdom) note_fft_plans(step.frf, wisdom->save());
   std::vector<std::string> notes = dropped_lines(step.frf);
   if (flags.compensate != Compensation::none) {
     const double delay_s = flags.delay_s ? *flags.delay_s : declared_delay_s(flags.logs.front());
@@ -166,8 +158,6 @@ void frf_command(CLI::App& app, Console& console) {
       "--stage", flags.stage,
       "stage or controller file for the health checks; default: the one stored in the log");
   command.add_flag("--no-health", flags.no_health, "skip the health checks of the data");
-  add_value(command, "--fft-wisdom", flags.fft_wisdom, "FILE",
-            "file of FFT plans: its plans are reused; missing ones are found by timing and added");
   add_threads(command, flags.options.threads);
 }
 

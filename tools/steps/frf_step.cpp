@@ -57,12 +57,6 @@ std::string complete_provenance(const FrfEstimate& frf, const std::vector<const 
 
 }  // namespace
 
-void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint) {
-  Json provenance = Json::parse(frf.provenance_json);
-  provenance["fft_plans"] = fingerprint;
-  frf.provenance_json = json_line(provenance);
-}
-
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options) {
   Json request = {{"version", version()}, {"options", options_json(options)}};
   for (const LogReader* log : logs) request["experiments"].push_back(lasting_metadata(*log));

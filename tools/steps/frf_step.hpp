@@ -36,9 +36,6 @@ FrfStep estimate_frf(const std::vector<const LogReader*>& logs, FrfOptions optio
 FrfStep estimate_frf(const std::vector<std::filesystem::path>& files, const FrfOptions& options,
                      const HealthRequest& health, const Console& console);
 
-/// Adds to the provenance which timed FFT plans were used ("fft_plans"), because rounding depends on them.
-void note_fft_plans(FrfEstimate& frf, const std::string& fingerprint);
-
 /// Identifies a request: version, options and the experiment metadata of the logs. Two estimates with equal identity
 /// from the same samples are equal.
 std::string frf_request_id(const std::vector<const LogReader*>& logs, const FrfOptions& options);
