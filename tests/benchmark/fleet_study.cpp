@@ -106,12 +106,12 @@ class Design {
   std::vector<StoredMode> modes_;
 };
 
-void time_query(const Database& database, const char* what, const std::string& sql) {
+void time_query(Database& database, const char* what, const std::string& sql) {
   std::size_t rows = 0;
   const double processor = processor_seconds();
   const double seconds = seconds_of([&] {
-    Statement statement = database.prepare(sql);
-    while (statement.step()) ++rows;
+    const auto statement = database.prepare(sql);
+    while (statement->step()) ++rows;
   });
   fmt::print("query {}: {} rows in {:.3f} s, {:.3f} s of processor time\n", what, rows, seconds,
              processor_seconds() - processor);
@@ -126,7 +126,7 @@ int study(int argc, char** argv) {
   const int stages = std::atoi(argv[2]);
   const int days = std::atoi(argv[3]);
   const bool made = std::filesystem::exists(file);
-  FleetStore store(file, Database::Access::create);
+  FleetStore store(file, DatabaseAccess::create);
   if (!made) {
     Design design(std::atoi(argv[4]));
     const double all = static_cast<double>(stages) * days;
@@ -150,13 +150,13 @@ int study(int argc, char** argv) {
     fmt::print("pairing: {:.1f} s, {:.0f} identifications per second, {:.1f} s of processor time\n",
                pairing, all / pairing, processor_seconds() - processor);
   }
-  const Database& database = store.database();
+  Database& database = store.database();
   double bytes = 0.0;
   if (is_database_url(file)) {
-    Statement size = database.prepare(
+    const auto size = database.prepare(
         "SELECT SUM(pg_total_relation_size(oid)) FROM pg_class "
         "WHERE relnamespace = current_schema()::regnamespace AND relkind = 'r'");
-    if (size.step()) bytes = size.number(0);
+    if (size->step()) bytes = size->number(0);
   } else {
     database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
     bytes = static_cast<double>(std::filesystem::file_size(file));

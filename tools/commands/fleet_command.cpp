@@ -70,7 +70,7 @@ void run_jobs(const FleetFlags& flags, Console& console) {
   if (flags.slurm_tasks > 0 && submit_jobs(flags, config, logs, console)) return;
   say_at_interrupt("finished jobs are stored; run the command again to continue");
   const FleetSummary summary = run_fleet(config, logs, flags.workers, console);
-  FleetStore store(config.store, Database::Access::write);
+  FleetStore store(config.store, DatabaseAccess::write);
   pair_fleet(store);
   console.result("{}: {}: {} done before, {} done now, {} of them not trustworthy; {} failed",
                  shown_place(config.store), counted(summary.jobs, "job"), summary.done_before,
@@ -106,7 +106,7 @@ void run_job(const FleetJobFlags& flags, Console& console) {
     log.tags.emplace_back(tag.substr(0, at), tag.substr(at + 1));
   }
   require_readable(log.file);
-  FleetStore store(config.store, Database::Access::create);
+  FleetStore store(config.store, DatabaseAccess::create);
   const std::string fingerprint = log_fingerprint(store, log.file);
   const std::string job = job_id(fingerprint, config);
   bool added = false;
@@ -130,7 +130,7 @@ struct FleetAddFlags {
 void add_watched_log(const FleetAddFlags& flags, Console& console) {
   require_time("--time", flags.log.time_utc);
   require_readable(flags.log.file);
-  FleetStore store(flags.store, Database::Access::create);
+  FleetStore store(flags.store, DatabaseAccess::create);
   const std::size_t rows = add_watched(store, flags.log);
   console.result("{}: {} of stage '{}'", shown_place(flags.store), counted(rows, "watched value"),
                  flags.log.stage);
@@ -144,7 +144,7 @@ struct FleetReportFlags {
 };
 
 void report_fleet(const FleetReportFlags& flags, Console& console) {
-  FleetStore store(flags.store, Database::Access::write);
+  FleetStore store(flags.store, DatabaseAccess::write);
   require_ending(flags.request.output, "a page", {".html", ".htm"});
   require_writable(flags.request.output, {flags.store});
   require_time("--since", flags.request.since);
@@ -166,7 +166,7 @@ bool is_name(const std::string& text) {
   return text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string::npos;
 }
 
-void require_table(const Database& database, const std::string& name) {
+void require_table(Database& database, const std::string& name) {
   const std::vector<std::string> tables = database.tables();
   if (std::ranges::find(tables, name) == tables.end())
     fail_request("{}: unknown table '{}'; use one of {}, or an SQL statement", database.name(),
@@ -174,34 +174,35 @@ void require_table(const Database& database, const std::string& name) {
 }
 
 Json value_of(const Statement& row, int column) {
-  if (row.is_null(column)) return {};
-  if (row.is_integer(column)) return row.integer(column);
-  if (row.is_real(column)) return row.number(column);
+  const SqlKind kind = row.kind(column);
+  if (kind == SqlKind::null) return {};
+  if (kind == SqlKind::integer) return row.integer(column);
+  if (kind == SqlKind::real) return row.number(column);
   return row.text(column);
 }
 
 void query_fleet(const FleetQueryFlags& flags, Console& console) {
-  const FleetStore store(flags.store, Database::Access::read);
+  const FleetStore store(flags.store, DatabaseAccess::read);
   if (!flags.csv.empty()) {
     require_ending(flags.csv, "a table", {".csv"});
     require_writable(flags.csv, {flags.store});
   }
   if (is_name(flags.sql) && !flags.sql.starts_with("sqlite_"))
     require_table(store.database(), flags.sql);
-  Statement rows =
+  const auto rows =
       store.database().prepare(is_name(flags.sql) ? "SELECT * FROM " + flags.sql : flags.sql);
-  if (!rows.changes_nothing() || rows.columns() == 0)
+  if (!rows->changes_nothing() || rows->columns() == 0)
     fail_request("{}: expected a table or a SELECT statement", shown_place(flags.store));
   std::vector<std::vector<std::string>> table(1);
-  for (int c = 0; c < rows.columns(); ++c) table[0].push_back(rows.name(c));
+  for (int c = 0; c < rows->columns(); ++c) table[0].push_back(rows->name(c));
   Json list = Json::array();
-  while (rows.step()) {
+  while (rows->step()) {
     table.emplace_back();
     Json object = Json::object();
-    for (int c = 0; c < rows.columns(); ++c) {
-      const Json value = value_of(rows, c);
+    for (int c = 0; c < rows->columns(); ++c) {
+      const Json value = value_of(*rows, c);
       const bool rounded = value.is_number_float() && flags.csv.empty();
-      table.back().push_back(rounded ? fmt::format("{:.7g}", rows.number(c)) : rows.text(c));
+      table.back().push_back(rounded ? fmt::format("{:.7g}", rows->number(c)) : rows->text(c));
       if (console.json) object[table[0][c]] = value;
     }
     if (console.json) list.push_back(std::move(object));

@@ -10,9 +10,9 @@
 namespace stageid {
 
 std::string Statement::text(int column) const {
-  if (engine_->kind(column) != SqlKind::bytes) return engine_->text(column);
+  if (kind(column) != SqlKind::bytes) return text_of(column);
   std::string digits;
-  for (const std::byte byte : engine_->bytes(column))
+  for (const std::byte byte : bytes(column))
     digits += fmt::format("{:02x}", std::to_integer<unsigned>(byte));
   return digits;
 }
@@ -43,13 +43,9 @@ std::string shown_place(const std::filesystem::path& place) {
   return std::regex_replace(url, parameter, "$1...");
 }
 
-Database::Database(const std::filesystem::path& place, Access access)
-    : name_(shown_place(place)),
-      engine_(is_database_url(place) ? make_postgres_engine(place.string(), access)
-                                     : make_sqlite_engine(place, access)) {}
-
-Transaction::Transaction(const Database& database) : database_(database) {
-  database_.engine_->begin();
+std::unique_ptr<Database> open_database(const std::filesystem::path& place, DatabaseAccess access) {
+  return is_database_url(place) ? open_postgres(place.string(), access)
+                                : open_sqlite(place, access);
 }
 
 Transaction::~Transaction() {

@@ -9,54 +9,73 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
-
-#include "tools/database/database_engine.hpp"
 
 namespace stageid {
 
-/// One SQL statement, prepared once and executed repeatedly. Parameters are written as ?.
+/// A parameter of a statement; monostate: null.
+using SqlValue = std::variant<std::monostate, std::int64_t, double, std::string_view,
+                              std::span<const std::byte>>;
+
+enum class SqlKind : unsigned char { null, integer, real, text, bytes };
+
+/// How long a writer waits for another one.
+inline constexpr int kPatience_s = 60;
+/// @throws FileError: that was too short
+[[noreturn]] void fail_busy(const std::string& name);
+
+/// One SQL statement, prepared once and executed repeatedly. Parameters are written as ?. @throws as open_database()
 class Statement {
  public:
+  Statement() = default;
+  Statement(Statement&&) = delete;
+  virtual ~Statement() = default;
+
   /// Takes the parameters in order and is ready for step(). Numbers that are not finite are null.
   template <typename... Values>
   Statement& bind(const Values&... values) {
-    engine_->start(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
+    start(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
     return *this;
   }
-  /// The next row; false after the last one. @throws as Database
-  bool step() { return engine_->step(); }
+  /// The next row; false after the last one.
+  virtual bool step() = 0;
   /// For a statement without rows. Within a Transaction, an error may be thrown later, at the latest by commit().
   template <typename... Values>
   void run(const Values&... values) {
-    engine_->run(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
+    run_with(std::array<SqlValue, sizeof...(Values)>{sql_value(values)...});
   }
   /// The number in the first column of the first row; none if there is no row.
   template <typename... Values>
   std::optional<std::int64_t> first(const Values&... values) {
     std::optional<std::int64_t> out;
     if (bind(values...).step()) out = integer(0);
-    engine_->finish();
+    finish();
     return out;
   }
 
-  bool changes_nothing() const { return engine_->changes_nothing(); }
-  int columns() const { return engine_->columns(); }
-  std::string name(int column) const { return engine_->name(column); }
-  bool is_null(int column) const { return engine_->kind(column) == SqlKind::null; }
-  bool is_integer(int column) const { return engine_->kind(column) == SqlKind::integer; }
-  bool is_real(int column) const { return engine_->kind(column) == SqlKind::real; }
-  double number(int column) const { return engine_->number(column); }  ///< 0 for null
-  std::int64_t integer(int column) const { return engine_->integer(column); }
-  std::string text(int column) const;                   ///< bytes as hexadecimal digits
-  std::span<const std::byte> bytes(int column) const {  ///< until the next bytes() or step()
-    return engine_->bytes(column);
-  }
+  virtual bool changes_nothing() const = 0;
+  virtual int columns() const = 0;
+  virtual std::string name(int column) const = 0;
+  // Of the current row.
+  virtual SqlKind kind(int column) const = 0;
+  bool is_null(int column) const { return kind(column) == SqlKind::null; }
+  virtual double number(int column) const = 0;  ///< 0 for null
+  virtual std::int64_t integer(int column) const = 0;
+  std::string text(int column) const;  ///< bytes as hexadecimal digits
+  /// Until the next bytes() or step().
+  virtual std::span<const std::byte> bytes(int column) const = 0;
+
+ protected:
+  /// Ready for step() with these parameters, which it does not need any more afterwards.
+  virtual void start(std::span<const SqlValue> parameters) = 0;
+  virtual void run_with(std::span<const SqlValue> parameters) = 0;
+  /// Gives up the rows that were not read.
+  virtual void finish() = 0;
+  virtual std::string text_of(int column) const = 0;  ///< not of bytes
 
  private:
-  friend class Database;
-  explicit Statement(std::unique_ptr<StatementEngine> engine) : engine_(std::move(engine)) {}
-
   static SqlValue sql_value(std::int64_t value) { return value; }
   static SqlValue sql_value(int value) { return std::int64_t{value}; }
   static SqlValue sql_value(std::size_t value) { return static_cast<std::int64_t>(value); }
@@ -67,37 +86,41 @@ class Statement {
   static SqlValue sql_value(const std::optional<Value>& value) {
     return value ? sql_value(*value) : SqlValue();
   }
-
-  std::unique_ptr<StatementEngine> engine_;
 };
 
+enum class DatabaseAccess : unsigned char { read, write, create };
+
 /// A SQLite file in WAL mode, or a PostgreSQL database. One transaction writes at a time, and readers do not wait for
-/// it; others wait up to a minute. Objects of this file are used by one thread.
+/// it; others wait up to a minute. Objects of this file are used by one thread. @throws as open_database()
 class Database {
  public:
-  using Access = DatabaseAccess;
-
-  /// @param place a file, or a URL as of is_database_url()
-  /// @throws FileError, FormatError naming the place; here and in all other functions
-  Database(const std::filesystem::path& place, Access access);
+  explicit Database(std::string name) : name_(std::move(name)) {}
   Database(Database&&) = delete;
+  virtual ~Database() = default;
 
   /// See shown_place().
   const std::string& name() const noexcept { return name_; }
   /// @throws std::invalid_argument if it is not one statement
-  Statement prepare(const std::string& sql) const { return Statement(engine_->prepare(sql)); }
-  void execute(const std::string& sql) const { engine_->execute(sql); }
-  /// See DatabaseEngine.
-  void create(const std::string& schema) const { engine_->create(schema); }
-  std::vector<std::string> tables() const { return engine_->tables(); }
-  bool claim(std::int64_t number) const { return engine_->claim(number); }
-  void release(std::int64_t number) const { engine_->release(number); }
+  virtual std::unique_ptr<Statement> prepare(const std::string& sql) = 0;
+  virtual void execute(const std::string& sql) = 0;  ///< one or several statements
+  /// Executes CREATE statements in the words of SQLite.
+  virtual void create(const std::string& schema) = 0;
+  virtual std::vector<std::string> tables() = 0;  ///< and views, in the order of their names
+  /// Claims a number until release(), or until this process ends in any way. @returns false if another one has it
+  virtual bool claim(std::int64_t number) = 0;
+  virtual void release(std::int64_t number) = 0;
+  /// For Transaction: begins one and waits until it is the only one that writes.
+  virtual void begin() = 0;
 
  private:
-  friend class Transaction;
   std::string name_;
-  std::unique_ptr<DatabaseEngine> engine_;
 };
+
+/// @param place a file, or a URL as of is_database_url()
+/// @throws FileError, FormatError naming the place
+std::unique_ptr<Database> open_database(const std::filesystem::path& place, DatabaseAccess access);
+std::unique_ptr<Database> open_sqlite(const std::filesystem::path& file, DatabaseAccess access);
+std::unique_ptr<Database> open_postgres(const std::string& url, DatabaseAccess access);
 
 /// postgresql://USER@HOST:PORT/DATABASE?OPTIONS, as libpq takes it.
 bool is_database_url(const std::filesystem::path& place);
@@ -108,13 +131,13 @@ std::string shown_place(const std::filesystem::path& place);
 /// Everything between construction and commit() is stored, or nothing. It is the only writer meanwhile.
 class Transaction {
  public:
-  explicit Transaction(const Database& database);
+  explicit Transaction(Database& database) : database_(database) { database_.begin(); }
   ~Transaction();
   Transaction(Transaction&&) = delete;
   void commit();
 
  private:
-  const Database& database_;
+  Database& database_;
   bool open_ = true;
 };
 

@@ -60,11 +60,11 @@ class FleetPage {
   std::vector<std::pair<std::string, std::int64_t>> chosen_stages() const {
     std::vector<std::pair<std::string, std::int64_t>> out;
     std::vector<std::string> names;
-    Statement rows = database_.prepare("SELECT id, name FROM stage ORDER BY name");
-    while (rows.step()) {
-      names.push_back(rows.text(1));
+    const auto rows = database_.prepare("SELECT id, name FROM stage ORDER BY name");
+    while (rows->step()) {
+      names.push_back(rows->text(1));
       if (request_.stages.empty() || std::ranges::count(request_.stages, names.back()) > 0)
-        out.emplace_back(names.back(), rows.integer(0));
+        out.emplace_back(names.back(), rows->integer(0));
     }
     for (const std::string& wanted : request_.stages)
       if (std::ranges::count(names, wanted) == 0)
@@ -82,9 +82,9 @@ class FleetPage {
       "WHERE i.stage_id = ? AND i.is_current = 1 AND i.time_utc >= ? AND i.time_utc < ? ORDER BY "
       "i.time_utc, i.job";
 
-  Statement of_period(const std::string& select, std::int64_t stage) const {
-    Statement rows = database_.prepare(select + kOfPeriod);
-    rows.bind(stage, request_.since, request_.until.empty() ? std::string("~") : request_.until);
+  std::unique_ptr<Statement> of_period(const std::string& select, std::int64_t stage) const {
+    auto rows = database_.prepare(select + kOfPeriod);
+    rows->bind(stage, request_.since, request_.until.empty() ? std::string("~") : request_.until);
     return rows;
   }
 
@@ -112,24 +112,24 @@ class FleetPage {
   }
 
   Json stage(std::int64_t id, const std::string& name) {
-    Statement rows = of_period(
+    const auto rows = of_period(
         "SELECT i.id, i.time_utc, i.verdict, i.outlier, i.reasons, i.job, i.results "
         "FROM identification i ",
         id);
     std::map<std::int64_t, std::size_t> place;  // per identification
     std::size_t counts[3] = {0, 0, 0};          // per verdict
     const std::size_t first = count_;
-    while (rows.step()) {
+    while (rows->step()) {
       const auto verdict =
-          from_word<IdentificationVerdict>(rows.text(2)).value_or(IdentificationVerdict::failed);
-      place[rows.integer(0)] = count_ - first;
+          from_word<IdentificationVerdict>(rows->text(2)).value_or(IdentificationVerdict::failed);
+      place[rows->integer(0)] = count_ - first;
       ++counts[static_cast<std::size_t>(verdict)];
-      series_.add_identification(days_of(rows.text(1)).value_or(0.0),
-                                 static_cast<unsigned char>(verdict), folder(rows.text(6)),
-                                 rows.text(5));
+      series_.add_identification(days_of(rows->text(1)).value_or(0.0),
+                                 static_cast<unsigned char>(verdict), folder(rows->text(6)),
+                                 rows->text(5));
       const bool doubtful = verdict != IdentificationVerdict::trustworthy;
-      if (doubtful || !rows.is_null(3))
-        outliers_.push_back({count_, doubtful ? rows.text(4) : "", rows.text(3)});
+      if (doubtful || !rows->is_null(3))
+        outliers_.push_back({count_, doubtful ? rows->text(4) : "", rows->text(3)});
       if (++count_ > kMostOnPage)
         fail_request(
             "{}: more than {} identifications are too many for one page; choose some with --stage, "
@@ -149,29 +149,29 @@ class FleetPage {
     };
     std::map<std::int64_t, Track> by_track;
     std::vector<std::int64_t> in_order;  // of the modes
-    Statement known = database_.prepare(
+    const auto known = database_.prepare(
         "SELECT track, mode, frequency_hz, frequency_std_hz, damping_ratio, deviation FROM track "
         "WHERE stage_id = ? AND mode IS NOT NULL ORDER BY mode, track");
-    known.bind(stage);
-    while (known.step()) {
-      in_order.push_back(known.integer(0));
+    known->bind(stage);
+    while (known->step()) {
+      in_order.push_back(known->integer(0));
       Track& track = by_track[in_order.back()];
-      track.about = {known.integer(1), rounded(known.number(2)), rounded(known.number(3)),
-                     rounded(known.number(4)),
-                     known.is_null(5) ? Json() : Json(rounded(known.number(5)))};
+      track.about = {known->integer(1), rounded(known->number(2)), rounded(known->number(3)),
+                     rounded(known->number(4)),
+                     known->is_null(5) ? Json() : Json(rounded(known->number(5)))};
       track.present.resize(place.size(), 0);
     }
-    Statement rows = of_period(
+    const auto rows = of_period(
         "SELECT i.id, m.track, m.frequency_hz, m.frequency_std_hz FROM identification i "
         "JOIN mode m ON m.identification_id = i.id ",
         stage);
-    while (rows.step()) {
-      const auto track = by_track.find(rows.integer(1));
-      const auto day = place.find(rows.integer(0));
-      if (rows.is_null(1) || track == by_track.end() || day == place.end()) continue;
+    while (rows->step()) {
+      const auto track = by_track.find(rows->integer(1));
+      const auto day = place.find(rows->integer(0));
+      if (rows->is_null(1) || track == by_track.end() || day == place.end()) continue;
       track->second.present[day->second] = 1;
-      track->second.frequency_hz.push_back(rows.number(2));
-      track->second.std_hz.push_back(rows.number(3));
+      track->second.frequency_hz.push_back(rows->number(2));
+      track->second.std_hz.push_back(rows->number(3));
     }
     Json out = Json::array();
     for (const std::int64_t number : in_order) {
@@ -184,7 +184,7 @@ class FleetPage {
     return out;
   }
 
-  const Database& database_;
+  Database& database_;
   const FleetPageRequest& request_;
   FleetSeries series_;
   std::size_t count_ = 0;

@@ -51,28 +51,28 @@ double positive_number(const Statement& row, int column, const Database& databas
   return number;
 }
 
-StageHistory read_stage(const Database& database, std::int64_t stage) {
+StageHistory read_stage(Database& database, std::int64_t stage) {
   StageHistory history;
-  Statement rows = database.prepare(
+  const auto rows = database.prepare(
       "SELECT i.id, i.time_utc, m.number, m.frequency_hz, m.frequency_std_hz, m.damping_ratio, "
       "m.shape_std, m.shape, c.outputs "
       "FROM identification i JOIN channels c ON c.id = i.channels_id "
       "LEFT JOIN mode m ON m.identification_id = i.id "
       "WHERE i.stage_id = ? AND i.is_current = 1 ORDER BY i.time_utc, i.job, m.number");
-  rows.bind(stage);
-  while (rows.step()) {
-    if (history.identifications.empty() || history.identifications.back() != rows.integer(0)) {
-      history.identifications.push_back(rows.integer(0));
-      history.days.push_back(days_of(rows.text(1)).value_or(0.0));
+  rows->bind(stage);
+  while (rows->step()) {
+    if (history.identifications.empty() || history.identifications.back() != rows->integer(0)) {
+      history.identifications.push_back(rows->integer(0));
+      history.days.push_back(days_of(rows->text(1)).value_or(0.0));
     }
-    if (rows.is_null(2)) continue;
+    if (rows->is_null(2)) continue;
     Row row;
-    row.identification = rows.integer(0);
-    row.number = rows.integer(2);
+    row.identification = rows->integer(0);
+    row.number = rows->integer(2);
     row.day = history.days.size() - 1;
-    row.damping_ratio = rows.number(5);
-    row.mode = {positive_number(rows, 3, database), rows.number(4),
-                residue_shape(rows.bytes(7), names_in(rows.text(8))), rows.number(6)};
+    row.damping_ratio = rows->number(5);
+    row.mode = {positive_number(*rows, 3, database), rows->number(4),
+                residue_shape(rows->bytes(7), names_in(rows->text(8))), rows->number(6)};
     history.rows.push_back(std::move(row));
   }
   return history;
@@ -146,31 +146,32 @@ std::vector<std::complex<float>> floats_of(const Eigen::VectorXcd& shape) {
   return {floats.begin(), floats.end()};
 }
 
-void store_stage(const Database& database, std::int64_t stage, const StageHistory& history,
+void store_stage(Database& database, std::int64_t stage, const StageHistory& history,
                  const ModeTracks& tracks, const std::vector<std::vector<Row*>>& rows,
                  const std::vector<std::vector<std::string>>& reasons) {
-  Statement mode = database.prepare(
+  const auto mode = database.prepare(
       "UPDATE mode SET track = ?, deviation = ? WHERE identification_id = ? AND number = ?");
   for (const Row& row : history.rows)
-    mode.run(row.track, row.deviation, row.identification, row.number);
-  Statement outlier = database.prepare("UPDATE identification SET outlier = ? WHERE id = ?");
+    mode->run(row.track, row.deviation, row.identification, row.number);
+  const auto outlier = database.prepare("UPDATE identification SET outlier = ? WHERE id = ?");
   for (std::size_t i = 0; i < reasons.size(); ++i)
-    outlier.run(reasons[i].empty() ? std::optional<std::string>()
-                                   : fmt::format("{}", fmt::join(reasons[i], "; ")),
-                history.identifications[i]);
-  database.prepare("DELETE FROM track WHERE stage_id = ?").run(stage);
-  Statement track = database.prepare(
+    outlier->run(reasons[i].empty() ? std::optional<std::string>()
+                                    : fmt::format("{}", fmt::join(reasons[i], "; ")),
+                 history.identifications[i]);
+  database.prepare("DELETE FROM track WHERE stage_id = ?")->run(stage);
+  const auto track = database.prepare(
       "INSERT INTO track (stage_id, track, seen, frequency_hz, frequency_std_hz, damping_ratio, "
       "shape) VALUES (?, ?, ?, ?, ?, ?, ?)");
   for (std::size_t t = 0; t < rows.size(); ++t) {
     const double hz = median_of(rows[t], [](const Row& row) { return row.mode.frequency_hz; });
     double square = 0.0;
     for (const Row* row : rows[t]) square += std::pow(row->mode.frequency_hz - hz, 2);
-    track.run(stage, t, rows[t].size(), hz, std::sqrt(square / static_cast<double>(rows[t].size())),
-              median_of(rows[t], [](const Row& row) { return row.damping_ratio; }),
-              floats_of(tracks.mode(t).shape));
+    track->run(stage, t, rows[t].size(), hz,
+               std::sqrt(square / static_cast<double>(rows[t].size())),
+               median_of(rows[t], [](const Row& row) { return row.damping_ratio; }),
+               floats_of(tracks.mode(t).shape));
   }
-  database.prepare("UPDATE stage SET changed = 2 WHERE id = ?").run(stage);
+  database.prepare("UPDATE stage SET changed = 2 WHERE id = ?")->run(stage);
 }
 
 struct StageTrack {
@@ -180,27 +181,27 @@ struct StageTrack {
   SeenMode seen;
 };
 
-std::vector<StageTrack> read_tracks(const Database& database) {
+std::vector<StageTrack> read_tracks(Database& database) {
   std::vector<StageTrack> out;
-  Statement rows = database.prepare(
+  const auto rows = database.prepare(
       "SELECT t.stage_id, t.track, t.frequency_hz, t.shape FROM track t "
       "JOIN stage s ON s.id = t.stage_id "
       "WHERE t.seen >= CAST(? AS DOUBLE PRECISION) * (SELECT COUNT(*) FROM identification i WHERE "
       "i.stage_id = t.stage_id "
       "AND i.is_current = 1 AND i.channels_id IS NOT NULL) ORDER BY s.name, t.track");
-  rows.bind(kLeastShare);
-  while (rows.step()) {
-    const double hz = positive_number(rows, 2, database);
-    out.push_back({rows.integer(0),
-                   rows.integer(1),
+  rows->bind(kLeastShare);
+  while (rows->step()) {
+    const double hz = positive_number(*rows, 2, database);
+    out.push_back({rows->integer(0),
+                   rows->integer(1),
                    0,
-                   {hz, kStageSpread * hz, shape_in(rows.bytes(3)), 0.0}});
+                   {hz, kStageSpread * hz, shape_in(rows->bytes(3)), 0.0}});
   }
   return out;
 }
 
 /// Stages are paired one after another, as days are, but without drift.
-void pair_stages(const Database& database) {
+void pair_stages(Database& database) {
   std::vector<StageTrack> all = read_tracks(database);
   ModeTracks modes({.drift = 0.0, .shape_change = 0.2, .shape_memory = 1e9});
   for (std::size_t first = 0; first < all.size();) {
@@ -222,7 +223,7 @@ void pair_stages(const Database& database) {
   std::vector<std::size_t> number(modes.size());
   for (std::size_t i = 0; i < order.size(); ++i) number[order[i]] = i + 1;
 
-  Statement store =
+  const auto store =
       database.prepare("UPDATE track SET mode = ?, deviation = ? WHERE stage_id = ? AND track = ?");
   for (const StageTrack& track : all) {
     std::vector<double> others = values[track.mode];
@@ -233,21 +234,21 @@ void pair_stages(const Database& database) {
       const double spread = 1.4826 * median(others);
       if (spread > 0.0) deviation = (std::log(track.seen.frequency_hz) - centre) / spread;
     }
-    store.run(number[track.mode], deviation, track.stage, track.track);
+    store->run(number[track.mode], deviation, track.stage, track.track);
   }
 }
 
 }  // namespace
 
 void pair_fleet(FleetStore& store) {
-  const Database& database = store.database();
+  Database& database = store.database();
   std::vector<std::int64_t> changed;
-  Statement stages = database.prepare("SELECT id FROM stage WHERE changed = 1 ORDER BY id");
-  while (stages.step()) changed.push_back(stages.integer(0));
+  const auto stages = database.prepare("SELECT id FROM stage WHERE changed = 1 ORDER BY id");
+  while (stages->step()) changed.push_back(stages->integer(0));
   for (const std::int64_t stage : changed) {
     Transaction transaction(database);
     // Other processes may have paired it meanwhile.
-    if (!database.prepare("SELECT 1 FROM stage WHERE id = ? AND changed = 1").first(stage))
+    if (!database.prepare("SELECT 1 FROM stage WHERE id = ? AND changed = 1")->first(stage))
       continue;
     StageHistory history = read_stage(database, stage);
     const ModeTracks tracks = follow(history);
@@ -257,7 +258,7 @@ void pair_fleet(FleetStore& store) {
   }
   // 2: followed over time, but not yet compared with the other stages, even if an earlier call was interrupted.
   const auto is_paired = [&] {
-    return !database.prepare("SELECT 1 FROM stage WHERE changed = 2").first().has_value();
+    return !database.prepare("SELECT 1 FROM stage WHERE changed = 2")->first().has_value();
   };
   if (is_paired()) return;
   Transaction transaction(database);

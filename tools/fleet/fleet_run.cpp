@@ -49,7 +49,7 @@ class FleetRun {
   FleetRun(const FleetConfig& config, const Console& console)
       : config_(config),
         console_(console),
-        store_(config.store, Database::Access::create),
+        store_(config.store, DatabaseAccess::create),
         progress_(console, "fleet", "jobs") {}
 
   /// The jobs that are not done. Their fingerprints are stored, so that others need not read the logs for them.

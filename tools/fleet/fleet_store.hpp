@@ -64,10 +64,10 @@ class FleetStore {
  public:
   /// @param place a file, or the URL of a PostgreSQL database
   /// @param access create: also the file and the tables @throws FileError, FormatError
-  FleetStore(const std::filesystem::path& place, Database::Access access);
+  FleetStore(const std::filesystem::path& place, DatabaseAccess access);
   FleetStore(FleetStore&&) = delete;
 
-  const Database& database() const noexcept { return database_; }
+  Database& database() const noexcept { return *database_; }
   std::map<std::string, JobState> jobs() const;
   JobState state_of(const std::string& job);
   /// The number of a failed result, which mostly differs from that of the failure before it.
@@ -88,9 +88,9 @@ class FleetStore {
   /// Results of this log are no longer current, and their stages have to be paired again.
   void supersede(const std::string& log_fingerprint);
 
-  Database database_;
+  std::unique_ptr<Database> database_;
   // Empty until the tables exist.
-  std::optional<Statement> state_, add_stage_, add_configuration_, add_channels_,
+  std::unique_ptr<Statement> state_, add_stage_, add_configuration_, add_channels_,
       add_identification_, add_mode_, add_tag_, remove_failed_, remove_tags_, supersede_,
       change_stages_;
 };

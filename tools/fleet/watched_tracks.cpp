@@ -37,12 +37,12 @@ double start_of(const WatchedLog& log, const WatchedTracks& tracks) {
 std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
   const WatchedTracks tracks = read_tracks(log.file, kHour_s);
   const double start = start_of(log, tracks);
-  const Database& database = store.database();
+  Database& database = store.database();
   Transaction transaction(database);
   database.create(kWatchedSchema);
   database.prepare("INSERT INTO stage (name, changed) VALUES (?, 0) ON CONFLICT DO NOTHING")
-      .run(log.stage);
-  Statement add = database.prepare(
+      ->run(log.stage);
+  const auto add = database.prepare(
       "INSERT INTO watched_property VALUES ((SELECT id FROM stage WHERE name = ?), ?, ?, ?, ?, ?, "
       "?) ON CONFLICT (stage_id, property, time_utc) DO UPDATE SET value = excluded.value, "
       "change = excluded.change, deviation = excluded.deviation");
@@ -53,8 +53,8 @@ std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
       const double nominal = tracks.nominal[p];
       const double value =
           tracks.kinds[p] == TrackedKind::delay ? nominal + change : nominal * (1.0 + change);
-      add.run(log.stage, utc_of(start + tracks.time_s[t] / kDay_s), tracks.names[p],
-              to_string(tracks.kinds[p]), value, change, tracks.deviation(t, p));
+      add->run(log.stage, utc_of(start + tracks.time_s[t] / kDay_s), tracks.names[p],
+               to_string(tracks.kinds[p]), value, change, tracks.deviation(t, p));
     }
   transaction.commit();
   return rows;

@@ -28,9 +28,10 @@ TEST(Database, SeveralWritersMayCreateOneFileAtTheSameInstant) {
     for (int writer = 0; writer < kWriters; ++writer)
       writers.emplace_back([&, &error = errors[file * kWriters + writer]] {
         try {
-          const Database database(directory / fmt::format("{}.db", file), Database::Access::create);
-          Transaction transaction(database);
-          database.execute("CREATE TABLE IF NOT EXISTS a (b)");
+          const auto database =
+              open_database(directory / fmt::format("{}.db", file), DatabaseAccess::create);
+          Transaction transaction(*database);
+          database->execute("CREATE TABLE IF NOT EXISTS a (b)");
           transaction.commit();
         } catch (const std::exception& thrown) {
           error = thrown.what();

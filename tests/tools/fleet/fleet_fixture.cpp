@@ -41,16 +41,16 @@ std::filesystem::path store_place(const TemporaryDirectory& folder, const std::s
   const std::string database = std::getenv("STAGEID_TEST_POSTGRES");
   std::string schema = folder.path().filename().string() + "_" + name;
   std::replace(schema.begin(), schema.end(), '-', '_');
-  Database(database, Database::Access::create)
-      .execute(fmt::format("CREATE SCHEMA IF NOT EXISTS \"{}\"", schema));
+  open_database(database, DatabaseAccess::create)
+      ->execute(fmt::format("CREATE SCHEMA IF NOT EXISTS \"{}\"", schema));
   return fmt::format("{}{}options=-csearch_path%3D%22{}%22", database,
                      database.find('?') == std::string::npos ? '?' : '&', schema);
 }
 
 std::int64_t count_in(const FleetStore& store, const std::string& table) {
-  Statement count = store.database().prepare("SELECT COUNT(*) FROM " + table);
-  count.step();
-  return count.integer(0);
+  const auto count = store.database().prepare("SELECT COUNT(*) FROM " + table);
+  count->step();
+  return count->integer(0);
 }
 
 }  // namespace stageid::test

@@ -97,7 +97,7 @@ TEST_F(FleetJobsTest, IdentifiesAJobByLogAndOptions) {
 }
 
 TEST_F(FleetJobsTest, FingerprintsAChangedLogAgain) {
-  FleetStore store(test::store_place(folder_), Database::Access::create);
+  FleetStore store(test::store_place(folder_), DatabaseAccess::create);
   const std::filesystem::path log = write("a.slog", "one");
   const std::string before = log_fingerprint(store, log);
   EXPECT_EQ(log_fingerprint(store, log), before);

@@ -17,7 +17,7 @@ struct FleetPageTest : testing::Test {
     return fleet_page(store_, {{}, "", "", folder_ / "fleet.html"});
   }
   test::TemporaryDirectory folder_;
-  FleetStore store_{test::store_place(folder_), Database::Access::create};
+  FleetStore store_{test::store_place(folder_), DatabaseAccess::create};
 };
 
 TEST_F(FleetPageTest, OmitsStagesWithoutIdentifications) {

@@ -37,16 +37,16 @@ std::vector<Identification> small_fleet(int stages) {
 struct FleetPairingTest : testing::Test {
   FleetStore store_of(const std::string& name, const std::vector<Identification>& all) const {
     const std::filesystem::path place = test::store_place(folder_, name);
-    FleetStore store(place, Database::Access::create);
+    FleetStore store(place, DatabaseAccess::create);
     for (const Identification& one : all) store.add(one);
-    return {place, Database::Access::write};
+    return {place, DatabaseAccess::write};
   }
   static std::vector<std::string> rows(const FleetStore& store, const std::string& sql) {
     std::vector<std::string> out;
-    Statement statement = store.database().prepare(sql);
-    while (statement.step()) {
+    const auto statement = store.database().prepare(sql);
+    while (statement->step()) {
       out.emplace_back();
-      for (int c = 0; c < statement.columns(); ++c) out.back() += statement.text(c) + "|";
+      for (int c = 0; c < statement->columns(); ++c) out.back() += statement->text(c) + "|";
     }
     return out;
   }

@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 using States = std::map<std::string, JobState>;
 
 struct FleetStoreTest : testing::Test {
-  FleetStore open() const { return {test::store_place(folder_), Database::Access::create}; }
+  FleetStore open() const { return {test::store_place(folder_), DatabaseAccess::create}; }
   test::TemporaryDirectory folder_;
 };
 
@@ -74,37 +74,37 @@ TEST_F(FleetStoreTest, KeepsWhatWasStored) {
   given.modes[0].frequency_std_hz = std::nullopt;
   given.tags = {{"temperature", "21.5"}, {"site", "north"}};
   open().add(given);
-  const FleetStore store(test::store_place(folder_), Database::Access::read);
-  Statement mode = store.database().prepare(
+  const FleetStore store(test::store_place(folder_), DatabaseAccess::read);
+  const auto mode = store.database().prepare(
       "SELECT frequency_hz, frequency_std_hz, shape, damping_ratio_std FROM mode");
-  ASSERT_TRUE(mode.step());
-  EXPECT_EQ(mode.number(0), 123.456);
-  EXPECT_TRUE(mode.is_null(1));
-  const Eigen::VectorXcd shape = residue_shape(mode.bytes(2), 2);
+  ASSERT_TRUE(mode->step());
+  EXPECT_EQ(mode->number(0), 123.456);
+  EXPECT_TRUE(mode->is_null(1));
+  const Eigen::VectorXcd shape = residue_shape(mode->bytes(2), 2);
   const Eigen::MatrixXcd residue =
       given.modes[0].output_shape * given.modes[0].input_shape.transpose();
   EXPECT_LT((shape - residue.reshaped()).norm(), 1e-6);
-  Statement tags = store.database().prepare("SELECT name, number, text FROM tag ORDER BY name");
-  ASSERT_TRUE(tags.step());
-  EXPECT_EQ(tags.text(2), "north");
-  EXPECT_TRUE(tags.is_null(1));
-  ASSERT_TRUE(tags.step());
-  EXPECT_EQ(tags.number(1), 21.5);
+  const auto tags = store.database().prepare("SELECT name, number, text FROM tag ORDER BY name");
+  ASSERT_TRUE(tags->step());
+  EXPECT_EQ(tags->text(2), "north");
+  EXPECT_TRUE(tags->is_null(1));
+  ASSERT_TRUE(tags->step());
+  EXPECT_EQ(tags->number(1), 21.5);
 }
 
 TEST_F(FleetStoreTest, ShowsBytesAsHexadecimalDigits) {
   FleetStore store = open();
   store.add(identification("a", "s", "2026-01-01", {100.0}));
-  Statement row = store.database().prepare("SELECT shape, 'text' FROM mode; -- a comment");
-  ASSERT_TRUE(row.step());
-  EXPECT_EQ(row.text(0).substr(0, 16), "0000803f00000000");  // float32 1 + 0j
-  EXPECT_EQ(row.text(0).size(), 2U * row.bytes(0).size());
-  EXPECT_EQ(row.text(1), "text");
+  const auto row = store.database().prepare("SELECT shape, 'text' FROM mode; -- a comment");
+  ASSERT_TRUE(row->step());
+  EXPECT_EQ(row->text(0).substr(0, 16), "0000803f00000000");  // float32 1 + 0j
+  EXPECT_EQ(row->text(0).size(), 2U * row->bytes(0).size());
+  EXPECT_EQ(row->text(1), "text");
 }
 
 TEST_F(FleetStoreTest, ReadersCannotWrite) {
   open();
-  const FleetStore store(test::store_place(folder_), Database::Access::read);
+  const FleetStore store(test::store_place(folder_), DatabaseAccess::read);
   EXPECT_THROW(store.database().execute("DELETE FROM stage"), std::exception);
 }
 
@@ -122,11 +122,11 @@ TEST_F(FleetStoreTest, AStatementThatFailsIsToldAtTheEndAndNothingIsStored) {
     EXPECT_THROW(
         {
           Transaction transaction(store.database());
-          Statement add =
+          const auto add =
               store.database().prepare("INSERT INTO stage (name, changed) VALUES (?, 0)");
-          add.run(std::string("twice"));
-          add.run(std::string("twice"));
-          for (int i = 0; i < more; ++i) add.run(fmt::format("{}", i));
+          add->run(std::string("twice"));
+          add->run(std::string("twice"));
+          for (int i = 0; i < more; ++i) add->run(fmt::format("{}", i));
           transaction.commit();
         },
         std::invalid_argument);
@@ -202,11 +202,11 @@ TEST_F(FleetStoreTest, StoresAllOfAJobOrNothingOnAFullDisk) {
 TEST_F(FleetStoreTest, RefusesOtherFiles) {
   const std::filesystem::path text = folder_ / "text.db";
   std::ofstream(text) << "not a database, but a text that is long enough to have a header\n";
-  EXPECT_THROW(FleetStore(text, Database::Access::create), FormatError);
-  EXPECT_THROW(FleetStore(folder_ / "missing.db", Database::Access::read), FileError);
+  EXPECT_THROW(FleetStore(text, DatabaseAccess::create), FormatError);
+  EXPECT_THROW(FleetStore(folder_ / "missing.db", DatabaseAccess::read), FileError);
   const std::filesystem::path foreign = folder_ / "foreign.db";
-  Database(foreign, Database::Access::create).execute("CREATE TABLE x (y INTEGER)");
-  EXPECT_THROW(FleetStore(foreign, Database::Access::create), FormatError);
+  open_database(foreign, DatabaseAccess::create)->execute("CREATE TABLE x (y INTEGER)");
+  EXPECT_THROW(FleetStore(foreign, DatabaseAccess::create), FormatError);
 }
 
 TEST_F(FleetStoreTest, RefusesAnotherVersionOfTheSchema) {

@@ -39,34 +39,34 @@ struct WatchedTracksTest : test::DirectoryTest {
   }
 
   std::filesystem::path tracks_ = directory_ / "watch.h5";
-  FleetStore store_{test::store_place(directory_), Database::Access::create};
+  FleetStore store_{test::store_place(directory_), DatabaseAccess::create};
 };
 
 TEST_F(WatchedTracksTest, StoresTheValuesAtTheEndOfEachHour) {
   write_tracks(
       4);  // ends at 00:30, 01:00 (learned from: 23:30), ... after 2 h: 01:00 of the next day
   EXPECT_EQ(add_watched(store_, {tracks_, "A", ""}), 4U);
-  Statement rows = store_.database().prepare(
+  const auto rows = store_.database().prepare(
       "SELECT stage, time_utc, property, kind, value, change, deviation FROM watched "
       "ORDER BY kind DESC, time_utc");
   const std::vector<std::pair<std::string, int>> expected = {{"2026-03-05T00:30:00Z", 3},
                                                              {"2026-03-05T01:00:00Z", 4}};
   for (const auto& [time, t] : expected) {
-    ASSERT_TRUE(rows.step());
-    EXPECT_EQ(rows.text(0), "A");
-    EXPECT_EQ(rows.text(1), time);
-    EXPECT_EQ(rows.text(2), "frequency of the mode at 100 Hz");
-    EXPECT_EQ(rows.text(3), "frequency");
-    EXPECT_DOUBLE_EQ(rows.number(4), 100.0 * (1.0 + 1e-4 * t));
-    EXPECT_DOUBLE_EQ(rows.number(5), 1e-4 * t);
-    EXPECT_DOUBLE_EQ(rows.number(6), 1e-5);
+    ASSERT_TRUE(rows->step());
+    EXPECT_EQ(rows->text(0), "A");
+    EXPECT_EQ(rows->text(1), time);
+    EXPECT_EQ(rows->text(2), "frequency of the mode at 100 Hz");
+    EXPECT_EQ(rows->text(3), "frequency");
+    EXPECT_DOUBLE_EQ(rows->number(4), 100.0 * (1.0 + 1e-4 * t));
+    EXPECT_DOUBLE_EQ(rows->number(5), 1e-4 * t);
+    EXPECT_DOUBLE_EQ(rows->number(6), 1e-5);
   }
   for (const auto& [time, t] : expected) {
-    ASSERT_TRUE(rows.step());
-    EXPECT_EQ(rows.text(1), time);
-    EXPECT_DOUBLE_EQ(rows.number(4), 1e-7 * t);
+    ASSERT_TRUE(rows->step());
+    EXPECT_EQ(rows->text(1), time);
+    EXPECT_DOUBLE_EQ(rows->number(4), 1e-7 * t);
   }
-  EXPECT_FALSE(rows.step());
+  EXPECT_FALSE(rows->step());
 }
 
 TEST_F(WatchedTracksTest, ALogThatHasGrownReplacesItsValues) {
@@ -76,9 +76,9 @@ TEST_F(WatchedTracksTest, ALogThatHasGrownReplacesItsValues) {
   EXPECT_EQ(add_watched(store_, {tracks_, "A", ""}), 6U);
   add_watched(store_, {tracks_, "B", "2026-01-01"});
   const auto rows_of = [&](const std::string& stage) {
-    Statement rows = store_.database().prepare("SELECT COUNT(*) FROM watched WHERE stage = ?");
-    rows.bind(stage).step();
-    return rows.integer(0);
+    const auto rows = store_.database().prepare("SELECT COUNT(*) FROM watched WHERE stage = ?");
+    rows->bind(stage).step();
+    return rows->integer(0);
   };
   // The last value of the shorter log is at the end of an hour that both have.
   EXPECT_EQ(rows_of("A"), 8);
@@ -104,7 +104,7 @@ TEST_F(WatchedTracksTest, RefusesOtherFilesAndStoresNothing) {
         add_watched(store_, {tracks_, "A", ""});
       },
       ThrowsMessage<FormatError>(HasSubstr("contains no tracks")));
-  EXPECT_FALSE(store_.database().prepare("SELECT 1 FROM stage").step());
+  EXPECT_FALSE(store_.database().prepare("SELECT 1 FROM stage")->step());
 }
 
 }  // namespace stageid::test_watched_tracks

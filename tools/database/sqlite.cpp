@@ -11,7 +11,7 @@
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/system_reason.hpp"
-#include "tools/database/database_engine.hpp"
+#include "tools/database/database.hpp"
 
 namespace stageid {
 namespace {
@@ -28,17 +28,16 @@ int enter_wal_mode(sqlite3* database) {
   }
 }
 
-[[noreturn]] void fail(const std::filesystem::path& file, sqlite3* database, int code) {
-  const std::string name = file.string();
+[[noreturn]] void fail(const std::string& name, sqlite3* database, int code) {
   switch (code & 0xFF) {
     case SQLITE_FULL:
       throw FileError(fmt::format("{}: {}", name, system_reason(ENOSPC)));
     case SQLITE_BUSY:
       fail_busy(name);
     case SQLITE_NOTADB:
-      throw FormatError(file, "", "is not a store of 'stageid fleet'; choose another one");
+      throw FormatError(name, "", "is not a store of 'stageid fleet'; choose another one");
     case SQLITE_CORRUPT:
-      throw FormatError(file, "",
+      throw FormatError(name, "",
                         "is damaged; restore a copy, or delete it and run the fleet again");
     case SQLITE_CANTOPEN:
     case SQLITE_IOERR:
@@ -57,10 +56,10 @@ int enter_wal_mode(sqlite3* database) {
   }
 }
 
-class SqliteStatement final : public StatementEngine {
+class SqliteStatement final : public Statement {
  public:
-  SqliteStatement(std::filesystem::path file, sqlite3* database, sqlite3_stmt* statement)
-      : file_(std::move(file)), database_(database), statement_(statement) {}
+  SqliteStatement(const std::string& name, sqlite3* database, sqlite3_stmt* statement)
+      : name_(name), database_(database), statement_(statement) {}
 
   void start(std::span<const SqlValue> parameters) override {
     finish();
@@ -71,10 +70,10 @@ class SqliteStatement final : public StatementEngine {
   }
   bool step() override {
     const int code = ::sqlite3_step(statement_.get());
-    if (code != SQLITE_ROW && code != SQLITE_DONE) fail(file_, database_, code);
+    if (code != SQLITE_ROW && code != SQLITE_DONE) fail(name_, database_, code);
     return code == SQLITE_ROW;
   }
-  void run(std::span<const SqlValue> parameters) override {
+  void run_with(std::span<const SqlValue> parameters) override {
     start(parameters);
     while (step()) {
     }
@@ -106,7 +105,7 @@ class SqliteStatement final : public StatementEngine {
   std::int64_t integer(int column) const override {
     return ::sqlite3_column_int64(statement_.get(), column);
   }
-  std::string text(int column) const override {
+  std::string text_of(int column) const override {
     const auto* text =
         reinterpret_cast<const char*>(::sqlite3_column_text(statement_.get(), column));
     return text == nullptr ? "" : text;
@@ -133,18 +132,19 @@ class SqliteStatement final : public StatementEngine {
     ::sqlite3_bind_blob64(statement_.get(), index, value.data(), value.size(), SQLITE_TRANSIENT);
   }
 
-  std::filesystem::path file_;
+  const std::string& name_;
   sqlite3* database_;
   std::unique_ptr<sqlite3_stmt, Free> statement_;
 };
 
-class SqliteEngine final : public DatabaseEngine {
+class SqliteDatabase final : public Database {
  public:
-  SqliteEngine(std::filesystem::path file, DatabaseAccess access) : file_(std::move(file)) {
+  SqliteDatabase(const std::filesystem::path& file, DatabaseAccess access)
+      : Database(file.string()) {
     const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX |
                       (access == DatabaseAccess::create ? SQLITE_OPEN_CREATE : 0);
     sqlite3* handle = nullptr;
-    const int opened = ::sqlite3_open_v2(file_.c_str(), &handle, flags, nullptr);
+    const int opened = ::sqlite3_open_v2(file.c_str(), &handle, flags, nullptr);
     handle_.reset(handle);
     check(opened);
     ::sqlite3_extended_result_codes(handle, 1);
@@ -160,15 +160,15 @@ class SqliteEngine final : public DatabaseEngine {
     execute("PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON");
   }
 
-  std::unique_ptr<StatementEngine> prepare(const std::string& sql) override {
+  std::unique_ptr<Statement> prepare(const std::string& sql) override {
     const char* rest = "";
-    auto prepared = std::make_unique<SqliteStatement>(file_, handle_.get(), compiled(sql, rest));
+    auto prepared = std::make_unique<SqliteStatement>(name(), handle_.get(), compiled(sql, rest));
     sqlite3_stmt* second = nullptr;  // remains empty after a comment
     const char* end = "";
     const int code = ::sqlite3_prepare_v2(handle_.get(), rest, -1, &second, &end);
     ::sqlite3_finalize(second);
     if (code != SQLITE_OK || second != nullptr)
-      fail_request("{}: got several SQL statements; write one", file_.string());
+      fail_request("{}: got several SQL statements; write one", name());
     return prepared;
   }
   void execute(const std::string& sql) override {
@@ -186,7 +186,7 @@ class SqliteEngine final : public DatabaseEngine {
 
   /// One byte of the file STORE-claims, locked: the system releases it with this process.
   bool claim(std::int64_t number) override {
-    const std::string path = file_.string() + "-claims";
+    const std::string path = name() + "-claims";
     if (!claims_) claims_.emplace(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
     if (claims_->get() < 0) throw FileError(fmt::format("{}: {}", path, system_reason(errno)));
     if (lock(number, F_WRLCK)) return true;
@@ -202,7 +202,7 @@ class SqliteEngine final : public DatabaseEngine {
   };
 
   void check(int code) const {
-    if (code != SQLITE_OK) fail(file_, handle_.get(), code);
+    if (code != SQLITE_OK) fail(name(), handle_.get(), code);
   }
   sqlite3_stmt* compiled(const std::string& sql, const char*& rest) {
     sqlite3_stmt* statement = nullptr;
@@ -218,16 +218,14 @@ class SqliteEngine final : public DatabaseEngine {
     return ::fcntl(claims_->get(), F_OFD_SETLK, &lock) == 0;
   }
 
-  std::filesystem::path file_;
   std::unique_ptr<sqlite3, Close> handle_;
   std::optional<FileDescriptor> claims_;
 };
 
 }  // namespace
 
-std::unique_ptr<DatabaseEngine> make_sqlite_engine(const std::filesystem::path& file,
-                                                   DatabaseAccess access) {
-  return std::make_unique<SqliteEngine>(file, access);
+std::unique_ptr<Database> open_sqlite(const std::filesystem::path& file, DatabaseAccess access) {
+  return std::make_unique<SqliteDatabase>(file, access);
 }
 
 }  // namespace stageid

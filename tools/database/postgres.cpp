@@ -163,7 +163,7 @@ std::string numbered(const std::string& sql) {
 
 int digit(char c) { return c <= '9' ? c - '0' : c - 'a' + 10; }
 
-class PostgresStatement final : public StatementEngine {
+class PostgresStatement final : public Statement {
  public:
   PostgresStatement(Connection& connection, const std::string& sql)
       : connection_(connection), statement_(fmt::format("s{}", ++connection.statements)) {
@@ -187,7 +187,7 @@ class PostgresStatement final : public StatementEngine {
     row_ = -1;
   }
   /// Within a transaction, without waiting for the answer of the server.
-  void run(std::span<const SqlValue> parameters) override {
+  void run_with(std::span<const SqlValue> parameters) override {
     if (connection_.pending == 0) {
       if (::PQtransactionStatus(handle()) != PQTRANS_INTRANS) return start(parameters);
       if (::PQenterPipelineMode(handle()) == 0) connection_.fail(nullptr);
@@ -229,7 +229,7 @@ class PostgresStatement final : public StatementEngine {
   std::int64_t integer(int column) const override {
     return std::strtoll(value(column), nullptr, 10);
   }
-  std::string text(int column) const override { return value(column); }
+  std::string text_of(int column) const override { return value(column); }
   std::span<const std::byte> bytes(int column) const override {
     const std::string_view hex = value(column);  // \x00ff...
     bytes_.clear();
@@ -249,10 +249,10 @@ class PostgresStatement final : public StatementEngine {
   mutable std::vector<std::byte> bytes_;
 };
 
-class PostgresEngine final : public DatabaseEngine {
+class PostgresDatabase final : public Database {
  public:
-  PostgresEngine(const std::string& url, DatabaseAccess access) {
-    connection_.name = shown_place(url);
+  PostgresDatabase(const std::string& url, DatabaseAccess access) : Database(shown_place(url)) {
+    connection_.name = name();
     connection_.reads_only = access == DatabaseAccess::read;
     std::vector<const char*> keys, values;
     for (const auto& [key, value] : kConnection) {
@@ -269,7 +269,7 @@ class PostgresEngine final : public DatabaseEngine {
     if (connection_.reads_only) execute("SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY");
   }
 
-  std::unique_ptr<StatementEngine> prepare(const std::string& sql) override {
+  std::unique_ptr<Statement> prepare(const std::string& sql) override {
     return std::make_unique<PostgresStatement>(connection_, sql);
   }
   void execute(const std::string& sql) override {
@@ -332,9 +332,8 @@ class PostgresEngine final : public DatabaseEngine {
 
 }  // namespace
 
-std::unique_ptr<DatabaseEngine> make_postgres_engine(const std::string& url,
-                                                     DatabaseAccess access) {
-  return std::make_unique<PostgresEngine>(url, access);
+std::unique_ptr<Database> open_postgres(const std::string& url, DatabaseAccess access) {
+  return std::make_unique<PostgresDatabase>(url, access);
 }
 
 }  // namespace stageid
