@@ -52,16 +52,6 @@ std::vector<int> leave_out_at_random(const std::vector<int>& odd_lines, const Li
   return kept;
 }
 
-std::vector<int> unexcited_between(const std::vector<int>& lines, bool odd) {
-  std::vector<int> unexcited;
-  for (std::size_t i = 1; i < lines.size(); ++i) {
-    for (int line = lines[i - 1] + 1; line < lines[i]; ++line) {
-      if (is_odd(line) == odd) unexcited.push_back(line);
-    }
-  }
-  return unexcited;
-}
-
 }  // namespace
 
 FrequencyGrid::FrequencyGrid(double sample_rate_hz, int samples_per_period, std::vector<int> lines)
@@ -118,14 +108,6 @@ Eigen::VectorXd FrequencyGrid::frequency_hz() const {
 
 Eigen::VectorXd FrequencyGrid::omega_rad_s() const {
   return 2.0 * std::numbers::pi * frequency_hz();
-}
-
-std::vector<int> FrequencyGrid::even_detection_lines() const {
-  return unexcited_between(lines_, false);
-}
-
-std::vector<int> FrequencyGrid::odd_detection_lines() const {
-  return unexcited_between(lines_, true);
 }
 
 }  // namespace stageid

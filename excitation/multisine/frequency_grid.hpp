@@ -50,10 +50,6 @@ class FrequencyGrid {
   Eigen::VectorXd frequency_hz() const;  ///< size()
   Eigen::VectorXd omega_rad_s() const;   ///< size()
 
-  /// Unexcited lines between the first and the last excited one: even and odd ones.
-  std::vector<int> even_detection_lines() const;
-  std::vector<int> odd_detection_lines() const;
-
   friend bool operator==(const FrequencyGrid&, const FrequencyGrid&) = default;
 
  private:

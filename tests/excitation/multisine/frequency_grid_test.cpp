@@ -23,8 +23,6 @@ TEST(FrequencyGrid, IsThePapersGridOfFourThousandOddLines) {
   EXPECT_EQ(grid.frequency_hz()[3999], 1999.75);
   EXPECT_EQ(grid.resolution_hz(), 0.25);
   EXPECT_EQ(grid.period_s(), 4.0);
-  EXPECT_EQ(grid.even_detection_lines().size(), 3999U);
-  EXPECT_TRUE(grid.odd_detection_lines().empty());
 }
 
 TEST(FrequencyGrid, HoldsBothEndsOfTheBand) {
@@ -73,12 +71,6 @@ TEST(FrequencyGrid, LeavesOneOddLineOfEveryGroupOut) {
     }
     EXPECT_EQ(places.size(), static_cast<std::size_t>(group)) << "some places are never left out";
   }
-}
-
-TEST(FrequencyGrid, DetectionLinesAreWhatIsLeftBetweenTheExcited) {
-  const FrequencyGrid grid(100.0, 100, {3, 5, 9, 10, 15});
-  EXPECT_EQ(grid.even_detection_lines(), (std::vector<int>{4, 6, 8, 12, 14}));
-  EXPECT_EQ(grid.odd_detection_lines(), (std::vector<int>{7, 11, 13}));
 }
 
 TEST(FrequencyGrid, DrawsTheLinesOfTheIndependentReference) {
