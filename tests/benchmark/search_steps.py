@@ -72,7 +72,9 @@ def draw(steps, picture):
 def main():
     model, picture = sys.argv[1:]
     with open(model, encoding="utf-8") as file:
-        draw(steps_of(json.load(file)["provenance"]["decisions"]), picture)
+        read = json.load(file)
+    steps = steps_of(read["provenance"]["decisions"])
+    draw([*steps, ("last fit", read["fit"]["cost"], False)], picture)
 
 
 if __name__ == "__main__":

@@ -75,10 +75,12 @@ std::vector<std::string> validation_lines(const Validation& v) {
         : v.variance == ResidualVariance::scatter ? "what neighbouring lines scatter"
                                                   : "noise and distortion",
         expected));
-    lines.push_back(
-        fmt::format("residuals above their 95 % point: {:.1f} %; autocorrelation {:.4f}, 99 % "
-                    "limit {:.4f}",
-                    100.0 * v.whitened_above_95, v.whiteness, v.whiteness_limit));
+    std::string whitened =
+        fmt::format("residuals above their 95 % point: {:.1f} %", 100.0 * v.whitened_above_95);
+    if (v.whiteness_limit > 0.0)
+      whitened += fmt::format("; autocorrelation {:.4f}, 99 % limit {:.4f}", v.whiteness,
+                              v.whiteness_limit);
+    lines.push_back(std::move(whitened));
   } else {
     lines.push_back("too few lines without variances, so the error cannot be compared with noise");
   }
