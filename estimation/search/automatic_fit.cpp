@@ -67,9 +67,11 @@ class AutomaticFit {
     target_ = selection_.exactly + surplus;
     if (surplus > 0) target_ = std::min(target_, affordable_modes());
     if (best_.status() == FitStatus::singular || selection_.keep_modes) return;
+    if (!delay_denied_.empty()) return;
     // Two modes on one peak prevent convergence, and their residual looks like more modes.
     if (selection_.exactly == 0) {
       reduce();
+      if (!simple_) simple_ = best_;
       if (restructure()) reduce();
     }
     grow();
@@ -77,6 +79,7 @@ class AutomaticFit {
     reduce();
     if (selection_.exactly == 0) {
       for (bool changed = restructure(); grow() || changed; changed = restructure()) reduce();
+      a_delay_explains_more();
       return;
     }
     if (!at_rounding()) hold_hidden();
@@ -106,7 +109,6 @@ class AutomaticFit {
     other.take_structure_of(other.best_.model);
     if (!other.mode_may_be_worth_as_much(search->best_)) return;
     other.most_parameters_ = search->best_.parameters;
-    other.ungrown_.reset();
     other.search(0);
     if (other.score() < search->score()) search.emplace(std::move(other));
   }
@@ -209,6 +211,7 @@ class AutomaticFit {
 
   /// The first fit of an open search; then all modes are placed at once by pole relocation, if that is better.
   void begin_relocated_from(const AdditiveModel& model) {
+    start_ = model;
     adopt(fit_additive_model(frf_, model, quick_));
     if (limit_reached()) return;
     const auto modes = static_cast<std::size_t>(count_modes(best_.model));
@@ -323,7 +326,9 @@ class AutomaticFit {
   /// @returns true if anything was changed
   bool restructure() {
     bool changed = false;
-    if (structure_.open == OpenStructure{} || history_.size() == structured_at_) return false;
+    if (structure_.open == OpenStructure{} || history_.size() == structured_at_ ||
+        !delay_denied_.empty())
+      return false;
     while (!limit_reached() && change_structure()) changed = true;
     structured_at_ = history_.size();
     return changed;
@@ -342,7 +347,6 @@ class AutomaticFit {
     const bool was_proportional = !structure_.general_damping;
     take_structure_of(best_.model);
     if (was_proportional && structure_.general_damping) proportional_ = std::move(before_);
-    ungrown_.reset();  // models of one structure are compared
     return true;
   }
 
@@ -434,14 +438,13 @@ class AutomaticFit {
   /// Adds modes while they are worth their parameters. @returns true if any was added.
   bool grow() {
     bool grown = false;
-    if (history_.size() == exhausted_at_) return false;
+    if (history_.size() == exhausted_at_ || !delay_denied_.empty()) return false;
     for (int round = 0; wanted_more(); ++round) {
       if (selection_.exactly == 0 && std::has_single_bit(static_cast<unsigned>(round))) {
         if (restructure()) reduce();
         if (round > 1 && a_delay_explains_more()) break;
       }
       const std::vector<ProposedMode> candidates = proposals(added_together());
-      if (!ungrown_) ungrown_ = best_;
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
     }
@@ -449,25 +452,28 @@ class AutomaticFit {
     return grown;
   }
 
-  /// Returns to the model without the added modes if one delay, which is not to be estimated, is worth more than all of
-  /// them: any number of modes imitates it.
+  /// Returns to the model with which the search began if one delay, which is not to be estimated, is worth more than all
+  /// that was added since: modes and general damping imitate it.
   bool a_delay_explains_more() {
-    if (options_.delay != DelayModel::fixed || !ungrown_) return false;
+    if (options_.delay != DelayModel::fixed || start_.submodels.empty() || !simple_ ||
+        !(cost() < simple_->model.fit.cost))
+      return false;
     FitOptions options = quick_;
     options.delay = DelayModel::estimate;
     options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
-    AdditiveModel model = ungrown_->model;
+    options.max_iterations = options_.max_iterations;
+    AdditiveModel model = start_;  // a fit with a wrong delay has moved the poles
     model.input_delay_s.resize(0);
     model.output_delay_s.resize(0);
     const FitResult trial = fit_additive_model(frf_, model, options);
     if (!is_better(trial)) return false;
     delay_denied_ = fmt::format(
-        "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than {} "
-        "more modes ({:.6g}), which were discarded; use --delay estimate",
-        trial.model.mean_delay_s(), options_.delay_s, trial.model.fit.cost,
-        count_modes(best_.model) - count_modes(ungrown_->model), cost());
+        "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than more "
+        "modes or another structure ({:.6g}), which were discarded; use --delay estimate",
+        trial.model.mean_delay_s(), options_.delay_s, trial.model.fit.cost, cost());
     say("{}", delay_denied_);
-    best_ = *ungrown_;
+    best_ = *simple_;
+    take_structure_of(best_.model);
     return true;
   }
 
@@ -623,9 +629,10 @@ class AutomaticFit {
   Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
   std::string delay_denied_;  ///< why the search ended early; empty if it did not
   FitResult best_;
-  FitResult before_;                  ///< the last one before best_ was adopted
-  std::optional<FitResult> ungrown_;  ///< the last one of this structure before modes were added
-  FitResult proportional_;            ///< the last one before general damping
+  FitResult before_;                 ///< the last one before best_ was adopted
+  AdditiveModel start_;              ///< of the first fit; empty if that was of a part of the data
+  std::optional<FitResult> simple_;  ///< before modes were added or the structure was changed
+  FitResult proportional_;           ///< the last one before general damping
   std::vector<std::string> decisions_;
   std::vector<double> history_;
   // Size of the history when no such move was left; with the same model, none is tried again.

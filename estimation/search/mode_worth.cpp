@@ -89,10 +89,7 @@ double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
 }
 
-double ModeWorth::cost_of_one() const {
-  const double searched = 2.0 + channels_;
-  return cost_of_mode(searched, data_, lines_) + most_by_noise(parameters_of_mode_ - searched);
-}
+double ModeWorth::cost_of_one() const { return cost_of_mode(parameters_of_mode_, data_, lines_); }
 
 double ModeWorth::criterion(const FitResult& fit) const {
   return data_ * std::log(squares(fit)) + penalty(fit.model, fit.parameters);

@@ -39,7 +39,7 @@ class ModeWorth {
 
   double parameters_of_mode() const { return parameters_of_mode_; }
 
-  /// Of a mode, in the units of the criterion.
+  /// Of a mode, in the units of the criterion; also its B_1 by BIC, because they are searched with its place.
   double cost_of_one() const;
 
   /// Decrease of sum W |E|^2 of `fit` above which one more mode is worth its parameters.

@@ -37,7 +37,7 @@ namespace stageid {
 /// reported; the remedy discards as many periods as are needed to get there. Runs have random phases, so the
 /// expected shift is the bound over the root of their number. It is that of the residues, along which a ringing mode
 /// lies; frequency and damping shifted by about 0.45 of it (120 simulated logs with bounds from 7 to 14, and twelve up to
-/// 50). A fault if that is above one and a half deviations although the first period is discarded, at a maximum between
+/// 50). A fault if that is above 1.2 deviations although the first period is discarded, at a maximum between
 /// the lines.
 std::vector<Finding> check_start_transient(const StartEvidence& evidence);
 

@@ -158,7 +158,7 @@ class HeadTest(ProcessTest):
     def test_a_delay_that_is_not_declared(self):
         self.configure("delay", ("fit:\n", "fit:\n  delay_s: 0\n"))
         first = self.identified("delay", "delay")
-        self.assertRegex(first["what"], r"^a delay of 0\.0005\d* s instead of 0 s")
+        self.assertRegex(first["what"], r"^a delay of 0\.0006 s instead of 0 s")
         self.assertEqual(self.obey(first)["head"], [])
 
     def test_noise_alone(self):
