@@ -88,10 +88,10 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   if (frequency_hz.size() == 0)
     fail_request("{}: the model does not contain its band; define the lines with --frf FRF",
                  flags.input.string());
-  warn_if_doubtful(model, flags.input, console);
   const StageConfig stage = load_stage_config(flags.stage);
   Eigen::MatrixXd covariance;
   if (!flags.covariance.empty()) covariance = read_covariance(flags.covariance, model);
+  warn_if_doubtful(model, flags.input, console);
   ControllerView view = controller_view(stage, model, covariance, frequency_hz);
   view.model_fingerprint = fingerprint_of_file(flags.input);
   write_controller_view(flags.output, view);
