@@ -1,38 +1,48 @@
 #include "estimation/modal/line_correlation.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <complex>
 
 namespace stageid {
 namespace {
 
 constexpr Eigen::Index kMostLags = 64;
 constexpr double kClearlyPositive = 5.0;  // standard deviations of the correlation of white noise
+constexpr Eigen::Index kChannels = 256;   // at a time
+
+/// Real parts of the autocorrelation over the lines for lags 0, 1, ...; lag 0 is 1.
+Eigen::ArrayXd autocorrelation(const FrfEstimate& frf, const ModelBlockResponse& model,
+                               const Eigen::MatrixXd& variance, Eigen::Index lags) {
+  Eigen::ArrayXd sums = Eigen::ArrayXd::Zero(lags + 1);
+  for (Eigen::Index first = 0; first < frf.response.rows(); first += kChannels) {
+    const Eigen::Index count = std::min(kChannels, frf.response.rows() - first);
+    const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
+    const Eigen::ArrayXXcd E =
+        frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
+    const Eigen::MatrixXcd white =
+        (of_noise > 0.0).select(E / of_noise.sqrt(), std::complex<double>(0.0));  // 0: unknown
+    for (Eigen::Index lag = 0; lag <= lags; ++lag) {
+      const Eigen::Index n = white.cols() - lag;
+      sums[lag] += white.leftCols(n).conjugate().cwiseProduct(white.rightCols(n)).sum().real();
+    }
+  }
+  return sums / sums[0];
+}
 
 }  // namespace
 
 double lines_per_independent(const FrfEstimate& frf, const ModelBlockResponse& model,
                              const Eigen::MatrixXd& variance) {
-  const Eigen::Index lags = std::min<Eigen::Index>(kMostLags, frf.lines() / 4);
-  if (variance.size() == 0 || lags == 0) return 1.0;
-  Eigen::ArrayXd sums = Eigen::ArrayXd::Zero(lags + 1);
-  for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
-    const Eigen::ArrayXd deviation =
-        variance.row(c).transpose().array().sqrt().max(std::numeric_limits<double>::min());
-    const Eigen::VectorXcd white =
-        (frf.response.row(c) - model({c, 1, 0, frf.lines()})).transpose().array() / deviation;
-    if (!white.allFinite()) continue;
-    for (Eigen::Index lag = 0; lag <= lags; ++lag) {
-      const Eigen::Index n = white.size() - lag;
-      sums[lag] += white.head(n).dot(white.tail(n)).real();
-    }
-  }
+  if (variance.size() == 0 || frf.lines() < 4) return 1.0;
   // The outputs of one input share disturbances, so they count as one.
   const double limit =
       kClearlyPositive / std::sqrt(2.0 * static_cast<double>(frf.lines() * frf.n_inputs()));
+  Eigen::ArrayXd rho = autocorrelation(frf, model, variance, 1);
+  if (!(rho[1] > limit)) return 1.0;
+  rho = autocorrelation(frf, model, variance, std::min(kMostLags, frf.lines() / 4));
   double out = 1.0;
-  for (Eigen::Index lag = 1; lag <= lags && sums[lag] > limit * sums[0]; ++lag)
-    out += 2.0 * sums[lag] / sums[0];
+  for (Eigen::Index lag = 1; lag < rho.size() && rho[lag] > limit; ++lag) out += 2.0 * rho[lag];
   return out;
 }
 
