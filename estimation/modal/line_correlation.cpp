@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 
 namespace stageid {
 namespace {
@@ -22,15 +21,17 @@ Eigen::ArrayXd autocorrelation(const FrfEstimate& frf, const ModelBlockResponse&
         frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
     const Eigen::MatrixXcd white =
         (of_noise > 0.0).select(E / of_noise.sqrt(), std::complex<double>(0.0));  // 0: unknown
-    for (Eigen::Index lag = 0; lag <= lags; ++lag) {
-      const Eigen::Index n = white.cols() - lag;
-      sums[lag] += white.leftCols(n).conjugate().cwiseProduct(white.rightCols(n)).sum().real();
-    }
+    for (Eigen::Index lag = 0; lag <= lags; ++lag) sums[lag] += product_at_lag(white, lag).real();
   }
   return sums / sums[0];
 }
 
 }  // namespace
+
+std::complex<double> product_at_lag(const Eigen::MatrixXcd& x, Eigen::Index lag) {
+  const Eigen::Index n = x.cols() - lag;
+  return x.leftCols(n).conjugate().cwiseProduct(x.rightCols(n)).sum();
+}
 
 double lines_per_independent(const FrfEstimate& frf, const ModelBlockResponse& model,
                              const Eigen::MatrixXd& variance) {

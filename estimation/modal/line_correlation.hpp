@@ -1,8 +1,13 @@
 #pragma once
 
+#include <complex>
+
 #include "estimation/modal/residual_verdict.hpp"
 
 namespace stageid {
+
+/// sum conj(x_k) x_{k + lag} over the lines of all channels. @param x n_c x N  @pre lag < N
+std::complex<double> product_at_lag(const Eigen::MatrixXcd& x, Eigen::Index lag);
 
 /// Of so many neighbouring lines of a residual, one is independent: 1 + 2 sum rho(lag), with the real part rho of the
 /// autocorrelation over the lines, up to the first lag where it is not clearly positive. The noise of lines is alike

@@ -20,10 +20,9 @@ namespace {
 
 // times the variance: the error of the model is then as large as the noise
 constexpr double kAllowed = 2.0;
-constexpr double kByChance = 1e-3;  // probability that any part of a right model is not explained
-constexpr Eigen::Index kRun = 32;   // lines judged together
-constexpr double kRounding =
-    1e-20;  // of the power of a channel on a line: no measurement is more exact
+constexpr double kByChance = 1e-3;   // probability that any part of a right model is not explained
+constexpr Eigen::Index kRun = 32;    // lines judged together
+constexpr double kRounding = 1e-20;  // of the power of a channel: no measurement is more exact
 
 /// Sums over one part of the data.
 struct Part {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "acquisition/files/fail.hpp"
+#include "estimation/modal/line_correlation.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
 
@@ -55,12 +56,8 @@ void require_same_units(const char* kind, const ChannelList& model, const Channe
 void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
   const double power = white.cwiseAbs2().sum();
   if (!(power > 0.0) || white.cols() < 20) return;
-  for (Eigen::Index lag = 1; lag <= 10; ++lag) {
-    const Eigen::Index n = white.cols() - lag;
-    const std::complex<double> sum =
-        white.leftCols(n).conjugate().cwiseProduct(white.rightCols(n)).sum();
-    out.whiteness = std::max(out.whiteness, std::abs(sum) / power);
-  }
+  for (Eigen::Index lag = 1; lag <= 10; ++lag)
+    out.whiteness = std::max(out.whiteness, std::abs(product_at_lag(white, lag)) / power);
   // r|^2 of circular white noise is exponential with mean 1/count; ten lags share the probability of 1 %.
   const double count = static_cast<double>(white.size());
   out.whiteness_limit = std::sqrt(-std::log(1.0 - std::pow(0.99, 0.1)) / count);

@@ -74,7 +74,6 @@ class Regression {
     squares_ += std::norm(product) / power;
   }
   std::complex<double> slope() const { return products_ / power_; }
-  double power() const { return power_; }
   /// Part of the component of W along B that the same c explains in all runs.
   double explained() const {
     return squares_ > 0.0 ? std::norm(products_) / (power_ * squares_) : 1.0;

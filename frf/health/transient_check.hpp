@@ -33,12 +33,12 @@ namespace stageid {
 /// From W = c B follows q: c = (q - mean q^2...q^P) / (1 - mean q...q^P). The transient in the mean of the used
 /// periods, relative to its noise and over all runs, sensors and lines of the window, bounds the shift of every
 /// fitted parameter in its own standard deviations (Cauchy-Schwarz). The reported deviations include the scatter of the
-/// periods by the transient itself: one that is gone after one used period counts as noise. Shifts below half a deviation are not
-/// reported; the remedy discards as many periods as are needed to get there. Runs have random phases, so the
-/// expected shift is the bound over the root of their number. It is that of the residues, along which a ringing mode
-/// lies; frequency and damping shifted by about 0.45 of it (120 simulated logs with bounds from 7 to 14, and twelve up to
-/// 50). A fault if that is above 1.2 deviations although the first period is discarded, at a maximum between
-/// the lines.
+/// periods by the transient itself: one that is gone after one used period counts as noise. Shifts below half a
+/// deviation are not reported; the remedy discards as many periods as are needed to get there. Runs have random phases,
+/// so the expected shift is the bound over the root of their number. It is that of the residues, along which a ringing
+/// mode lies; frequency and damping shifted by about 0.45 of it (120 simulated logs with bounds from 7 to 14, and twelve
+/// up to 50). A fault if that is above 1.2 deviations although the first period is discarded, at a maximum between the
+/// lines.
 std::vector<Finding> check_start_transient(const StartEvidence& evidence);
 
 }  // namespace stageid
