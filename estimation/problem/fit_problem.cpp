@@ -170,6 +170,9 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     group.fractions = fraction_columns(*through[g], problem.lines.omega_rad_s.maxCoeff(),
                                        problem.shapes, beta.a, with_derivatives, problem.held);
   });
+  const SharedMatrix<Eigen::MatrixXd> base(
+      fraction_base(*through[0], groups[0].fractions.lambda, with_derivatives));
+  for (BasisGroup& group : groups) group.fractions.base = base;
   const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
   for_each_task(problem.threads, static_cast<int>(groups.size() * parts), [&](int task) {
     const std::size_t g = static_cast<std::size_t>(task) / parts;

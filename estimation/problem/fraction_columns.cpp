@@ -64,25 +64,6 @@ class PairColumns {
   Eigen::Index pair_;
 };
 
-void fill_base(const HoldEquivalent& through, bool squares, FractionColumns& out) {
-  const Eigen::Index simple = out.simple_columns();
-  out.base.resize(through.lines(), squares ? 2 * simple - 1 : simple);
-  out.base.col(0).setOnes();
-  SplitMatrix q;
-  for (Eigen::Index i = 0; i < out.pairs(); ++i)
-    for (Eigen::Index other = 0; other < 2; ++other) {
-      const Complex lambda = out.lambda[i];
-      through.reciprocal(other == 0 ? lambda : std::conj(lambda), q);
-      const Eigen::Index column = 1 + 4 * i + 2 * other;
-      out.base.col(column) = q.re;
-      out.base.col(column + 1) = q.im;
-      if (!squares) continue;
-      const Eigen::Index square = column + simple - 1;
-      out.base.col(square) = q.re.array().square() - q.im.array().square();
-      out.base.col(square + 1) = 2.0 * q.re.cwiseProduct(q.im);
-    }
-}
-
 }  // namespace
 
 std::complex<double> equation_error_residue(const HoldEquivalent& through,
@@ -92,6 +73,28 @@ std::complex<double> equation_error_residue(const HoldEquivalent& through,
   for (Eigen::Index i = a.size(); i > 0; --i)
     slope = slope * lambda + static_cast<double>(i) * a[i - 1];
   return through.place_slope(lambda) * std::pow(lambda, static_cast<int>(q)) / slope;
+}
+
+Eigen::MatrixXd fraction_base(const HoldEquivalent& through, const std::vector<Complex>& lambda,
+                              bool squares) {
+  const Eigen::Index simple = 1 + 4 * std::ssize(lambda);
+  Eigen::MatrixXd out(through.lines(), squares ? 2 * simple - 1 : simple);
+  out.col(0).setOnes();
+  SplitMatrix q;
+  Eigen::Index column = 1;
+  for (const Complex pole : lambda)
+    for (const Complex one : {pole, std::conj(pole)}) {
+      through.reciprocal(one, q);
+      out.col(column) = q.re;
+      out.col(column + 1) = q.im;
+      if (squares) {
+        const Eigen::Index square = column + simple - 1;
+        out.col(square) = q.re.array().square() - q.im.array().square();
+        out.col(square + 1) = 2.0 * q.re.cwiseProduct(q.im);
+      }
+      column += 2;
+    }
+  return out;
 }
 
 FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
@@ -122,7 +125,6 @@ FractionColumns fraction_columns(const HoldEquivalent& through, double highest_r
       out.Y.push_back(pair ? pair->equation_error(q) : FractionColumn{});
     before += shapes[i].order;
   }
-  fill_base(through, derivatives, out);
   return out;
 }
 

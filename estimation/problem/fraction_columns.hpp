@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimation/model/basis.hpp"
+#include "estimation/problem/shared_matrix.hpp"
 
 namespace stageid {
 
@@ -25,9 +26,8 @@ struct FractionColumns {
   std::vector<std::complex<double>> lambda;  ///< one per pair, rad/s
   std::vector<std::complex<double>> place;   ///< x_lambda
   SplitMatrix first;                         ///< N x 1
-  /// N x (1 + 4 P) or, with squares, N x (1 + 8 P): 1; Re q, Im q, Re p, Im p per pair; then those of
-  /// the squares.
-  Eigen::MatrixXd base;
+  /// See fraction_base(); the same for every delay.
+  SharedMatrix<Eigen::MatrixXd> base;
   std::vector<FractionColumn> F;  ///< as the columns of BasisGroup
   std::vector<FractionColumn> D;  ///< empty without squares
   std::vector<FractionColumn> Y;  ///< of the equation error, see EquationMethod::Y
@@ -36,8 +36,13 @@ struct FractionColumns {
   Eigen::Index simple_columns() const noexcept { return 1 + 4 * pairs(); }
 };
 
+/// N x (1 + 4 P) or, with squares, N x (1 + 8 P): 1; Re q, Im q, Re p, Im p per pair; then those of the squares.
+Eigen::MatrixXd fraction_base(const HoldEquivalent& through,
+                              const std::vector<std::complex<double>>& lambda, bool squares);
+
+/// Everything but the base.
 /// @param a denominator coefficients, one vector per submodel
-/// @param derivatives whether squares, D and Y are computed
+/// @param derivatives whether D and Y are computed
 /// @param held coefficients without columns of D, counted over all submodels
 FractionColumns fraction_columns(const HoldEquivalent& through, double highest_rad_s,
                                  const std::vector<SubmodelShape>& shapes,

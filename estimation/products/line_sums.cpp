@@ -51,7 +51,7 @@ class Share {
     };
     direct(products_.FF, sums_.FF);
     direct(products_.FD, sums_.FD);
-    sums_.S.setZero(members, group_.fractions.base.cols());
+    sums_.S.setZero(members, group_.fractions.base->cols());
     sums_.FE.setZero(n_f_, members);
     sums_.DD.setZero(n_d_, n_d_);
     sums_.ZE.setZero(n_a_);
@@ -85,7 +85,7 @@ class Share {
     if (!regresses()) return;
     const Eigen::VectorXd re = tile(fractions.first.re);
     const Eigen::VectorXd im = tile(fractions.first.im);
-    const auto base = fractions.base.block(first_, 0, n_, simple_columns());
+    const auto base = fractions.base->block(first_, 0, n_, simple_columns());
     const Eigen::MatrixXd V_re = WE_re_ * re.asDiagonal() + WE_im_ * im.asDiagonal();
     const Eigen::MatrixXd V_im = WE_im_ * re.asDiagonal() - WE_re_ * im.asDiagonal();
     sums_.S_re.noalias() += V_re * base;

@@ -121,7 +121,7 @@ void add_fraction_sums(const Eigen::MatrixXd& W, const FractionColumns& fraction
       W * (tile(fractions.first.re).cwiseAbs2() + tile(fractions.first.im).cwiseAbs2())
               .col(0)
               .asDiagonal();
-  S.noalias() += weighted * fractions.base.block(first_line, 0, W.cols(), S.cols());
+  S.noalias() += weighted * fractions.base->block(first_line, 0, W.cols(), S.cols());
 }
 
 void add_pair_sums(const Eigen::MatrixXd& W, const SplitMatrix& X, const SplitMatrix& Y,

@@ -57,9 +57,9 @@ Eigen::VectorXcd written_out(const FractionColumns& columns, const FractionColum
   const Eigen::Index squares = columns.simple_columns() - 1;
   const Eigen::Index at = 1 + 4 * column.pair;
   const auto part = [&](Eigen::Index from) -> Eigen::VectorXcd {
-    return columns.base.col(from) + i * columns.base.col(from + 1);
+    return columns.base->col(from) + i * columns.base->col(from + 1);
   };
-  return Eigen::VectorXcd::Constant(columns.base.rows(), column.constant) +
+  return Eigen::VectorXcd::Constant(columns.base->rows(), column.constant) +
          column.simple * part(at) + std::conj(column.simple) * part(at + 2) +
          column.squared * part(at + squares) + std::conj(column.squared) * part(at + squares + 2);
 }
@@ -98,7 +98,7 @@ TEST(FractionColumns, OfNumeratorsAloneHaveNoSquares) {
   const Case c(HoldModel::exact);
   const BasisGroup bare = evaluate_groups(c.fit, c.evaluated.beta, false).at(0);
   EXPECT_TRUE(bare.fractions.D.empty());
-  EXPECT_EQ(bare.fractions.base, c.group.fractions.base.leftCols(17));
+  EXPECT_EQ(*bare.fractions.base, c.group.fractions.base->leftCols(17));
 }
 
 struct ReductionTest : testing::Test {
@@ -117,7 +117,7 @@ struct ReductionTest : testing::Test {
     Eigen::MatrixXd direct = Eigen::MatrixXd::Zero(std::ssize(reduction.direct()), W.rows());
     add_pair_sums(W, left_columns, right_columns, reduction.direct(), 0, direct);
     const Eigen::MatrixXd sums =
-        reduction.expand(W * size.asDiagonal() * fractions.base, direct, 2);
+        reduction.expand(W * size.asDiagonal() * *fractions.base, direct, 2);
     Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(std::ssize(pairs), W.rows());
     add_pair_sums(W, left_columns, right_columns, pairs, 0, wanted);
     expect_close(pairs, wanted, sums, W, left_columns, right_columns);
@@ -170,7 +170,7 @@ TEST_F(ReductionTest, WithComplexWeightsToo) {
     };
     const auto re = fractions.first.re.col(0).asDiagonal();
     const auto im = fractions.first.im.col(0).asDiagonal();
-    const auto base = fractions.base.leftCols(fractions.simple_columns());
+    const auto base = fractions.base->leftCols(fractions.simple_columns());
     const Eigen::MatrixXd S_re = (V_re * re + V_im * im) * base;
     const Eigen::MatrixXd S_im = (V_im * re - V_re * im) * base;
     const Eigen::MatrixXd size = V_re.cwiseAbs2() + V_im.cwiseAbs2();
