@@ -65,17 +65,6 @@ std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candi
   return out;
 }
 
-AdditiveModel of_inputs(const FrfEstimate& frf, const AdditiveModel& model,
-                        const std::vector<Eigen::Index>& at) {
-  AdditiveModel out = model;
-  if (std::ssize(at) == model.n_inputs()) return out;
-  out.inputs = pick(frf.inputs, at);
-  if (model.input_delay_s.size() > 0) out.input_delay_s = model.input_delay_s(at);
-  for (Submodel& s : out.submodels)
-    for (Eigen::MatrixXd& B : s.numerator) B = B(Eigen::all, at).eval();
-  return out;
-}
-
 bool is_searched_mode(const Submodel& submodel) noexcept {
   return submodel.role == SubmodelRole::searched && submodel.is_mode();
 }

@@ -45,10 +45,6 @@ std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructu
 std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
                                          const ModelStructure& structure);
 
-/// The model of these inputs of the FRF.
-AdditiveModel of_inputs(const FrfEstimate& frf, const AdditiveModel& model,
-                        const std::vector<Eigen::Index>& at);
-
 /// A mode that was found by a search and may be dropped again.
 bool is_searched_mode(const Submodel& submodel) noexcept;
 

@@ -243,7 +243,7 @@ class AutomaticFit {
     structure_.open = search->structure_.open;
     take_structure_of(search->best_.model);
     delay_denied_ = std::move(search->delay_denied_);
-    adopt(fit_additive_model(frf_, with_all_inputs(frf_, search->best_.model), quick_));
+    adopt(fit_additive_model(frf_, with_all_channels(frf_, search->best_.model), quick_));
     structured_at_ = history_.size();
     return true;
   }
@@ -352,7 +352,7 @@ class AutomaticFit {
 
   void take_structure_of(const AdditiveModel& model) {
     const OpenStructure open = structure_.open;
-    structure_ = structure_of(with_all_inputs(frf_, model));
+    structure_ = structure_of(with_all_channels(frf_, model));
     structure_.open = open;
     worth_ = ModeWorth(frf_, structure_, quick_.user_weights);
   }
@@ -425,7 +425,7 @@ class AutomaticFit {
     FitOptions options = quick_;
     options.delay = move.options.delay;
     options.delay_s = move.options.delay_s;
-    if (!all) fit = fit_additive_model(frf_, with_all_inputs(frf_, fit.model), options);
+    if (!all) fit = fit_additive_model(frf_, with_all_channels(frf_, fit.model), options);
     if (!is_better(fit)) return false;
     say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, cost(), fit.model.fit.cost,
         best_.parameters, fit.parameters);

@@ -23,7 +23,7 @@ inline constexpr double kReach = 5.0;
 
 inline constexpr Eigen::Index kPartLines = 500;        ///< at least
 inline constexpr Eigen::Index kPartLinesOfAMode = 20;  ///< at least, per mode
-inline constexpr Eigen::Index kPartChannels = 256;     ///< at most, if an input has no more
+inline constexpr Eigen::Index kPartChannels = 128;     ///< at most; the whole stage has 119
 
 // When the search or its last fit ends.
 

@@ -1,6 +1,7 @@
 #include "estimation/search/trials.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "estimation/model/model_structure.hpp"
@@ -9,6 +10,29 @@
 #include "frf/response/channel_positions.hpp"
 
 namespace stageid {
+namespace {
+
+/// Up to `most` of `count` channels.
+std::vector<Eigen::Index> spread(Eigen::Index most, Eigen::Index count) {
+  const Eigen::Index chosen = std::min(most, count);
+  std::vector<Eigen::Index> out(static_cast<std::size_t>(chosen));
+  for (Eigen::Index i = 0; i < chosen; ++i) out[i] = i * count / chosen;
+  return out;
+}
+
+AdditiveModel of_channels(AdditiveModel model, const FrfEstimate& part,
+                          const std::vector<Eigen::Index>& outputs,
+                          const std::vector<Eigen::Index>& inputs) {
+  model.inputs = part.inputs;
+  model.outputs = part.outputs;
+  if (model.input_delay_s.size() > 0) model.input_delay_s = model.input_delay_s(inputs).eval();
+  if (model.output_delay_s.size() > 0) model.output_delay_s = model.output_delay_s(outputs).eval();
+  for (Submodel& s : model.submodels)
+    for (Eigen::MatrixXd& B : s.numerator) B = B(outputs, inputs).eval();
+  return model;
+}
+
+}  // namespace
 
 FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
   FitOptions trial = options;
@@ -31,35 +55,40 @@ PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
       std::max<Eigen::Index>(kPartLines, kPartLinesOfAMode * count_modes(model));
   const Eigen::Index step = std::max<Eigen::Index>(1, frf.lines() / wanted);
   const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
-  const Eigen::Index count =
-      std::clamp<Eigen::Index>(kPartChannels / frf.n_outputs(), 1, frf.n_inputs());
-  std::vector<Eigen::Index> inputs;
+  const auto side = static_cast<Eigen::Index>(std::sqrt(kPartChannels));
+  const std::vector<Eigen::Index> outputs =
+      spread(std::max(side, kPartChannels / frf.n_inputs()), frf.n_outputs());
+  const std::vector<Eigen::Index> inputs =
+      spread(kPartChannels / std::ssize(outputs), frf.n_inputs());
   std::vector<Eigen::Index> channels;
-  for (Eigen::Index u = 0; u < count; ++u) {
-    inputs.push_back(u * (frf.n_inputs() / count));
-    for (Eigen::Index y = 0; y < frf.n_outputs(); ++y)
-      channels.push_back(inputs.back() * frf.n_outputs() + y);
-  }
+  for (const Eigen::Index u : inputs)
+    for (const Eigen::Index y : outputs) channels.push_back(u * frf.n_outputs() + y);
   PartOfData out;
-  out.all = step == 1 && count == frf.n_inputs();
+  out.all = step == 1 && std::ssize(channels) == frf.response.rows();
   out.options = options;
   out.options.user_weights = Eigen::MatrixXd((*options.user_weights)(channels, lines));
   out.frf.frequency_hz = frf.frequency_hz(lines);
   out.frf.response = frf.response(channels, lines);
   out.frf.correlated_lines = frf.correlated_lines;
   out.frf.inputs = pick(frf.inputs, inputs);
-  out.frf.outputs = frf.outputs;
+  out.frf.outputs = pick(frf.outputs, outputs);
   out.frf.sample_rate_hz = frf.sample_rate_hz;
   out.frf.hold = frf.hold;
-  out.model = of_inputs(frf, model, inputs);
+  out.model = of_channels(model, out.frf, outputs, inputs);
   return out;
 }
 
-AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model) {
-  if (model.n_inputs() == frf.n_inputs()) return model;
-  if (model.input_delay_s.size() > 0)
+AdditiveModel with_all_channels(const FrfEstimate& frf, AdditiveModel model) {
+  if (model.n_inputs() == frf.n_inputs() && model.n_outputs() == frf.n_outputs()) return model;
+  if (model.input_delay_s.size() > 0) {
     model.input_delay_s.setConstant(frf.n_inputs(), model.input_delay_s.mean());
+    if (model.n_outputs() < frf.n_outputs()) {
+      model.input_delay_s.array() += model.output_delay_s.mean();
+      model.output_delay_s.setZero(frf.n_outputs());
+    }
+  }
   model.inputs = frf.inputs;
+  model.outputs = frf.outputs;
   for (Submodel& s : model.submodels)
     for (Eigen::MatrixXd& B : s.numerator) B.setZero(frf.n_outputs(), frf.n_inputs());
   return model;

@@ -10,7 +10,7 @@ namespace stageid {
 /// weights computed once and diagonal, no standard deviations.
 FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options);
 
-/// Some of the lines and inputs of an FRF, evenly spaced, with a model of them and the options of a fit.
+/// Some of the lines, inputs and outputs of an FRF, evenly spaced, with a model of them and the options of a fit.
 struct PartOfData {
   FrfEstimate frf;
   FitOptions options;
@@ -18,13 +18,13 @@ struct PartOfData {
   bool all = false;  ///< there are few: these are all
 };
 
-/// As many lines and inputs as a walk through models needs: at least 500 lines, 20 per mode, up to 256 channels. All, if
-/// there are few. Modes between the lines of the part are found later, on all data.
+/// As many lines and channels as a walk through models needs: at least 500 lines, 20 per mode, up to 128 channels. All, if
+/// there are few. Modes between the lines of the part, or at whose nodes its channels are, are found later, on all data.
 /// @param options with FitOptions::user_weights, which become those of the part
 PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
                         const AdditiveModel& model);
 
-/// The poles and delays of a model of a part, for all inputs; of those that were not in it, the mean delay.
-AdditiveModel with_all_inputs(const FrfEstimate& frf, AdditiveModel model);
+/// The poles and delays of a model of a part, for all channels; of those that were not in it, the mean delay.
+AdditiveModel with_all_channels(const FrfEstimate& frf, AdditiveModel model);
 
 }  // namespace stageid

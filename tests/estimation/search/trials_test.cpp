@@ -41,33 +41,48 @@ TEST(PartOfData, FewDataAreWhole) {
   EXPECT_EQ(part.frf.response, frf.response);
 }
 
-TEST(PartOfData, ManyLinesAndInputsAreTakenEvenly) {
-  FrfEstimate frf = frf_of(2, 300, 1100);
+TEST(PartOfData, ManyLinesAndChannelsAreTakenEvenly) {
+  FrfEstimate frf = frf_of(40, 330, 1100);
   frf.correlated_lines = 3.0;
-  const AdditiveModel model = one_mode(frf);
+  AdditiveModel model = one_mode(frf);
+  model.output_delay_s.setLinSpaced(40, 2e-4, 0.0);
   const PartOfData part = part_of_data(frf, weighed(frf), model);
   EXPECT_FALSE(part.all);
   ASSERT_EQ(part.frf.lines(), 550);
-  ASSERT_EQ(part.frf.n_inputs(), 128);
-  for (Eigen::Index u = 0; u < part.frf.n_inputs(); ++u) {
-    EXPECT_EQ(part.frf.inputs.names[static_cast<std::size_t>(u)], fmt::format("u{}", 2 * u));
-    EXPECT_EQ(part.model.input_delay_s[u], model.input_delay_s[2 * u]);
-    EXPECT_EQ(part.model.submodels[0].numerator[0].col(u),
-              model.submodels[0].numerator[0].col(2 * u));
-    for (Eigen::Index y = 0; y < 2; ++y) {
-      EXPECT_EQ(part.frf.response(2 * u + y, 7), frf.response(4 * u + y, 14));
-      EXPECT_EQ((*part.options.user_weights)(2 * u + y, 7), std::norm(frf.response(4 * u + y, 14)));
+  ASSERT_EQ(part.frf.n_inputs(), 11);
+  ASSERT_EQ(part.frf.n_outputs(), 11);
+  for (Eigen::Index u = 0; u < 11; ++u) {
+    EXPECT_EQ(part.frf.inputs.names[static_cast<std::size_t>(u)], fmt::format("u{}", 30 * u));
+    EXPECT_EQ(part.model.input_delay_s[u], model.input_delay_s[30 * u]);
+    for (Eigen::Index y = 0; y < 11; ++y) {
+      const Eigen::Index of_all = y * 40 / 11;
+      EXPECT_EQ(part.frf.outputs.names[static_cast<std::size_t>(y)], fmt::format("y{}", of_all));
+      EXPECT_EQ(part.model.output_delay_s[y], model.output_delay_s[of_all]);
+      const std::complex<double> response = frf.response(1200 * u + of_all, 14);
+      EXPECT_EQ(part.frf.response(11 * u + y, 7), response);
+      EXPECT_EQ((*part.options.user_weights)(11 * u + y, 7), std::norm(response));
+      EXPECT_EQ(part.model.submodels[0].numerator[0](y, u),
+                model.submodels[0].numerator[0](of_all, 30 * u));
     }
   }
   EXPECT_EQ(part.frf.frequency_hz[7], frf.frequency_hz[14]);
   EXPECT_EQ(part.frf.correlated_lines, 3.0);
 
-  const AdditiveModel whole = with_all_inputs(frf, part.model);
+  const AdditiveModel whole = with_all_channels(frf, part.model);
   EXPECT_EQ(whole.inputs.names, frf.inputs.names);
+  EXPECT_EQ(whole.outputs.names, frf.outputs.names);
   EXPECT_EQ(whole.submodels[0].denominator, model.submodels[0].denominator);
   EXPECT_TRUE(whole.submodels[0].numerator[0].isZero(0.0));
-  ASSERT_EQ(whole.input_delay_s.size(), 300);
-  EXPECT_NEAR(whole.input_delay_s[0], part.model.input_delay_s.mean(), 1e-15);
+  ASSERT_EQ(whole.input_delay_s.size(), 330);
+  ASSERT_EQ(whole.output_delay_s.size(), 40);
+  EXPECT_NEAR(whole.mean_delay_s(), part.model.mean_delay_s(), 1e-15);
+}
+
+TEST(PartOfData, FewInputsLeaveMoreOutputs) {
+  const FrfEstimate frf = frf_of(300, 2, 100);
+  const PartOfData part = part_of_data(frf, weighed(frf), one_mode(frf));
+  EXPECT_EQ(part.frf.n_inputs(), 2);
+  EXPECT_EQ(part.frf.n_outputs(), 64);
 }
 
 TEST(PartOfData, ManyModesNeedManyLines) {
