@@ -56,12 +56,11 @@ struct ArrowSystem::GlobalSums {
 };
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const std::vector<BasisGroup>& groups, FitMethod method,
-                         ChannelEquationsUse use)
+                         const BasisGroups& groups, FitMethod method, ChannelEquationsUse use)
     : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, use) {}
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
+                         const BasisGroups& groups, FitMethod method, IndexRange part,
                          ChannelEquationsUse use)
     : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
   if (keeps()) channels_.resize(part.count);
@@ -73,17 +72,17 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
   const Eigen::Index end =
       std::min(part.first + part.count, (first_tile + own.first + own.count) * kTileChannels);
   std::vector<GlobalSums> sums(own.count, GlobalSums(problem.globals()));
-  for (const BasisGroup& group : groups) {
+  groups.for_each([&](const BasisGroup& group) {
     const std::vector<TileRange> blocks =
         member_blocks(group, {first, end - first}, problem.size());
-    if (blocks.empty()) continue;
+    if (blocks.empty()) return;
     const GroupProducts products(shared_, group);
     for (const TileRange& block : blocks) {
       const Eigen::Index tile = group.channels[block.first_member] / kTileChannels;
       GlobalSums& out = sums[tile - first_tile - own.first];
       if (out.irregular() == 0.0) add_block(products, block, out);
     }
-  }
+  });
   std::vector<Eigen::VectorXd> parts;
   for (GlobalSums& of_tile : sums) parts.push_back(std::move(of_tile.numbers));
   GlobalSums all(problem.globals());

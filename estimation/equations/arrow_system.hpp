@@ -31,13 +31,12 @@ enum class ChannelEquationsUse : std::uint8_t {
 class ArrowSystem {
  public:
   /// @pre `groups` were evaluated with derivatives at `beta`.
-  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method,
-              ChannelEquationsUse use = ChannelEquationsUse::kept);
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta, const BasisGroups& groups,
+              FitMethod method, ChannelEquationsUse use = ChannelEquationsUse::kept);
 
   /// The contribution of these channels only: M, e and the Schur complement are sums over parts.
-  ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-              const std::vector<BasisGroup>& groups, FitMethod method, IndexRange part,
+  ArrowSystem(const FitProblem& problem, const FitParameters& beta, const BasisGroups& groups,
+              FitMethod method, IndexRange part,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
 
   /// The step of the globals with `damping` times the diagonal of the Schur complement added to it; that of the

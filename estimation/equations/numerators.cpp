@@ -137,20 +137,20 @@ IndexRange own_channels(const FitProblem& problem) {
 
 /// Calls visit(group, pairs, block) for its own channels in blocks.
 template <typename Visit>
-void visit_blocks(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+void visit_blocks(const FitProblem& problem, const BasisGroups& groups, Visit visit) {
   const IndexRange own = own_channels(problem);
-  for (const BasisGroup& group : groups) {
+  groups.for_each([&](const BasisGroup& group) {
     // The products of all functions, shared by all blocks.
     const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
                               triangular_pairs(problem.functions()));
     for (const TileRange& block : member_blocks(group, own, problem.size()))
       visit(group, pairs, block);
-  }
+  });
 }
 
 /// Calls visit(c, M) for every own channel with its normal equations, the members of a block in parallel.
 template <typename Visit>
-void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& groups, Visit visit) {
+void visit_channels(const FitProblem& problem, const BasisGroups& groups, Visit visit) {
   visit_blocks(problem, groups, [&](const auto& group, const auto& pairs, const auto& block) {
     const Eigen::MatrixXd FF = gram_sums(problem, group, pairs, block).FF;
     for_each_task(problem.threads, static_cast<int>(FF.cols()), [&](int r) {
@@ -162,8 +162,7 @@ void visit_channels(const FitProblem& problem, const std::vector<BasisGroup>& gr
 }  // namespace
 
 std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
-                                                 const std::vector<BasisGroup>& groups,
-                                                 Eigen::MatrixXd& B) {
+                                                 const BasisGroups& groups, Eigen::MatrixXd& B) {
   B.setZero(problem.channels(), problem.functions());
   const Eigen::Index tiles = channel_tiles(problem.channels());
   const TileShare own = problem.team->share(tiles);
@@ -208,7 +207,7 @@ void gather_numerators(const FitProblem& problem, Eigen::MatrixXd& B) {
   problem.team->gather_rows(kTileChannels, B);
 }
 
-std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+std::vector<double> removal_costs(const FitProblem& problem, const BasisGroups& groups,
                                   const Eigen::MatrixXd& B) {
   Eigen::MatrixXd costs = Eigen::MatrixXd::Zero(std::ssize(problem.shapes), problem.channels());
   visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {
@@ -226,7 +225,7 @@ std::vector<double> removal_costs(const FitProblem& problem, const std::vector<B
   return {sum.begin(), sum.end()};
 }
 
-double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+double shrink_numerators(const FitProblem& problem, const BasisGroups& groups,
                          const std::vector<double>& share, Eigen::MatrixXd& B) {
   Eigen::VectorXd rise = Eigen::VectorXd::Zero(problem.channels());
   visit_channels(problem, groups, [&](Eigen::Index c, const Eigen::MatrixXd& M) {

@@ -19,22 +19,21 @@ struct SolvedNumerators {
 /// the rows of its own channels, see gather_numerators().
 /// @returns nothing if the equations of a channel are singular to rounding
 std::optional<SolvedNumerators> solve_numerators(const FitProblem& problem,
-                                                 const std::vector<BasisGroup>& groups,
-                                                 Eigen::MatrixXd& B);
+                                                 const BasisGroups& groups, Eigen::MatrixXd& B);
 
 /// Gives the numerators of each process to all others.
 void gather_numerators(const FitProblem& problem, Eigen::MatrixXd& B);
 
 /// Rise of sum W |E|^2 if the numerators of a submodel were removed and the others re-solved; one entry per submodel.
 /// @pre `B` solves the convex problem.
-std::vector<double> removal_costs(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+std::vector<double> removal_costs(const FitProblem& problem, const BasisGroups& groups,
                                   const Eigen::MatrixXd& B);
 
 /// Numerators that minimize sum W |E|^2 + sum_i s_i / (1 - s_i) b_i' C_i^-1 b_i: alone, submodel i would keep 1 - s_i
 /// of its numerators b_i. C_i is the block of the inverse normal equations.
 /// @param share s, 0 <= s < 1; one entry per submodel  @pre `B` solves the convex problem
 /// @returns the rise of sum W |E|^2
-double shrink_numerators(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+double shrink_numerators(const FitProblem& problem, const BasisGroups& groups,
                          const std::vector<double>& share, Eigen::MatrixXd& B);
 
 }  // namespace stageid

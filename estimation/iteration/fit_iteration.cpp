@@ -94,7 +94,7 @@ class Iteration : public Descent {
   /// Numerators and cost of the candidate.
   bool solve(Trial& trial) {
     const auto solved =
-        solve_numerators(problem_, evaluate_groups(problem_, trial.beta, false), trial.beta.B);
+        solve_numerators(problem_, BasisGroups(problem_, trial.beta, false), trial.beta.B);
     if (solved) trial.solved = *solved;
     return solved.has_value();
   }
@@ -130,12 +130,10 @@ class Iteration : public Descent {
         gradient, std::abs(system.solve_globals(0.0, result_.frozen).dot(system.schur_gradient())));
   }
 
-  bool descent_step() {
-    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    return factored_ || at_rounding() ? factored_step(groups) : summed_step(groups);
-  }
+  bool descent_step() { return factored_ || at_rounding() ? factored_step() : summed_step(); }
 
-  bool summed_step(const std::vector<BasisGroup>& groups) {
+  bool summed_step() {
+    const BasisGroups groups(problem_, beta_, true);
     const ArrowSystem system(problem_, beta_, groups, options_.method, kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are singular: two modes coincide");
@@ -151,7 +149,8 @@ class Iteration : public Descent {
   }
 
   /// By Gauss-Newton: without a residual, the refined-IV equations are the same.
-  bool factored_step(const std::vector<BasisGroup>& groups) {
+  bool factored_step() {
+    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
     gather_numerators(problem_, beta_.B);
     const FactoredEquations system(problem_, beta_, groups);
     if (!goes_on_with(system)) return false;
@@ -184,8 +183,8 @@ class Iteration : public Descent {
 
   bool fixed_point_step() {
     if (!best_) best_ = Trial{beta_, {cost_}};
-    const std::vector<BasisGroup> groups = evaluate_groups(problem_, beta_, true);
-    const ArrowSystem system(problem_, beta_, groups, FitMethod::sk, kGlobalsOnly);
+    const ArrowSystem system(problem_, beta_, BasisGroups(problem_, beta_, true), FitMethod::sk,
+                             kGlobalsOnly);
     if (!system.regular())
       return end(FitStatus::singular, "the numerators are singular: two modes coincide");
     result_.gradient = gradient_of(system);

@@ -18,7 +18,7 @@ class LowRankIteration : public Descent {
 
  private:
   ArrowSystem equations(const FitParameters& beta) const {
-    return {problem_, beta, evaluate_groups(problem_, beta, true), FitMethod::gn,
+    return {problem_, beta, BasisGroups(problem_, beta, true), FitMethod::gn,
             ChannelEquationsUse::only_kept};
   }
 

@@ -1,6 +1,8 @@
 #include "estimation/problem/fit_problem.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <span>
 
 #include "estimation/problem/search_limit.hpp"
 
@@ -96,6 +98,7 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
 namespace {
 
 constexpr std::size_t kSubmodelsATask = 32;
+constexpr std::size_t kGroupsAtOnce = 16;
 
 /// First columns of a submodel.
 struct SubmodelPlace {
@@ -149,18 +152,20 @@ void add_work(const FitProblem& problem, const WantedBasis& wanted) {
                      columns);
 }
 
-}  // namespace
-
-std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
-                                        bool with_derivatives) {
+/// The groups of all channels, without their functions.
+std::vector<BasisGroup> unevaluated_groups(const FitParameters& beta) {
   std::vector<BasisGroup> groups;
   for (auto& [delay, channels] : channels_by_delay(beta.input_delay_s, beta.output_delay_s)) {
     groups.emplace_back().delay_s = delay;
     groups.back().channels = std::move(channels);
   }
+  return groups;
+}
 
+/// @param base see fraction_base(); if empty, it is computed
+void evaluate(const FitProblem& problem, const FitParameters& beta, bool with_derivatives,
+              std::span<BasisGroup> groups, std::optional<SharedMatrix<Eigen::MatrixXd>>& base) {
   const WantedBasis wanted{with_derivatives, with_derivatives && problem.delays() > 0};
-  if (problem.limit) add_work(problem, wanted);
   const std::vector<SubmodelPlace> places = submodel_places(problem);
   std::vector<std::optional<HoldEquivalent>> through(groups.size());
   for_each_task(problem.threads, static_cast<int>(groups.size()), [&](int g) {
@@ -170,9 +175,8 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     group.fractions = fraction_columns(*through[g], problem.lines.omega_rad_s.maxCoeff(),
                                        problem.shapes, beta.a, with_derivatives, problem.held);
   });
-  const SharedMatrix<Eigen::MatrixXd> base(
-      fraction_base(*through[0], groups[0].fractions.lambda, with_derivatives));
-  for (BasisGroup& group : groups) group.fractions.base = base;
+  if (!base) base = fraction_base(*through[0], groups[0].fractions.lambda, with_derivatives);
+  for (BasisGroup& group : groups) group.fractions.base = *base;
   const std::size_t parts = (places.size() + kSubmodelsATask - 1) / kSubmodelsATask;
   for_each_task(problem.threads, static_cast<int>(groups.size() * parts), [&](int task) {
     const std::size_t g = static_cast<std::size_t>(task) / parts;
@@ -181,7 +185,44 @@ std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitPara
     for (std::size_t i = first; i < std::min(places.size(), first + kSubmodelsATask); ++i)
       evaluate_submodel(problem, *through[g], beta, i, places[i], wanted, basis, groups[g]);
   });
-  return groups;
+}
+
+/// Calls visit(groups) for the evaluated groups, `most` at a time.
+template <typename Visit>
+void visit_groups(const FitProblem& problem, const FitParameters& beta, bool with_derivatives,
+                  std::size_t most, Visit visit) {
+  if (problem.limit) add_work(problem, {with_derivatives, false});
+  std::vector<BasisGroup> groups = unevaluated_groups(beta);
+  std::optional<SharedMatrix<Eigen::MatrixXd>> base;
+  for (std::size_t first = 0; first < groups.size(); first += most) {
+    const std::span<BasisGroup> some(groups.data() + first, std::min(most, groups.size() - first));
+    evaluate(problem, beta, with_derivatives, some, base);
+    visit(some);
+    for (BasisGroup& group : some) group = {};
+  }
+}
+
+}  // namespace
+
+std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
+                                        bool with_derivatives) {
+  std::vector<BasisGroup> out;
+  visit_groups(problem, beta, with_derivatives, problem.channels(), [&](auto groups) {
+    out.assign(std::move_iterator(groups.begin()), std::move_iterator(groups.end()));
+  });
+  return out;
+}
+
+BasisGroups::BasisGroups(const FitProblem& problem, const FitParameters& beta,
+                         bool with_derivatives)
+    : problem_(&problem), beta_(&beta), with_derivatives_(with_derivatives) {}
+
+void BasisGroups::for_each(const std::function<void(const BasisGroup&)>& visit) const {
+  if (evaluated_ != nullptr)
+    std::ranges::for_each(*evaluated_, visit);
+  else
+    visit_groups(*problem_, *beta_, with_derivatives_, kGroupsAtOnce,
+                 [&](auto groups) { std::ranges::for_each(groups, visit); });
 }
 
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,

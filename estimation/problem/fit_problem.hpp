@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -138,6 +139,26 @@ FitParameters stepped(const FitProblem& problem, const FitParameters& beta,
 /// Evaluates the functions of every group of channels at the parameters.
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives);
+
+/// The same for one group after the other. Many are evaluated a few at a time: with a delay per channel, all of them
+/// together would need many times the memory of the data.
+class BasisGroups {
+ public:
+  /// Both must outlive this.
+  BasisGroups(const FitProblem& problem, const FitParameters& beta, bool with_derivatives);
+  /// Groups that are already evaluated, and kept elsewhere.
+  BasisGroups(const std::vector<BasisGroup>& evaluated)  // NOLINT: they are such groups
+      : evaluated_(&evaluated) {}
+
+  /// Calls visit(group) in the order of evaluate_groups().
+  void for_each(const std::function<void(const BasisGroup&)>& visit) const;
+
+ private:
+  const std::vector<BasisGroup>* evaluated_ = nullptr;  // null: not yet
+  const FitProblem* problem_ = nullptr;
+  const FitParameters* beta_ = nullptr;
+  bool with_derivatives_ = false;
+};
 
 /// The group of every channel.
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,

@@ -96,7 +96,7 @@ void fill_model(const FrfEstimate& frf, const FitOptions& options, const FitProb
     if (Submodel& s = result.model.submodels[i]; !s.is_mode())
       s.poles = pole_estimates(beta.a[i], Eigen::MatrixXd());
   if (result.removal_cost.empty())
-    result.removal_cost = removal_costs(problem, evaluate_groups(problem, beta, false), beta.B);
+    result.removal_cost = removal_costs(problem, BasisGroups(problem, beta, false), beta.B);
 }
 
 void fill_record(const FitOptions& options, const IterationResult& iteration, double relative_rms,
@@ -143,7 +143,7 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
     if (const Submodel& s = result.model.submodels[i]; is_searched_mode(s) && s.frequency_held)
       hidden.push_back(i);
   if (hidden.empty()) return;
-  const std::vector<BasisGroup> groups = evaluate_groups(problem, beta, false);
+  const BasisGroups groups(problem, beta, false);
   double cost = iteration.end_cost;
   result.removal_cost =
       removal_costs(problem, groups, beta.B);  // of the solution of the convex problem

@@ -41,7 +41,7 @@ int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, in
   return hidden;
 }
 
-void shrink_hidden_modes(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+void shrink_hidden_modes(const FitProblem& problem, const BasisGroups& groups,
                          const std::vector<std::size_t>& hidden, const std::vector<double>& removal,
                          Eigen::MatrixXd& B, double& cost) {
   const auto channels = static_cast<double>(problem.channels());

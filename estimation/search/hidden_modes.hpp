@@ -24,7 +24,7 @@ int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, in
 /// Source: James and Stein, Fourth Berkeley Symposium 1 (1961) 361.
 /// @param hidden submodels  @param removal removal_costs() of B @pre `B` solves the convex problem, with that cost
 /// @param[in,out] B n_c x n_f  @param[in,out] cost 1/(2N) sum W |E|^2
-void shrink_hidden_modes(const FitProblem& problem, const std::vector<BasisGroup>& groups,
+void shrink_hidden_modes(const FitProblem& problem, const BasisGroups& groups,
                          const std::vector<std::size_t>& hidden, const std::vector<double>& removal,
                          Eigen::MatrixXd& B, double& cost);
 

@@ -46,8 +46,7 @@ void search_delay(const FitProblem& problem, FitParameters& beta) {
   trial.output_delay_s.setZero(relative.n_outputs);
   for (int i = 0; i <= 24; ++i) {
     trial.input_delay_s.setConstant(step * i);
-    const std::vector<BasisGroup> groups = evaluate_groups(relative, trial, false);
-    const auto solved = solve_numerators(relative, groups, trial.B);
+    const auto solved = solve_numerators(relative, BasisGroups(relative, trial, false), trial.B);
     if (!solved || !(solved->cost < best_cost)) continue;
     best_cost = solved->cost;
     best.setConstant(step * i);
