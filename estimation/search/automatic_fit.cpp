@@ -59,7 +59,7 @@ class AutomaticFit {
   bool may_exchange() const {
     return selection_.exactly > 0 && !selection_.keep_modes &&
            selection_.exactly < affordable_modes() && best_.status() != FitStatus::singular &&
-           !at_rounding() && !limit_reached() && misses_a_mode();
+           !at_rounding() && !limit_reached() && missing_mode();
   }
 
   /// @param surplus modes to grow beyond the requested number
@@ -72,7 +72,7 @@ class AutomaticFit {
     if (selection_.exactly == 0) {
       reduce();
       if (!simple_) simple_ = best_;
-      if (restructure()) reduce();
+      if (!misses_mode_beside_lines() && restructure()) reduce();
     }
     grow();
     if (surplus > 0) restructure();
@@ -160,10 +160,18 @@ class AutomaticFit {
     return proposed_modes(frf_, best_.model, quick_.user_weights, most, quick_.workers());
   }
 
-  /// Whether the residual contains a mode that may be worth its parameters.
-  bool misses_a_mode() const {
+  /// The largest mode in the residual, if it may be worth its parameters.
+  std::optional<ModeCandidate> missing_mode() const {
     const std::vector<ProposedMode> missed = proposals(1);
-    return !missed.empty() && kReach * missed.front().gain > worth_.price(best_);
+    if (missed.empty() || kReach * missed.front().gain <= worth_.price(best_)) return std::nullopt;
+    return missed.front().mode;
+  }
+
+  /// Whether that mode is beside the lines. Every structure imitates such modes, so they are added first.
+  bool misses_mode_beside_lines() const {
+    const std::optional<ModeCandidate> mode = missing_mode();
+    return mode && (mode->frequency_hz < frf_.frequency_hz[0] ||
+                    mode->frequency_hz > frf_.frequency_hz[frf_.lines() - 1]);
   }
 
   /// Whether a further mode may be worth as much per parameter (of the logarithm of the cost) as those of a larger model.
