@@ -58,6 +58,14 @@ struct ModeShapeDeviation {
   double modal_mass = 0.0;
 };
 
+/// What a fit does not change of the pole of a mode.
+enum class HeldPole : std::uint8_t {
+  none,
+  frequency,  ///< a_2
+  pole,       ///< a_1 and a_2
+  guess  ///< both, but what others owe to their value is unknown: the covariance counts them as free
+};
+
 /// P_i(s) = (B_0 + B_1 s + ...) / (s^integrators (1 + a_1 s + ...)), s in rad/s.
 struct Submodel {
   int integrators = 0;
@@ -74,10 +82,7 @@ struct Submodel {
   std::vector<PoleEstimate> poles = {};
 
   SubmodelRole role = SubmodelRole::searched;
-  bool frequency_held = false;  ///< a mode with fixed a_2
-  bool damping_held = false;    ///< a mode with fixed a_1
-  /// The held values are a guess, so what others owe to them is unknown too: the covariance counts them as free.
-  bool is_guess = false;
+  HeldPole held = HeldPole::none;
   std::vector<Eigen::MatrixXd> numerator_std = {};  ///< per entry of numerator; empty: unknown
 
   int order() const noexcept { return static_cast<int>(denominator.size()) - 1; }  ///< n

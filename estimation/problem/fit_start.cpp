@@ -35,13 +35,14 @@ void check_structure(const FrfEstimate& frf, const AdditiveModel& start) {
           "fit: at most one submodel may have integrators; otherwise the model is not unique");
 }
 
-/// a_2 of the modes whose frequency is held.
-std::vector<Eigen::Index> held_frequencies(const AdditiveModel& start) {
+/// The coefficients of the poles that are held.
+std::vector<Eigen::Index> held_coefficients(const AdditiveModel& start) {
   std::vector<Eigen::Index> out;
   Eigen::Index first = 0;
   for (const Submodel& s : start.submodels) {
-    if (s.is_mode() && s.damping_held) out.push_back(first);
-    if (s.is_mode() && s.frequency_held) out.push_back(first + 1);
+    const HeldPole held = s.is_mode() ? s.held : HeldPole::none;
+    if (held == HeldPole::pole || held == HeldPole::guess) out.push_back(first);
+    if (held != HeldPole::none) out.push_back(first + 1);
     first += s.order();
   }
   return out;
@@ -87,7 +88,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
     problem.shapes.push_back(shape_of(s));
     problem.roles.push_back(s.role);
   }
-  problem.held = held_frequencies(start);
+  problem.held = held_coefficients(start);
   problem.delay = options.delay;
   problem.limit = options.limit;
   problem.threads = worker_count(options.threads);
@@ -124,7 +125,8 @@ void drop_guesses(const AdditiveModel& model, std::vector<Eigen::Index>& globals
   Eigen::Index first = 0;
   for (const Submodel& s : model.submodels) {
     const Eigen::Index next = first + s.order();
-    if (s.is_guess) std::erase_if(globals, [&](Eigen::Index p) { return p >= first && p < next; });
+    if (s.held == HeldPole::guess)
+      std::erase_if(globals, [&](Eigen::Index p) { return p >= first && p < next; });
     first = next;
   }
 }

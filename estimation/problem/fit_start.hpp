@@ -20,7 +20,7 @@ FitProblem make_problem(const FrfEstimate& frf, const AdditiveModel& start,
 FitParameters make_parameters(const FitProblem& problem, const AdditiveModel& start,
                               const FitOptions& options);
 
-/// Removes the coefficients of poles that are held at a guess (Submodel::is_guess) from globals of a fit of this model.
+/// Removes the coefficients of poles that are held at a guess (HeldPole::guess) from globals of a fit of this model.
 void drop_guesses(const AdditiveModel& model, std::vector<Eigen::Index>& globals);
 
 /// Writes denominators, numerators and delays into a model with the structure of the problem.

@@ -213,7 +213,7 @@ class AutomaticFit {
   double settled() const {
     double free = 0.0;
     for (const Submodel& s : best_.model.submodels)
-      if (is_searched_mode(s) && !s.frequency_held) free += 2.0;
+      if (is_searched_mode(s) && s.held == HeldPole::none) free += 2.0;
     return kSettled * std::sqrt(free);
   }
 
@@ -309,9 +309,9 @@ class AutomaticFit {
     for (const ModeCandidate& mode : modes) {
       Submodel& s = model.submodels.emplace_back(mode_submodel(frf_, structure_, mode));
       // The lines show only the asymptote of a pole an octave beside them; free, it would go to a noise peak.
-      s.frequency_held = s.damping_held =
-          selection_.keep_modes && (2.0 * mode.frequency_hz < frf_.frequency_hz[0] ||
-                                    mode.frequency_hz > 2.0 * frf_.frequency_hz[frf_.lines() - 1]);
+      const bool is_far_beside = 2.0 * mode.frequency_hz < frf_.frequency_hz[0] ||
+                                 mode.frequency_hz > 2.0 * frf_.frequency_hz[frf_.lines() - 1];
+      if (selection_.keep_modes && is_far_beside) s.held = HeldPole::pole;
     }
     return model;
   }

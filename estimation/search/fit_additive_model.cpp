@@ -140,7 +140,8 @@ void shrink_hidden(const FitProblem& problem, FitParameters& beta, IterationResu
                    FitResult& result) {
   std::vector<std::size_t> hidden;
   for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
-    if (const Submodel& s = result.model.submodels[i]; is_searched_mode(s) && s.frequency_held)
+    if (const Submodel& s = result.model.submodels[i];
+        is_searched_mode(s) && s.held != HeldPole::none)
       hidden.push_back(i);
   if (hidden.empty()) return;
   const BasisGroups groups(problem, beta, false);

@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kNamed = 8;          // in a message
 constexpr std::size_t kChannelsNamed = 6;  // likewise
 
-bool is_held_by_request(const Submodel& s) { return s.frequency_held || s.damping_held; }
+bool is_held_by_request(const Submodel& s) { return s.held != HeldPole::none; }
 
 /// Standard deviation of the frequency; if unknown, a part of the half-power width.
 double deviation_hz(const Submodel& s) {
@@ -59,7 +59,7 @@ std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) 
     return fit.model.submodels[i].damping_ratio() < kBroad
                ? "at its bound: narrower than the line spacing, undamped or unstable"
                : "at its bound";
-  if (fit.model.submodels[i].frequency_held) return "hidden by noise and held";
+  if (is_held_by_request(fit.model.submodels[i])) return "hidden by noise and held";
   return pole_doubt(fit, i) < 1.0 ? "does not justify its parameters (BIC)"
                                   : "with a standard deviation as large";
 }
@@ -151,7 +151,7 @@ std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const Additiv
   for (const auto& [i, j] : overlapping_modes(model)) {
     const Submodel& one = model.submodels[i];
     const Submodel& other = model.submodels[j];
-    if (one.frequency_held || other.frequency_held) continue;
+    if (is_held_by_request(one) || is_held_by_request(other)) continue;
     const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
     if (apart_hz < std::min(deviation_hz(one), deviation_hz(other))) return std::pair(i, j);
   }
@@ -165,7 +165,7 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   const bool asked = number == ModeNumber::asked;
   const bool beside = !is_between_lines(s, fit.model.fit, asked);
   if (!beside && fit.is_held(submodel) && !is_held_by_request(s)) return ModeVerdict::at_bound;
-  if (asked && s.frequency_held) return ModeVerdict::weak;  // hold_hidden_modes()
+  if (asked && is_held_by_request(s)) return ModeVerdict::weak;  // hold_hidden_modes()
   const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
   const bool unselected = number != ModeNumber::chosen;
   if (!is_held_by_request(s) && (open || (unselected && is_worth_nothing(frf, fit, submodel))))

@@ -35,8 +35,9 @@ int hold_hidden_modes(const FrfEstimate& frf, const Eigen::MatrixXd& weights, in
     const auto numbers =
         static_cast<double>(s.numerator.size() * static_cast<std::size_t>(channels));
     const double by_noise = tail_of_chi_square(fit.removal_cost[i] / noise, numbers);
-    s.frequency_held = s.damping_held = by_noise * static_cast<double>(frf.lines()) >= 1.0;
-    if (s.frequency_held) ++hidden;
+    const bool is_hidden = by_noise * static_cast<double>(frf.lines()) >= 1.0;
+    s.held = is_hidden ? HeldPole::pole : HeldPole::none;
+    if (is_hidden) ++hidden;
   }
   return hidden;
 }

@@ -45,8 +45,7 @@ Simpler with_held(const AdditiveModel& model, std::size_t i, const std::string& 
   Simpler out{model,
               fmt::format("held the pole at {:.6g} Hz, which the data need but do not determine {}",
                           model.submodels[i].natural_frequency_hz(), doubt)};
-  Submodel& s = out.model.submodels[i];
-  s.frequency_held = s.damping_held = s.is_guess = true;
+  out.model.submodels[i].held = HeldPole::guess;
   return out;
 }
 
@@ -158,7 +157,7 @@ void hold_suspensions(const FrfEstimate& frf, const FitOptions& options, FitResu
         std::isfinite(doubt)
             ? fmt::format(" (standard deviation {:.2g} Hz)", doubt * s.natural_frequency_hz())
             : " (at its bound)"));
-    s.frequency_held = true;
+    s.held = HeldPole::frequency;
     fit = fit_additive_model(frf, held, options);
   }
 }

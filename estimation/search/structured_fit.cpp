@@ -27,7 +27,7 @@ std::vector<Submodel> suspension_modes(const FrfEstimate& frf,
   std::vector<Submodel> out;
   for (const double frequency_hz : known_hz) {
     out.push_back(suspension_mode(frf, frequency_hz));
-    out.back().frequency_held = true;
+    out.back().held = HeldPole::frequency;
   }
   return out;
 }

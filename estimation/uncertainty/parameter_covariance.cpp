@@ -377,7 +377,7 @@ void fill_deviations(const FitProblem& problem, const ParameterCovariance& covar
   Eigen::Index f = 0;
   for (Submodel& s : model.submodels) {
     const Eigen::Index order = s.order();
-    if (s.is_mode() && !s.is_guess) {
+    if (s.is_mode() && s.held != HeldPole::guess) {
       const Eigen::Matrix2d C = covariance.globals.block<2, 2>(first, first);
       const double a1 = s.denominator[1];
       const double a2 = s.denominator[2];

@@ -258,7 +258,7 @@ test::DenseProblem suspended_body() {
     add(frequency_hz, 0.015, random_matrix(random, 2, 1) * random_matrix(random, 1, 3));
   for (const std::size_t i : {0, 1}) {
     problem.model.submodels[i].role = SubmodelRole::suspension;
-    problem.model.submodels[i].frequency_held = true;
+    problem.model.submodels[i].held = HeldPole::frequency;
   }
   problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
   return problem;

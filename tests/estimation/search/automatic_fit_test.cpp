@@ -231,10 +231,10 @@ TEST(AutomaticFit, ModesHiddenByNoiseAreHeldAndToldWhateverTheirNumber) {
     const FitResult fit = fit_model(comb_of(modes), request);
     EXPECT_EQ(fit.status(), FitStatus::undetermined);
     EXPECT_THAT(fit.message(), testing::HasSubstr("the data do not support the modes at"));
-    held += std::ranges::count(fit.model.submodels, true, &Submodel::frequency_held);
+    held += std::ranges::count(fit.model.submodels, HeldPole::pole, &Submodel::held);
     int determined = 0;
     for (const Submodel& s : fit.model.submodels) {
-      EXPECT_TRUE(!s.frequency_held || s.verdict == ModeVerdict::weak);
+      EXPECT_TRUE(s.held == HeldPole::none || s.verdict == ModeVerdict::weak);
       if (s.verdict != ModeVerdict::determined) continue;
       ++determined;
       const double number = s.natural_frequency_hz() / 20.0;

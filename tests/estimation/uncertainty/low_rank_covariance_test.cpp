@@ -120,7 +120,7 @@ TEST(LowRankCovariance, OfTheResponseIsRightWhereModesImitateEachOther) {
     const double hz = part * stage.problem.frequency_hz[0];
     const double omega_rad_s = 2.0 * std::numbers::pi * hz;
     spring.denominator = {1.0, 0.1 / omega_rad_s, 1.0 / (omega_rad_s * omega_rad_s)};
-    spring.frequency_held = spring.damping_held = true;
+    spring.held = HeldPole::pole;
     model.submodels.push_back(spring);
   }
   stage.problem.G = test::reference_response(model, stage.problem.frequency_hz, stage.problem.hold);

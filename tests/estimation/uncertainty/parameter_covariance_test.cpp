@@ -219,15 +219,14 @@ TEST(ParameterCovariance, AGuessedPoleCountsAsUnknown) {
   const FitOptions options = options_with(Weighting::noise_variance);
   const FitResult free = fit_additive_model(frf, problem.model, options);
   ASSERT_TRUE(free.trustworthy()) << free.message();
-  const auto held = [&](bool is_guess) {
+  const auto held = [&](HeldPole as) {
     AdditiveModel model = free.model;
     Submodel& mode = model.submodels.back();  // one of a close pair
-    mode.frequency_held = mode.damping_held = true;
-    mode.is_guess = is_guess;
+    mode.held = as;
     return fit_additive_model(frf, model, options);
   };
-  const FitResult guessed = held(true);
-  const FitResult known = held(false);
+  const FitResult guessed = held(HeldPole::guess);
+  const FitResult known = held(HeldPole::pole);
   double least = 1.0;
   for (std::size_t i = 0; i < free.model.submodels.size(); ++i) {
     const Submodel& one = free.model.submodels[i];
