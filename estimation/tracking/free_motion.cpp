@@ -1,12 +1,12 @@
 #include "estimation/tracking/free_motion.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <vector>
 
 #include "estimation/model/basis.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -20,9 +20,9 @@ Eigen::MatrixXd shapes_of(const Submodel& submodel, double omega_rad_s) {
   Eigen::MatrixXd all(submodel.numerator.front().rows(), n_u * std::ssize(submodel.numerator));
   for (Eigen::Index p = 0; p < std::ssize(submodel.numerator); ++p)
     all.middleCols(p * n_u, n_u) = submodel.numerator[p] * std::pow(omega_rad_s, p);
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(all, Eigen::ComputeThinU);
-  svd.setThreshold(kOfShape);
-  return svd.matrixU().leftCols(svd.rank());
+  Eigen::BDCSVD<Eigen::MatrixXd> parts = svd(all, Eigen::ComputeThinU);
+  parts.setThreshold(kOfShape);
+  return parts.matrixU().leftCols(parts.rank());
 }
 
 /// shape x spectrum for all of both, with norm 1

@@ -77,7 +77,7 @@ class ModeResidue {
   const Submodel& mode_;
   Complex lambda_;
   Eigen::MatrixXcd M_;
-  Eigen::JacobiSVD<Eigen::MatrixXcd> svd_;
+  Eigen::BDCSVD<Eigen::MatrixXcd> svd_;
   Eigen::MatrixXcd u_;
   Eigen::MatrixXcd v_;
   Eigen::Index leading_ = 0;

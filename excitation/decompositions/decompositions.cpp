@@ -63,12 +63,12 @@ Eigen::VectorXd hermitian_eigenvalues(const Eigen::MatrixXcd& m) {
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(m, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-Eigen::JacobiSVD<Eigen::MatrixXd> svd(const Eigen::MatrixXd& m, unsigned vectors) {
-  return Eigen::JacobiSVD<Eigen::MatrixXd>(m, vectors);
+Eigen::BDCSVD<Eigen::MatrixXd> svd(const Eigen::MatrixXd& m, unsigned vectors) {
+  return Eigen::BDCSVD<Eigen::MatrixXd>(m, vectors);
 }
 
-Eigen::JacobiSVD<Eigen::MatrixXcd> svd(const Eigen::MatrixXcd& m, unsigned vectors) {
-  return Eigen::JacobiSVD<Eigen::MatrixXcd>(m, vectors);
+Eigen::BDCSVD<Eigen::MatrixXcd> svd(const Eigen::MatrixXcd& m, unsigned vectors) {
+  return Eigen::BDCSVD<Eigen::MatrixXcd>(m, vectors);
 }
 
 void qr_in_place(Eigen::MatrixXd& m) { Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(m); }

@@ -29,8 +29,8 @@ Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> symmetric_eigen(const Eigen::Matr
 Eigen::VectorXd hermitian_eigenvalues(const Eigen::MatrixXcd& m);
 
 /// Singular values, largest first, and the requested vectors: Eigen::ComputeThinU, Eigen::ComputeFullV, ... or 0.
-Eigen::JacobiSVD<Eigen::MatrixXd> svd(const Eigen::MatrixXd& m, unsigned vectors);
-Eigen::JacobiSVD<Eigen::MatrixXcd> svd(const Eigen::MatrixXcd& m, unsigned vectors);
+Eigen::BDCSVD<Eigen::MatrixXd> svd(const Eigen::MatrixXd& m, unsigned vectors);
+Eigen::BDCSVD<Eigen::MatrixXcd> svd(const Eigen::MatrixXcd& m, unsigned vectors);
 
 /// Leaves R of m = Q R in the upper triangle, Householder vectors below.
 void qr_in_place(Eigen::MatrixXd& m);

@@ -22,7 +22,7 @@ double omega_of(double frequency_hz) { return 2.0 * std::numbers::pi * frequency
 
 /// Projects onto the motions of the channels that are possible for a rigid body.
 MatrixXd onto_range(const MatrixXd& motions) {
-  Eigen::JacobiSVD<MatrixXd> parts = svd(motions, Eigen::ComputeThinU);
+  Eigen::BDCSVD<MatrixXd> parts = svd(motions, Eigen::ComputeThinU);
   parts.setThreshold(kSmallestMotion);
   const MatrixXd U = parts.matrixU().leftCols(parts.rank());
   return U * U.transpose();

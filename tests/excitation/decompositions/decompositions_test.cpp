@@ -80,6 +80,19 @@ TEST(Decompositions, SingularVectorsOfTheRequestedKind) {
   EXPECT_TRUE(back.isApprox(Complex(0.0, 1.0) * m));
 }
 
+TEST(Decompositions, SingularValuesOfLargeMatricesOfAnyRank) {
+  for (const Eigen::Index rank : {Eigen::Index{3}, Eigen::Index{40}}) {
+    const MatrixXcd m = MatrixXcd::Random(40, rank) * MatrixXcd::Random(rank, 60);
+    const auto parts = svd(m, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const MatrixXcd back =
+        parts.matrixU() * parts.singularValues().asDiagonal() * parts.matrixV().adjoint();
+    EXPECT_TRUE(back.isApprox(m));
+    EXPECT_TRUE((parts.matrixU().adjoint() * parts.matrixU()).isIdentity(1e-12));
+    const VectorXd squares = hermitian_eigenvalues(m * m.adjoint()).reverse();
+    EXPECT_TRUE(parts.singularValues().cwiseAbs2().isApprox(squares, 1e-12));
+  }
+}
+
 TEST(Decompositions, TheTriangleInPlaceIsTheCholeskyFactorUpToSigns) {
   const MatrixXd m = MatrixXd::Random(7, 3);
   MatrixXd factored = m;
