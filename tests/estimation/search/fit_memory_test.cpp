@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "estimation/iteration/fit_iteration.hpp"
+#include "estimation/problem/fit_start.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/support/process/heap_peak.hpp"
@@ -110,6 +112,18 @@ TEST_F(FitMemory, HoldsForTheWholeWayFromNothingWithTheDelayEstimated) {
   options_.delay = DelayModel::estimate;
   options_.delay_s = 0.0;
   expect_little_beside(1.0, [&] { return structured_fit(frf_, {}, {}, options_); });
+}
+
+TEST_F(FitMemory, DoesNotGrowWithADelayPerChannel) {
+  options_.delay = DelayModel::per_channel;
+  options_.max_iterations = 1;
+  start_.input_delay_s.array() += Eigen::ArrayXd::LinSpaced(frf_.n_inputs(), 0.0, 1e-6);
+  start_.output_delay_s = Eigen::VectorXd::LinSpaced(frf_.n_outputs(), 1e-8, 0.0);
+  const FitProblem problem = make_problem(frf_, start_, options_, make_weights(frf_, options_));
+  FitParameters beta = make_parameters(problem, start_, options_);
+  const test::HeapPeak peak;
+  iterate(problem, beta, options_);
+  EXPECT_LT(static_cast<double>(peak.bytes()), kBeyond * (given() + entry_));
 }
 
 }  // namespace test_fit_memory

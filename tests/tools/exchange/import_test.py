@@ -150,7 +150,7 @@ class WithAMap(Case):
         np.testing.assert_array_equal(back["response"][:, 0, 1], y)
         for wrong, error in ((text.replace(";deg;", ";mag;"), "x.csv:1: duplicate column name"),
                              (text + "1;2;nonsense;4;5;\n", "got 'nonsense' in column 3"),
-                             (text + "9;-40;0;4;5;\n", "'mag' has a magnitude of -40"),
+                             (text + "9;-40;0;4;5;\n", "x.csv:mag: a magnitude is -40"),
                              (text + "1;2;" + "nonsense" * 9 + ";4;5;\n",
                               "'" + ("nonsense" * 9)[:37] + "...' in column 3")):
             (WORK / "x.csv").write_text(wrong)

@@ -87,7 +87,7 @@ Complex polar_of(const ArrayList& arrays, const ImportMap::Channel& channel) {
   Complex values = complex_of(arrays, channel.magnitude, channel.phase_deg);
   for (std::complex<double>& value : values) {
     if (value.real() < 0.0)
-      arrays.fail(channel.magnitude, "has a magnitude of {}; convert values in dB by 10^(dB / 20)",
+      arrays.fail(channel.magnitude, "a magnitude is {}; convert values in dB by 10^(dB / 20)",
                   value.real());
     value = std::polar(1.0, value.imag() * std::numbers::pi / 180.0) * value.real();
   }
