@@ -168,13 +168,19 @@ std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveM
   }
   std::stable_sort(scored.begin(), scored.end(),
                    [](const ProposedMode& a, const ProposedMode& b) { return a.gain > b.gain; });
+  const double low_hz = frf.frequency_hz[0];
+  const double high_hz = frf.frequency_hz[N - 1];
   std::vector<ProposedMode> best;
   for (const ProposedMode& candidate : scored) {
     if (best.size() == most) break;
+    const double hz = candidate.mode.frequency_hz;
     const bool taken = std::any_of(best.begin(), best.end(), [&](const ProposedMode& other) {
-      const double width = 2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) *
-                           other.mode.frequency_hz;
-      return std::abs(candidate.mode.frequency_hz - other.mode.frequency_hz) < width;
+      const double other_hz = other.mode.frequency_hz;
+      const double width =
+          2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) * other_hz;
+      // Modes on the same side of the lines are hardly distinguishable.
+      return std::abs(hz - other_hz) < width || (hz < low_hz && other_hz < low_hz) ||
+             (hz > high_hz && other_hz > high_hz);
     });
     if (!taken) best.push_back(candidate);
   }
