@@ -96,7 +96,7 @@ double operations(const Case& c, FitMethod method) {
   const Eigen::Index f = p.functions();
   const Eigen::Index d = group.D.re.cols();
   const auto simple = static_cast<double>(x.simple_columns());
-  double columns = static_cast<double>(x.base.cols()) + simple;
+  double columns = static_cast<double>(x.base->cols()) + simple;
   columns += 2.0 * direct(x.F, x.F, triangular_pairs(f)) + direct(x.F, x.D, all_pairs(f, d));
   columns += direct(x.D, x.D, triangular_pairs(d)) / 4.0;  // four derivatives share one weight
   if (method == FitMethod::riv)
