@@ -121,15 +121,23 @@ void add_late(const ChannelList& channels, const Eigen::VectorXd& delay_s,
   }
 }
 
-/// If the one estimated delay is clearly negative.
-std::string acausal_delay(const FitResult& fit) {
+/// If an estimated delay is unknown by more than a sample, or one for all channels is clearly negative.
+std::string doubtful_delay(const FitResult& fit) {
   const AdditiveModel& model = fit.model;
-  if (fit.delay != DelayModel::estimate || model.input_delay_std_s.size() == 0) return {};
+  if (fit.delay == DelayModel::fixed || model.input_delay_std_s.size() == 0) return {};
+  const double sample_s = model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0;
+  const double deviation_s =
+      std::max(model.input_delay_std_s.maxCoeff(), model.output_delay_std_s.maxCoeff());
+  if (sample_s > 0.0 && deviation_s > sample_s)
+    return fmt::format(
+        "the data do not determine {}: the standard deviation is {:.2g} us, more than a sample; if "
+        "you know it, use --delay with seconds",
+        fit.delay == DelayModel::estimate ? "the delay" : "the delays of the channels",
+        1e6 * deviation_s);
   const double delay_s = model.mean_delay_s();
-  const double least_s =
-      std::max(kClearly * model.input_delay_std_s[0],
-               model.sample_rate_hz > 0.0 ? kLeastSamples / model.sample_rate_hz : 0.0);
-  if (!(delay_s < -least_s)) return {};
+  if (fit.delay != DelayModel::estimate ||
+      !(delay_s < -std::max(kClearly * deviation_s, kLeastSamples * sample_s)))
+    return {};
   return fmt::format(
       "the delay is negative, {:.4g} us: the outputs come before the inputs. Check the timing of "
       "the recorder, and use --hold none if the inputs were measured rather than held",
@@ -244,7 +252,7 @@ void judge(const FrfEstimate& frf, const FitEvidence& evidence, FitResult& fit) 
   }
   if (!evidence.late_channels.empty()) tell(evidence.late_channels);
   if (!evidence.overestimated.empty()) tell(evidence.overestimated);
-  if (const std::string why = acausal_delay(fit); !why.empty()) tell(why);
+  if (const std::string why = doubtful_delay(fit); !why.empty()) tell(why);
   if (evidence.unexplained) {
     fit.decisions.push_back(evidence.unexplained->text());
     fit.findings.insert(fit.findings.begin(), evidence.unexplained->text());

@@ -1,5 +1,6 @@
 #include "estimation/search/fit_verdict.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace stageid {
@@ -36,6 +37,25 @@ TEST(LateChannels, OfTwoTheLaterIsNamed) {
       late_channels(with_delays(Eigen::Vector2d(3e-3, 2e-3), Eigen::VectorXd::Zero(1)));
   EXPECT_NE(text.find("a1 +1 samples"), std::string::npos) << text;
   EXPECT_EQ(text.find("a2"), std::string::npos);
+}
+
+TEST(DoubtfulDelay, IsUnknownByMoreThanASample) {
+  const auto findings = [](DelayModel delay, double deviation_s) {
+    FitResult fit;
+    fit.delay = delay;
+    fit.model = with_delays(Eigen::Vector2d(3e-3, 3e-3), Eigen::VectorXd::Zero(1));
+    fit.model.input_delay_std_s[1] = deviation_s;
+    judge({}, {}, fit);
+    return fit.findings;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(findings(DelayModel::estimate, 1.1e-3),
+              testing::ElementsAre(HasSubstr("the data do not determine the delay: the standard "
+                                             "deviation is 1.1e+03 us")));
+  EXPECT_THAT(findings(DelayModel::per_channel, 1.1e-3),
+              testing::ElementsAre(HasSubstr("the delays of the channels")));
+  EXPECT_THAT(findings(DelayModel::estimate, 0.9e-3), testing::IsEmpty());
+  EXPECT_THAT(findings(DelayModel::fixed, 1.1e-3), testing::IsEmpty());
 }
 
 }  // namespace test_late_channels
