@@ -1,7 +1,6 @@
 #include "estimation/problem/fit_problem.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <span>
 
 #include "estimation/problem/search_limit.hpp"
@@ -145,9 +144,9 @@ void evaluate_submodel(const FitProblem& problem, const HoldEquivalent& through,
 }
 
 /// The number of products of the functions grows with their square.
-void add_work(const FitProblem& problem, const WantedBasis& wanted) {
+void add_work(const FitProblem& problem, bool with_derivatives) {
   auto columns = static_cast<double>(problem.functions());
-  if (wanted.gradient) columns += static_cast<double>(derivative_columns(problem).size());
+  if (with_derivatives) columns += static_cast<double>(derivative_columns(problem).size());
   problem.limit->add(static_cast<double>(problem.size()), static_cast<double>(problem.channels()),
                      columns);
 }
@@ -187,30 +186,15 @@ void evaluate(const FitProblem& problem, const FitParameters& beta, bool with_de
   });
 }
 
-/// Calls visit(groups) for the evaluated groups, `most` at a time.
-template <typename Visit>
-void visit_groups(const FitProblem& problem, const FitParameters& beta, bool with_derivatives,
-                  std::size_t most, Visit visit) {
-  if (problem.limit) add_work(problem, {with_derivatives, false});
-  std::vector<BasisGroup> groups = unevaluated_groups(beta);
-  std::optional<SharedMatrix<Eigen::MatrixXd>> base;
-  for (std::size_t first = 0; first < groups.size(); first += most) {
-    const std::span<BasisGroup> some(groups.data() + first, std::min(most, groups.size() - first));
-    evaluate(problem, beta, with_derivatives, some, base);
-    visit(some);
-    for (BasisGroup& group : some) group = {};
-  }
-}
-
 }  // namespace
 
 std::vector<BasisGroup> evaluate_groups(const FitProblem& problem, const FitParameters& beta,
                                         bool with_derivatives) {
-  std::vector<BasisGroup> out;
-  visit_groups(problem, beta, with_derivatives, problem.channels(), [&](auto groups) {
-    out.assign(std::move_iterator(groups.begin()), std::move_iterator(groups.end()));
-  });
-  return out;
+  if (problem.limit) add_work(problem, with_derivatives);
+  std::vector<BasisGroup> groups = unevaluated_groups(beta);
+  std::optional<SharedMatrix<Eigen::MatrixXd>> base;
+  evaluate(problem, beta, with_derivatives, groups, base);
+  return groups;
 }
 
 BasisGroups::BasisGroups(const FitProblem& problem, const FitParameters& beta,
@@ -218,11 +202,20 @@ BasisGroups::BasisGroups(const FitProblem& problem, const FitParameters& beta,
     : problem_(&problem), beta_(&beta), with_derivatives_(with_derivatives) {}
 
 void BasisGroups::for_each(const std::function<void(const BasisGroup&)>& visit) const {
-  if (evaluated_ != nullptr)
+  if (evaluated_ != nullptr) {
     std::ranges::for_each(*evaluated_, visit);
-  else
-    visit_groups(*problem_, *beta_, with_derivatives_, kGroupsAtOnce,
-                 [&](auto groups) { std::ranges::for_each(groups, visit); });
+    return;
+  }
+  if (problem_->limit) add_work(*problem_, with_derivatives_);
+  std::vector<BasisGroup> groups = unevaluated_groups(*beta_);
+  std::optional<SharedMatrix<Eigen::MatrixXd>> base;
+  for (std::size_t first = 0; first < groups.size(); first += kGroupsAtOnce) {
+    const std::size_t count = std::min(kGroupsAtOnce, groups.size() - first);
+    const std::span<BasisGroup> some = std::span(groups).subspan(first, count);
+    evaluate(*problem_, *beta_, with_derivatives_, some, base);
+    std::ranges::for_each(some, visit);
+    std::ranges::fill(some, BasisGroup{});  // frees their memory
+  }
 }
 
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,

@@ -170,8 +170,7 @@ class AutomaticFit {
   /// Whether that mode is beside the lines. Every structure imitates such modes, so they are added first.
   bool misses_mode_beside_lines() const {
     const std::optional<ModeCandidate> mode = missing_mode();
-    return mode && (mode->frequency_hz < frf_.frequency_hz[0] ||
-                    mode->frequency_hz > frf_.frequency_hz[frf_.lines() - 1]);
+    return mode && side_of_lines(frf_, mode->frequency_hz) != 0;
   }
 
   /// Whether a further mode may be worth as much per parameter (of the logarithm of the cost) as those of a larger model.

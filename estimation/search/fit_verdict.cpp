@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kNamed = 8;          // in a message
 constexpr std::size_t kChannelsNamed = 6;  // likewise
 
-bool is_held_by_request(const Submodel& s) { return s.held != HeldPole::none; }
+bool has_held_pole(const Submodel& s) { return s.held != HeldPole::none; }
 
 /// Standard deviation of the frequency; if unknown, a part of the half-power width.
 double deviation_hz(const Submodel& s) {
@@ -59,7 +59,7 @@ std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) 
     return fit.model.submodels[i].damping_ratio() < kBroad
                ? "at its bound: narrower than the line spacing, undamped or unstable"
                : "at its bound";
-  if (is_held_by_request(fit.model.submodels[i])) return "hidden by noise and held";
+  if (has_held_pole(fit.model.submodels[i])) return "hidden by noise and held";
   return pole_doubt(fit, i) < 1.0 ? "does not justify its parameters (BIC)"
                                   : "with a standard deviation as large";
 }
@@ -148,7 +148,7 @@ std::string doubtful_delay(const FitResult& fit) {
 
 double pole_doubt(const FitResult& fit, std::size_t submodel) {
   const Submodel& s = fit.model.submodels[submodel];
-  if (!s.is_mode() || is_held_by_request(s)) return 0.0;
+  if (!s.is_mode() || has_held_pole(s)) return 0.0;
   if (fit.is_held(submodel)) return HUGE_VAL;
   const double of_frequency = s.natural_frequency_std_hz.value_or(0.0) / s.natural_frequency_hz();
   if (s.role == SubmodelRole::suspension) return of_frequency;
@@ -159,7 +159,7 @@ std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const Additiv
   for (const auto& [i, j] : overlapping_modes(model)) {
     const Submodel& one = model.submodels[i];
     const Submodel& other = model.submodels[j];
-    if (is_held_by_request(one) || is_held_by_request(other)) continue;
+    if (has_held_pole(one) || has_held_pole(other)) continue;
     const double apart_hz = std::abs(one.natural_frequency_hz() - other.natural_frequency_hz());
     if (apart_hz < std::min(deviation_hz(one), deviation_hz(other))) return std::pair(i, j);
   }
@@ -172,11 +172,11 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   if (!is_searched_mode(s)) return ModeVerdict::determined;
   const bool asked = number == ModeNumber::asked;
   const bool beside = !is_between_lines(s, fit.model.fit, asked);
-  if (!beside && fit.is_held(submodel) && !is_held_by_request(s)) return ModeVerdict::at_bound;
-  if (asked && is_held_by_request(s)) return ModeVerdict::weak;  // hold_hidden_modes()
+  if (!beside && fit.is_held(submodel) && !has_held_pole(s)) return ModeVerdict::at_bound;
+  if (asked && has_held_pole(s)) return ModeVerdict::weak;  // hold_hidden_modes()
   const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
   const bool unselected = number != ModeNumber::chosen;
-  if (!is_held_by_request(s) && (open || (unselected && is_worth_nothing(frf, fit, submodel))))
+  if (!has_held_pole(s) && (open || (unselected && is_worth_nothing(frf, fit, submodel))))
     return ModeVerdict::weak;
   return beside ? ModeVerdict::beside_band : ModeVerdict::determined;
 }

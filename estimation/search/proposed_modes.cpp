@@ -32,8 +32,8 @@ std::vector<ModeCandidate> candidate_grid(const FrfEstimate& frf, const Additive
   std::vector<ModeCandidate> grid;
   for (const double zeta : kDampings)
     for (double f = low; f <= high; f += std::max(1.4 * zeta * f, 0.5 * spacing)) {
-      const bool outside = f < frf.frequency_hz[0] || f > frf.frequency_hz[frf.lines() - 1];
-      if (outside && zeta < 0.02) continue;  // its width cannot be determined from the band
+      // Beside the lines, a width cannot be determined.
+      if (side_of_lines(frf, f) != 0 && zeta < 0.02) continue;
       grid.push_back({f, zeta, 1});
     }
   return grid;
@@ -114,6 +114,11 @@ Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& m
 
 }  // namespace
 
+int side_of_lines(const FrfEstimate& frf, double frequency_hz) {
+  if (frequency_hz < frf.frequency_hz[0]) return -1;
+  return frequency_hz > frf.frequency_hz[frf.lines() - 1] ? 1 : 0;
+}
+
 std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
                                          const Workers& workers) {
@@ -168,19 +173,17 @@ std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveM
   }
   std::stable_sort(scored.begin(), scored.end(),
                    [](const ProposedMode& a, const ProposedMode& b) { return a.gain > b.gain; });
-  const double low_hz = frf.frequency_hz[0];
-  const double high_hz = frf.frequency_hz[N - 1];
   std::vector<ProposedMode> best;
   for (const ProposedMode& candidate : scored) {
     if (best.size() == most) break;
     const double hz = candidate.mode.frequency_hz;
+    const int side = side_of_lines(frf, hz);
     const bool taken = std::any_of(best.begin(), best.end(), [&](const ProposedMode& other) {
       const double other_hz = other.mode.frequency_hz;
       const double width =
           2.0 * std::max(candidate.mode.damping_ratio, other.mode.damping_ratio) * other_hz;
       // Modes on the same side of the lines are hardly distinguishable.
-      return std::abs(hz - other_hz) < width || (hz < low_hz && other_hz < low_hz) ||
-             (hz > high_hz && other_hz > high_hz);
+      return std::abs(hz - other_hz) < width || (side != 0 && side == side_of_lines(frf, other_hz));
     });
     if (!taken) best.push_back(candidate);
   }
