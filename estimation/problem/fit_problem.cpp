@@ -214,7 +214,7 @@ void BasisGroups::for_each(const std::function<void(const BasisGroup&)>& visit) 
     const std::span<BasisGroup> some = std::span(groups).subspan(first, count);
     evaluate(*problem_, *beta_, with_derivatives_, some, base);
     std::ranges::for_each(some, visit);
-    std::ranges::fill(some, BasisGroup{});  // frees their memory
+    for (BasisGroup& group : some) group = {};  // assigned by move: a copy would keep memory
   }
 }
 
