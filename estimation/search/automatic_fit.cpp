@@ -72,7 +72,7 @@ class AutomaticFit {
     if (selection_.exactly == 0) {
       reduce();
       if (!simple_) simple_ = best_;
-      if (!misses_mode_beside_lines() && restructure()) reduce();
+      if ((race_ || !misses_mode_beside_lines()) && restructure()) reduce();
     }
     grow();
     if (surplus > 0) restructure();
@@ -95,10 +95,12 @@ class AutomaticFit {
   }
 
   /// Decides between general and proportional damping. A model with general damping can describe what a few missing
-  /// modes cause, and then these modes are not found. So the search continues with proportional damping, up to as many
-  /// parameters, if a further mode may be worth as much. The better of both models is final.
+  /// modes, or delays, cause, and then these are not found. So the search continues with proportional damping as long as
+  /// its model may become the better one. A requested number leaves no room for further modes.
   static void settle_damping(std::optional<AutomaticFit>& search) {
-    if (!search->structure_.open.general_damping || !search->structure_.general_damping) return;
+    if (!search->structure_.open.general_damping || !search->structure_.general_damping ||
+        search->selection_.exactly > 0)
+      return;
     search->structure_.open.general_damping = false;
     AutomaticFit other = *search;
     const StructureMove proportional = proportional_damping(other.quick_, other.best_.model);
@@ -107,10 +109,12 @@ class AutomaticFit {
     if (other.proportional_.model.fit.cost < other.cost())
       other.adopt(FitResult(other.proportional_));
     other.take_structure_of(other.best_.model);
-    if (!other.mode_may_be_worth_as_much(search->best_)) return;
-    other.most_parameters_ = search->best_.parameters;
+    other.race_ = {&search->best_, other.cost(), other.best_.parameters};
     other.search(0);
-    if (other.score() < search->score()) search.emplace(std::move(other));
+    other.race_.reset();
+    if (other.worth_.criterion_of_structure(other.best_) <
+        other.worth_.criterion_of_structure(search->best_))
+      search.emplace(std::move(other));
   }
 
   double score() const { return worth_.criterion(best_); }
@@ -171,17 +175,6 @@ class AutomaticFit {
   bool misses_mode_beside_lines() const {
     const std::optional<ModeCandidate> mode = missing_mode();
     return mode && side_of_lines(frf_, mode->frequency_hz) != 0;
-  }
-
-  /// Whether a further mode may be worth as much per parameter (of the logarithm of the cost) as those of a larger model.
-  bool mode_may_be_worth_as_much(const FitResult& larger) const {
-    const double room =
-        static_cast<double>(larger.parameters - best_.parameters) / worth_.parameters_of_mode();
-    if (best_.status() == FitStatus::singular || !(room > 0.0)) return false;
-    const std::vector<ProposedMode> modes = proposals(1);
-    const double share = 1.0 - std::pow(larger.model.fit.cost / cost(), 1.0 / room);
-    return !modes.empty() &&
-           modes.front().gain > share * 2.0 * static_cast<double>(frf_.lines()) * cost();
   }
 
   ModeNumber mode_number() const {
@@ -325,8 +318,8 @@ class AutomaticFit {
   bool wanted_more() const {
     const int modes = count_modes(best_.model);
     if (selection_.exactly > 0) return modes < target_;
-    return modes < affordable_modes() && best_.parameters < most_parameters_ &&
-           !worth_.at_rounding(best_) && delay_denied_.empty() && !limit_reached();
+    return modes < affordable_modes() && may_overtake() && !worth_.at_rounding(best_) &&
+           delay_denied_.empty() && !limit_reached();
   }
 
   /// Changes the structure as long as that lowers the criterion, each time by the change that lowers it most.
@@ -336,7 +329,7 @@ class AutomaticFit {
     if (structure_.open == OpenStructure{} || history_.size() == structured_at_ ||
         !delay_denied_.empty())
       return false;
-    while (!limit_reached() && change_structure()) changed = true;
+    while (!limit_reached() && may_overtake() && change_structure()) changed = true;
     structured_at_ = history_.size();
     return changed;
   }
@@ -440,6 +433,17 @@ class AutomaticFit {
     quick_.delay_s = options_.delay_s = options.delay_s;
     adopt(std::move(fit));
     return true;
+  }
+
+  /// Whether the model may reach the cost of its rival with as few parameters, if it gains twice as much per parameter as
+  /// since the race began.
+  bool may_overtake() const {
+    if (!race_) return true;
+    const auto left = static_cast<double>(race_->rival->parameters - best_.parameters);
+    const auto used = static_cast<double>(best_.parameters - race_->parameters);
+    const double gained = std::log(race_->cost / cost());
+    const double behind = std::log(cost() / race_->rival->model.fit.cost);
+    return left > 0.0 && behind * used <= 2.0 * gained * left;
   }
 
   /// Adds modes while they are worth their parameters. @returns true if any was added.
@@ -633,7 +637,13 @@ class AutomaticFit {
   ModeWorth worth_;
   int target_;      ///< number of modes to grow to, if it is requested
   int hidden_ = 0;  ///< modes of best_ whose poles are held because noise hides them
-  Eigen::Index most_parameters_ = std::numeric_limits<Eigen::Index>::max();
+  /// A race with a model of another structure, from a cost and a number of parameters on.
+  struct Race {
+    const FitResult* rival;
+    double cost;
+    Eigen::Index parameters;
+  };
+  std::optional<Race> race_;
   std::string delay_denied_;  ///< why the search ended early; empty if it did not
   FitResult best_;
   FitResult before_;                 ///< the last one before best_ was adopted

@@ -27,12 +27,16 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 /// does not fit its errors.
 class ModeWorth {
  public:
-  /// @param weights n_c x N, of the fits that are compared
+  /// @param frf remains in use  @param weights n_c x N, of the fits that are compared
   ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
             const Eigen::MatrixXd& weights);
 
   /// Smaller is better.
   double criterion(const FitResult& fit) const;
+
+  /// The same, to compare models of different structures. Modes beside the lines belong to the structure: they cost what
+  /// noise may gain with them, like the B_1 that can stand in for them.
+  double criterion_of_structure(const FitResult& fit) const;
 
   /// The cost at which a fit of this model has that criterion.
   double cost_at(double criterion, const AdditiveModel& model, Eigen::Index parameters) const;
@@ -58,6 +62,7 @@ class ModeWorth {
   double squares(const FitResult& fit) const;  ///< sum W |E|^2, not below rounding
   double penalty(const AdditiveModel& model, Eigen::Index parameters) const;
 
+  const FrfEstimate* frf_;
   double lines_ = 0.0;
   double channels_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers

@@ -105,6 +105,7 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
     frf_.response(0, k) += a[1] * (0.1 / A + 8e-4 / (A * A));
   }
   twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
+  options_.max_iterations = 16;
   ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
   const FitResult fit = settled_fit(frf_, twice, options_);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();

@@ -8,6 +8,7 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/models/model_reference.hpp"
+#include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/varied_plant.hpp"
 
@@ -44,6 +45,51 @@ TEST_P(StructureSearch, FindsTheStructureOfAPlant) {
 // dampings, direct terms, and delays per channel. In 1001, springs describe the delays until these are found.
 INSTANTIATE_TEST_SUITE_P(Plants, StructureSearch,
                          testing::Values(3, 5, 10, 11, 12, 18, 33, 35, 1001));
+
+// A strong mode above the lines and inputs that are late by different parts of a sample: general damping with one delay
+// for all describes the data as well, with three times as many parameters and wrong delays.
+TEST(StructureSearchFixed, DelaysAndAModeAboveTheLinesAreNotTakenForGeneralDamping) {
+  constexpr double kPeriod_s = 250e-6;
+  const Eigen::Vector3d late_s = Eigen::Vector3d(1.25, 0.1, 1.94) * kPeriod_s;
+  test::RandomNumbers random(1);
+  AdditiveModel truth;
+  truth.hold = HoldModel::exact;
+  truth.sample_rate_hz = 1.0 / kPeriod_s;
+  truth.outputs = {{"y1", "y2", "y3", "y4"}, {"m", "m", "m", "m"}};
+  truth.inputs = {{"u1", "u2", "u3"}, {"N", "N", "N"}};
+  truth.input_delay_s = late_s;
+  truth.output_delay_s = Eigen::Vector4d::Zero();
+  const double modes[][3] = {
+      {25.4, 0.037, 1}, {91.6, 0.06, 1}, {132.7, 0.011, 1}, {1090, 0.077, 10}};
+  for (const auto& [frequency_hz, damping, gain] : modes) {
+    Eigen::Vector4d shape;
+    Eigen::RowVector3d force;
+    for (double& x : shape) x = random.normal();
+    for (double& x : force) x = random.normal();
+    const std::vector<double> a = test::mode_coefficients(frequency_hz, damping);
+    truth.submodels.push_back({0, {1.0, a[0], a[1]}, {gain * shape * force}, {}, {}});
+  }
+  FrfEstimate frf;
+  frf.inputs = truth.inputs;
+  frf.outputs = truth.outputs;
+  frf.sample_rate_hz = truth.sample_rate_hz;
+  frf.hold = Hold::zoh;
+  frf.frequency_hz = Eigen::VectorXd::LinSpaced(600, 4.0, 800.0);
+  frf.response = test::reference_response(truth, frf.frequency_hz, HoldModel::exact);
+  frf.noise_variance =
+      (1e-4 * frf.response.cwiseAbs().rowwise().mean()).array().square().matrix().replicate(1, 600);
+  for (Eigen::Index i = 0; i < frf.response.size(); ++i)
+    frf.response(i) += std::sqrt(frf.noise_variance(i)) * random.circular();
+
+  const FitResult fit = fit_model(frf);
+  EXPECT_TRUE(fit.trustworthy()) << fit.message();
+  EXPECT_EQ(fit.delay, DelayModel::per_channel);
+  EXPECT_FALSE(structure_of(fit.model).general_damping);
+  ASSERT_EQ(fit.model.input_delay_s.size(), 3);
+  const double output_s = fit.model.output_delay_s.mean();
+  for (Eigen::Index u = 0; u < 3; ++u)
+    EXPECT_NEAR(fit.model.input_delay_s[u] + output_s, late_s[u], 0.1e-6) << u;
+}
 
 TEST(StructureSearchFixed, WhatIsRequestedIsNotChanged) {
   const test::VariedPlant plant = test::draw_varied_plant(5);  // free body, general damping
