@@ -165,7 +165,7 @@ void Hdf5LogReader::read_columns(const Dataset& dataset, std::uint64_t first,
   if (columns == 0) return;
   const std::uint64_t piece_rows =
       std::max<std::uint64_t>(1, kPieceBytes / (columns * sizeof(double)));
-  std::vector<double> piece(static_cast<std::size_t>(std::min(piece_rows, rows)) * columns);
+  std::vector<double> piece(std::min(piece_rows, rows) * columns);
   for (std::uint64_t done = 0; done < rows; done += piece_rows) {
     const std::uint64_t count = std::min(piece_rows, rows - done);
     {

@@ -15,7 +15,7 @@ using VecColumns = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
 template <typename Scalar>
 std::vector<Scalar> to_c_order(const VecColumns<Scalar>& columns, Eigen::Index rows) {
   const Eigen::Index n = columns.rows();
-  std::vector<Scalar> data(static_cast<std::size_t>(columns.size()));
+  std::vector<Scalar> data(columns.size());
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
     Eigen::Map<RowMajor<Scalar>>(data.data() + k * n, rows, n / rows) =
         Eigen::Map<const VecColumns<Scalar>>(columns.col(k).data(), rows, n / rows);

@@ -75,7 +75,7 @@ void Examination::check_samples() {
                                                   : *std::ranges::max_element(record_.periods)) *
       record_.info.period_samples;
   for (Index c = 0; c < static_cast<Index>(record_.scan.size()); ++c) {
-    const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+    const ChannelScan& scan = record_.scan[c];
     const bool sensor = c < record_.n_y();
     const auto stuck = static_cast<double>(scan.longest_constant());
     // Coarse steps repeat values everywhere, a stuck channel does not.
@@ -105,7 +105,7 @@ void Examination::check_samples() {
 
 /// @param log_p below this, an end of the range counts as clipped
 void Examination::find_clipped(Index c, double log_p) {
-  const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+  const ChannelScan& scan = record_.scan[c];
   const bool sensor = c < record_.n_y();
   const bool high = scan.log_p_high() <= log_p;
   const bool low = scan.log_p_low() <= log_p;
@@ -124,7 +124,7 @@ void Examination::find_clipped(Index c, double log_p) {
 /// clipped of `count` channels, starting at `first`.
 bool Examination::find_suspected(Index first, Index count) {
   const auto log_p = [this](Index c) {
-    const ChannelScan& scan = record_.scan[static_cast<std::size_t>(c)];
+    const ChannelScan& scan = record_.scan[c];
     return scan.log_p_high() + scan.log_p_low();
   };
   Index most = first;
@@ -142,7 +142,7 @@ bool Examination::expected_above_noise(Index sensor) const {
   const auto u = positions_in(nominal_->actuators, record_.info.actuators.names);
   return above_noise(record_, sensor, [&](Index k) -> Eigen::RowVectorXcd {
     const Eigen::MatrixXcd G = nominal_->rigid_body(record_.frequency_hz[k])(y, u);
-    const LineRecord& line = record_.lines[static_cast<std::size_t>(k)];
+    const LineRecord& line = record_.lines[k];
     return G.row(sensor) * record_.mean(line.Z.bottomRows(record_.n_u()));
   });
 }
@@ -187,7 +187,7 @@ void Examination::check_responses() {
   for (Index s = 0; s < record_.n_y(); ++s) {
     if (spoilt(s)) continue;
     const std::optional<bool> expected = expected_to_respond(s);
-    if (!responding[static_cast<std::size_t>(s)]) {
+    if (!responding[s]) {
       if (none && spoilt_.empty()) {
         drowned.push_back(s);
       } else if (expected == false) {
@@ -248,8 +248,7 @@ void Examination::check_arrival() {
     for (Index c = 0; c < channels; ++c)
       driven = driven || tail_of_evidence(evidence(c, a), lines) < kSignificance / tests;
     if (driven) continue;
-    find(Severity::fault, Cause::excitation,
-         record_.info.excitation.name(record_.axes[static_cast<std::size_t>(a)]),
+    find(Severity::fault, Cause::excitation, record_.info.excitation.name(record_.axes[a]),
          "the excitation does not reach the stage: no channel responds to it",
          "no line above the noise",
          "check the injection of this axis and measure again, or exclude it with --inputs");
@@ -261,7 +260,7 @@ void Examination::check_excitation() {
   double worst = 0.0;
   Index at = 0;
   for (Index k = 0; k < record_.frequency_hz.size(); ++k) {
-    const LineRecord& line = record_.lines[static_cast<std::size_t>(k)];
+    const LineRecord& line = record_.lines[k];
     const double cond = condition(line.R(record_.axes, Eigen::all));
     if (cond <= worst) continue;
     worst = cond;
@@ -295,8 +294,7 @@ void Examination::check_inputs() {
   const double last_hz = record_.frequency_hz[record_.frequency_hz.size() - 1];
   for (Index k = 0; k < record_.frequency_hz.size(); ++k)
     if (record_.frequency_hz[k] > 0.5 * last_hz)
-      conditions.push_back(
-          condition(record_.mean(record_.lines[static_cast<std::size_t>(k)].Z(rows, Eigen::all))));
+      conditions.push_back(condition(record_.mean(record_.lines[k].Z(rows, Eigen::all))));
   if (conditions.empty()) return;
   const double median = order_statistic(conditions, 0.5);
   if (std::isfinite(median) &&

@@ -22,7 +22,7 @@ bool above_noise(const HealthRecord& record, Index channel,
   for (std::size_t k = 0; k < record.lines.size(); ++k) {
     const double variance = record.variance_of_mean(record.lines[k].Z.row(channel))[0];
     const double mean_square =
-        response(static_cast<Index>(k)).squaredNorm() / static_cast<double>(record.experiments());
+        response(k).squaredNorm() / static_cast<double>(record.experiments());
     if (variance > kPowerRounding * mean_square)
       evidence -= log_tail_of_f(mean_square / variance, static_cast<int>(record.experiments()),
                                 record.scatter_dof());
@@ -34,7 +34,7 @@ bool above_noise(const HealthRecord& record, Index channel,
 
 bool responds(const HealthRecord& record, Index channel) {
   return above_noise(record, channel, [&](Index k) -> Eigen::RowVectorXcd {
-    return record.mean(record.lines[static_cast<std::size_t>(k)].Z.row(channel));
+    return record.mean(record.lines[k].Z.row(channel));
   });
 }
 

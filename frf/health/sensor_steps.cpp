@@ -47,7 +47,7 @@ double excess_over_steps(const FrfEstimate& frf, const HealthRecord& record, Eig
   double sum = 0.0;
   int count = 0;
   for (std::size_t i = 0; i < record.lines.size(); ++i) {
-    const double f = record.frequency_hz[static_cast<Eigen::Index>(i)];
+    const double f = record.frequency_hz[i];
     const auto at = std::ranges::lower_bound(frf.frequency_hz, f * (1.0 - 1e-9));
     if (at == frf.frequency_hz.end() || std::abs(*at - f) > 1e-9 * f) continue;
     const Eigen::MatrixXcd U = record.mean(record.lines[i].Z)(inputs, Eigen::all);
@@ -74,7 +74,7 @@ std::vector<Finding> check_sensor_steps(const FrfEstimate& frf, const HealthReco
     if (!tests_nonlinear(frf, y)) continue;
     const auto sensor = place_of(frf.outputs.name(y), record.info.sensors);
     if (!sensor || inputs.empty()) return {};
-    const double step = record.scan[static_cast<std::size_t>(*sensor)].step();
+    const double step = record.scan[*sensor].step();
     if (!(step > 0.0) || kLeastShare * excess_over_steps(frf, record, y, inputs) > step * step)
       return {};
     findings.push_back({Severity::doubt, Cause::resolution, frf.outputs.name(y),

@@ -89,9 +89,7 @@ std::vector<OctaveRecord> octave_records(const Eigen::Ref<const Eigen::MatrixXd>
   }
   for (Index first = 0; first < periods.cols();) {
     Index end = first + 1;
-    while (end < periods.cols() &&
-           number[static_cast<std::size_t>(end)] == number[static_cast<std::size_t>(end - 1)] + 1)
-      ++end;
+    while (end < periods.cols() && number[end] == number[end - 1] + 1) ++end;
     add_stretch(periods.middleCols(first, end - first), first, octaves);
     first = end;
   }

@@ -57,10 +57,7 @@ std::vector<Eigen::MatrixXd> line_grams(const ComparedPeriods& periods, Index ch
     const Index lines = band.count();
     deviation.resize(lines, P);
     for (Index p = 0; p < P; ++p)
-      deviation.col(p) = periods.spectra[static_cast<std::size_t>(p)]
-                             .row(channel)
-                             .segment(band.first, lines)
-                             .transpose();
+      deviation.col(p) = periods.spectra[p].row(channel).segment(band.first, lines).transpose();
     const Eigen::VectorXcd mean = deviation.rowwise().mean();
     deviation.colwise() -= mean;
     for (Index k = 0; k < lines; ++k) {
@@ -159,12 +156,12 @@ struct DegreesOfFreedom {
 /// over several periods has few. Half of each is used, because a sine between two lines contributes to both.
 DegreesOfFreedom degrees_of_freedom(const Eigen::MatrixXd& residuals, const Periods& core,
                                     std::span<const int> number) {
-  const auto place = [&](Index p) { return Index{number[static_cast<std::size_t>(p)]}; };
+  const auto place = [&](Index p) { return Index{number[p]}; };
   const Index span = place(core.back()) - place(core.front()) + 1;
   RealDft dft(static_cast<int>(residuals.rows() * span));
   std::fill(dft.input().begin(), dft.input().end(), 0.0);
   for (std::size_t q = 0; q < core.size(); ++q)
-    std::copy_n(residuals.col(static_cast<Index>(q)).data(), residuals.rows(),
+    std::copy_n(residuals.col(q).data(), residuals.rows(),
                 dft.input().begin() + (place(core[q]) - place(core.front())) * residuals.rows());
   const auto transformed = dft.forward();
   double sum = 0.0;
@@ -203,7 +200,7 @@ IndexRange deviating_samples(const OctaveRecord& octave, const Periods& position
   const double least = -2.0 * (log_chance - std::log(static_cast<double>(positions.size())));
   IndexRange range;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const double here = deviation[static_cast<Index>(i)];
+    const double here = deviation[i];
     if (!(here * here > least * variance)) continue;
     // Coefficients beyond an end of the period are not compared: a deviation of the last one may go on.
     const Index first = octave.begin + positions[i] * octave.step;
@@ -247,7 +244,7 @@ std::optional<Excess> excess(const OctaveRecord& octave, std::span<const int> nu
 Eigen::MatrixXd record_of(const ComparedPeriods& periods, Index channel) {
   Eigen::MatrixXd record(periods.samples.front().rows(), std::ssize(periods.spectra));
   for (Index p = 0; p < record.cols(); ++p)
-    record.col(p) = periods.samples[static_cast<std::size_t>(p)].col(channel).cast<double>();
+    record.col(p) = periods.samples[p].col(channel).cast<double>();
   return record;
 }
 

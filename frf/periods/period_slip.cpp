@@ -201,8 +201,7 @@ void add_peaks(const MatrixXd& earlier, const MatrixXd& later, RealDft& dft,
     const std::vector<std::complex<double>> of_later(X.begin(), X.end());
     const auto R = dft.forward(earlier.col(c));
     for (Index l = 1; l < correlation.size(); ++l) {
-      const auto at = static_cast<std::size_t>(l);
-      const std::complex<double> product = std::conj(R[at]) * of_later[at];
+      const std::complex<double> product = std::conj(R[l]) * of_later[l];
       const double size = std::abs(product);
       if (size > 0.0) correlation[l] += product / size;
     }
@@ -283,10 +282,8 @@ std::optional<PeriodSlip> find_slip(const LogSamples& earlier, const LogSamples&
       of_one->channel = c;
       largest_of_one = change.gain;
     };
-    for (Index c = 0; c < later.sensors.cols(); ++c)
-      try_one(sensors.channels[static_cast<std::size_t>(c)], c, true);
-    for (Index c = 0; c < later.actuators.cols(); ++c)
-      try_one(actuators.channels[static_cast<std::size_t>(c)], c, false);
+    for (Index c = 0; c < later.sensors.cols(); ++c) try_one(sensors.channels[c], c, true);
+    for (Index c = 0; c < later.actuators.cols(); ++c) try_one(actuators.channels[c], c, false);
   }
   return of_one && largest_of_one > kClearlyMore * largest ? of_one : found;
 }

@@ -42,7 +42,7 @@ std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Index channels
                                   int periods) {
   if (periods < 3 || N < 2 * kNeighbours) return {};
   const double least_ratio = std::max(kLeastGlitch, std::sqrt(static_cast<double>(N)));
-  std::vector<Glitch> worst(static_cast<std::size_t>(periods));
+  std::vector<Glitch> worst(periods);
   for (Index c = 0; c < channels; ++c) {
     const Eigen::ArrayXd ratio = unevenness(samples.col(c).head(N * periods), N);
     // A glitch affects three second differences, so neighbours count as one.
@@ -59,7 +59,7 @@ std::vector<Glitch> find_glitches(const Eigen::MatrixXd& samples, Index channels
         // d of period p depends on periods p and p + 1; d of p + 1, or of p - 1, identifies the wrong one.
         const bool later = p + 2 < periods ? stands_out(p + 1, n) : !stands_out(p - 1, n);
         if (!later && p == 0 && n < kNeighbours) continue;
-        Glitch& glitch = worst[static_cast<std::size_t>(later ? p + 1 : p)];
+        Glitch& glitch = worst[later ? p + 1 : p];
         if (here > glitch.ratio) glitch = {later ? p + 1 : p, c, here};
       }
   }

@@ -62,7 +62,7 @@ void DetectionAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
   for_each_line(workers, sum_.linear_power.cols(), [&](Eigen::Index k) {
     const Eigen::MatrixXcd Z = spectra.response(k);
     for (Eigen::Index e = 0; e < Z.cols(); ++e)
-      sum_.linear_power.col(k).segment(outputs_ * groups[static_cast<std::size_t>(e)], outputs_) +=
+      sum_.linear_power.col(k).segment(outputs_ * groups[e], outputs_) +=
           Z.col(e).head(outputs_).cwiseAbs2();
   });
 }
@@ -71,15 +71,12 @@ void DetectionAverage::add_line(const RealizationSpectra& spectra, const Eigen::
                                 const std::vector<Eigen::Index>& groups, Eigen::Index d) {
   const auto column = std::ssize(excited_) + d;
   const Eigen::MatrixXcd Z = spectra.response(column);
-  const Eigen::VectorXcd between =
-      interpolated_response(excited_, detection_[static_cast<std::size_t>(d)], G);
+  const Eigen::VectorXcd between = interpolated_response(excited_, detection_[d], G);
   const Eigen::MatrixXcd factor = residual_of_Z(between.reshaped(outputs_, Z.rows() - outputs_));
   const Eigen::MatrixXcd E = factor * Z;
-  for (Eigen::Index e = 0; e < E.cols(); ++e) {
-    const auto run = static_cast<std::size_t>(e);
-    sum_.power.col(d).segment(outputs_ * groups[run], outputs_) +=
-        spectra.runs()[run].periods * E.col(e).cwiseAbs2();
-  }
+  for (Eigen::Index e = 0; e < E.cols(); ++e)
+    sum_.power.col(d).segment(outputs_ * groups[e], outputs_) +=
+        spectra.runs()[e].periods * E.col(e).cwiseAbs2();
   const Eigen::MatrixXcd scatter = factor * spectra.scatter(column);
   // The scatter is a sum of squares, but rounding may make it negative.
   sum_.noise.col(d) +=

@@ -49,41 +49,39 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
 
   MatrixXd log_power(n_y * E, lines_);
   for_each_line(workers, lines_, [&](Index k) {
-    const std::vector<MatrixXcd> C = covariances(lines[static_cast<std::size_t>(k)], k);
+    const std::vector<MatrixXcd> C = covariances(lines[k], k);
     const Eigen::ArrayXd rounding =
         kRounding * spectra.response(k).topRows(n_y).cwiseAbs2().rowwise().maxCoeff();
-    for (std::size_t e = 0; e < runs.size(); ++e)
-      log_power.col(k).segment(n_y * static_cast<Index>(e), n_y) =
+    for (Index e = 0; e < E; ++e)
+      log_power.col(k).segment(n_y * e, n_y) =
           (C[e].diagonal().real().array() + rounding).log() - mean_of_log_power(runs[e].dof(k));
   });
   levels_.realization = spectra.realization();
-  levels_.log_power.assign(static_cast<std::size_t>(blocks), MatrixXd::Zero(n_y, E));
+  levels_.log_power.assign(blocks, MatrixXd::Zero(n_y, E));
   levels_.weight = levels_.log_power;
   levels_.differs.setConstant(n_y, blocks, false);
   VectorXd count = VectorXd::Zero(blocks);
   MatrixXd variance = MatrixXd::Zero(E, blocks);
   for (Index k = 0; k < lines_; ++k) {
     if (!log_power.col(k).allFinite()) continue;  // a constant channel
-    const auto block = static_cast<Index>(at(k));
-    levels_.log_power[at(k)] += log_power.col(k).reshaped(n_y, E);
+    const Index block = at(k);
+    levels_.log_power[block] += log_power.col(k).reshaped(n_y, E);
     count[block] += 1.0;
-    for (Index e = 0; e < E; ++e)
-      variance(e, block) += variance_of_log_power(runs[static_cast<std::size_t>(e)].dof(k));
+    for (Index e = 0; e < E; ++e) variance(e, block) += variance_of_log_power(runs[e].dof(k));
   }
   const MatrixXd dependence = dependence_of(spectra, n_y, blocks);
-  for (std::size_t b = 0; b < levels_.log_power.size(); ++b) {
-    const auto block = static_cast<Index>(b);
-    MatrixXd& mean = levels_.log_power[b];
+  for (Index block = 0; block < blocks; ++block) {
+    MatrixXd& mean = levels_.log_power[block];
     share_.emplace_back(MatrixXd::Ones(n_y, E));
     blocks_differ_.push_back(false);
     if (count[block] < kFewestLines) continue;
     mean /= count[block];
     const VectorXd weight =
         variance.col(block).cwiseInverse() * (count[block] * count[block] / std::max(1.0, shared));
-    levels_.weight[b] = dependence.col(block).cwiseInverse() * weight.transpose();
+    levels_.weight[block] = dependence.col(block).cwiseInverse() * weight.transpose();
     if (E < 2) continue;
-    const double ratio = compare(b);
-    blocks_differ_[b] = ratio > 1.0;
+    const double ratio = compare(block);
+    blocks_differ_[block] = ratio > 1.0;
     ratio_ = std::max(ratio_, ratio);
     MatrixXd& share = share_.back();
     share = (mean.colwise() - mean.rowwise().mean()).array().exp();
@@ -92,7 +90,7 @@ ExperimentNoise::ExperimentNoise(const RealizationSpectra& spectra,
 }
 
 /// The largest ratio of two experiments; 1 unless they differ significantly in an output.
-double ExperimentNoise::compare(std::size_t block) {
+double ExperimentNoise::compare(Index block) {
   double largest = 1.0;
   const MatrixXd& mean = levels_.log_power[block];
   const double tests =
@@ -109,7 +107,7 @@ double ExperimentNoise::compare(std::size_t block) {
         log_tail_of_f(ratio, static_cast<int>(std::min(dof, 1e6)), dof) >=
             std::log(kByChance / tests / (E * (E - 1.0))))
       continue;
-    levels_.differs(i, static_cast<Index>(block)) = true;
+    levels_.differs(i, block) = true;
     largest = std::max(largest, ratio);
   }
   return largest;
@@ -142,14 +140,13 @@ std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
         continue;
       std::vector<double> values;
       for (const NoiseLevels* one : known)
-        for (const double x : one->log_power[static_cast<std::size_t>(b)].row(i))
-          values.push_back(x);
+        for (const double x : one->log_power[b].row(i)) values.push_back(x);
       const double middle = value_of_rank(values, (values.size() - 1) / 2);
       OddRun most;
       double largest = 0.0;
       bool any = false;
       for (const NoiseLevels* one : known) {
-        const MatrixXd& x = one->log_power[static_cast<std::size_t>(b)];
+        const MatrixXd& x = one->log_power[b];
         for (Index e = 0; e < x.cols(); ++e) {
           const double off = std::abs(x(i, e) - middle);
           const OddRun run{one->realization, e, i, std::exp(x(i, e) - middle)};
@@ -158,7 +155,7 @@ std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
             most = run;
           }
           if (!(off > std::log(kWorthwhileRatio)) ||
-              !(off * std::sqrt(one->weight[static_cast<std::size_t>(b)](i, e)) > kDeviations))
+              !(off * std::sqrt(one->weight[b](i, e)) > kDeviations))
             continue;
           note(run);
           any = true;
@@ -169,9 +166,7 @@ std::vector<OddRun> odd_runs(const std::vector<NoiseLevels>& realizations) {
   return found;
 }
 
-std::size_t ExperimentNoise::at(Index k) const {
-  return static_cast<std::size_t>(noise_block(k, lines_));
-}
+Index ExperimentNoise::at(Index k) const { return noise_block(k, lines_); }
 
 std::vector<MatrixXcd> ExperimentNoise::covariances(const LineEstimate& line, Index k) const {
   std::vector<MatrixXcd> C;
@@ -188,10 +183,9 @@ LineNoise ExperimentNoise::scaled(const LineEstimate& line, const VectorXd& peri
   noise.residual.setZero(line.G.rows(), line.G.rows());
   double dof = 0.0;
   for (Index e = 0; e < share.cols(); ++e) {
-    const auto run = static_cast<std::size_t>(e);
-    const double nu = spectra_.runs()[run].dof(k);
+    const double nu = spectra_.runs()[e].dof(k);
     const VectorXd back = share.col(e).cwiseSqrt().cwiseInverse();
-    noise.residual += nu * (back.asDiagonal() * C[run] * back.asDiagonal());
+    noise.residual += nu * (back.asDiagonal() * C[e] * back.asDiagonal());
     dof += nu;
   }
   noise.residual /= dof;

@@ -56,8 +56,8 @@ class ExperimentNoise {
   LineNoise scaled(const LineEstimate& line, const Eigen::VectorXd& periods, Eigen::Index k) const;
 
  private:
-  std::size_t at(Eigen::Index k) const;  ///< the block of line k
-  double compare(std::size_t block);
+  Eigen::Index at(Eigen::Index k) const;  ///< the block of line k
+  double compare(Eigen::Index block);
 
   const RealizationSpectra& spectra_;
   Eigen::Index lines_;

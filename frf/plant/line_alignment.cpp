@@ -18,7 +18,7 @@ AlignmentAverage::AlignmentAverage(std::vector<int> excited, const std::vector<i
   std::vector<int> lines = excited_;
   lines.insert(lines.end(), detection.begin(), detection.end());
   column_ = first_indices(std::ssize(lines));
-  const auto line_of = [&](Eigen::Index column) { return lines[static_cast<std::size_t>(column)]; };
+  const auto line_of = [&](Eigen::Index column) { return lines[column]; };
   std::ranges::sort(column_, {}, line_of);
   std::ranges::transform(column_, std::back_inserter(lines_), line_of);
   const auto L = std::ssize(lines_);
@@ -33,18 +33,17 @@ void AlignmentAverage::add(const RealizationSpectra& spectra, const Eigen::Matri
   const Eigen::Index E = spectra.experiments();
   Eigen::MatrixXcd residual = Eigen::MatrixXcd::Zero(outputs_ * E, L);
   for_each_line(workers, L, [&](Eigen::Index l) {
-    const Eigen::Index column = column_[static_cast<std::size_t>(l)];
+    const Eigen::Index column = column_[l];
     if (column < N && first_) return;
-    const Eigen::VectorXcd response =
-        column < N ? Eigen::VectorXcd(G_before.col(column))
-                   : interpolated_response(excited_, lines_[static_cast<std::size_t>(l)], G);
+    const Eigen::VectorXcd response = column < N ? Eigen::VectorXcd(G_before.col(column))
+                                                 : interpolated_response(excited_, lines_[l], G);
     const Eigen::Map<const Eigen::MatrixXcd> at(response.data(), outputs_,
                                                 response.size() / outputs_);
     const Eigen::MatrixXcd Z = spectra.response(column);
     residual.col(l) = (Z.topRows(outputs_) - at * Z.bottomRows(at.cols())).reshaped();
   });
   for (Eigen::Index e = 0; e < E; ++e) {
-    const Eigen::MatrixXcd& mean = spectra.runs()[static_cast<std::size_t>(e)].mean;
+    const Eigen::MatrixXcd& mean = spectra.runs()[e].mean;
     residuals_.add(
         residual.middleRows(outputs_ * e, outputs_),
         kPowerRounding * mean.topLeftCorner(outputs_, N).cwiseAbs2().rowwise().maxCoeff());

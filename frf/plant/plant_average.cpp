@@ -84,9 +84,9 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   noise_known_ = noise_known_ && spectra.scatter_dof() > 0;
   Eigen::VectorXd periods(spectra.experiments());
   std::ranges::transform(spectra.runs(), periods.data(), &RunSpectra::periods);
-  std::vector<LineEstimate> lines(static_cast<std::size_t>(frequency_hz_.size()));
+  std::vector<LineEstimate> lines(frequency_hz_.size());
   for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
-    LineEstimate& line = lines[static_cast<std::size_t>(k)];
+    LineEstimate& line = lines[k];
     line = estimate_line(spectra.excitation(k), spectra.response(k), outputs_);
     add_response(spectra, line, k);
     drift_.add(spectra, line, realizations_ - 1, k);
@@ -96,9 +96,8 @@ void PlantAverage::add(const RealizationSpectra& spectra, int workers,
   const ExperimentNoise experiments(spectra, lines, lines_that_share(spectra), workers);
   experiment_noise_ratio_ = std::max(experiment_noise_ratio_, experiments.ratio());
   noise_levels_.push_back(experiments.levels());
-  for_each_line(workers, frequency_hz_.size(), [&](Eigen::Index k) {
-    add_noise(spectra, lines[static_cast<std::size_t>(k)], experiments, periods, k);
-  });
+  for_each_line(workers, frequency_hz_.size(),
+                [&](Eigen::Index k) { add_noise(spectra, lines[k], experiments, periods, k); });
 }
 
 void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstimate& line,
@@ -117,8 +116,7 @@ void PlantAverage::add_noise(const RealizationSpectra& spectra, const LineEstima
   const std::vector<Eigen::MatrixXcd> C = experiments.covariances(line, k);
   for (Eigen::Index e = 0; e < periods.size(); ++e) {
     const Eigen::VectorXcd q = line.Q.row(e).transpose();
-    const auto run = static_cast<std::size_t>(e);
-    add_product(q * q.adjoint() / periods[e], C[run], spectra.runs()[run].dof(k), k);
+    add_product(q * q.adjoint() / periods[e], C[e], spectra.runs()[e].dof(k), k);
   }
 }
 
@@ -136,8 +134,7 @@ void PlantAverage::add_zippered(const RealizationSpectra& spectra, const Zippere
 void PlantAverage::add_response(const RealizationSpectra& spectra, const LineEstimate& line,
                                 Eigen::Index k) {
   if (line.status != LineStatus::good) {
-    refuse(line.status, spectra.realization(), lines_[static_cast<std::size_t>(k)],
-           frequency_hz_[k]);
+    refuse(line.status, spectra.realization(), lines_[k], frequency_hz_[k]);
   }
   unvec(Z_sum_, k, outputs_ + inputs_) += line.Z_by_R;
   comparison_.add(line.G, k);

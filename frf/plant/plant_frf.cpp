@@ -319,9 +319,8 @@ class PlantEstimation {
     for (const OddRun& odd : average_->odd_runs()) {
       const auto of =
           std::ranges::find(realizations_, odd.realization, &RealizationRuns::realization);
-      results.noisy_runs.push_back(
-          {odd.realization, of->runs[static_cast<std::size_t>(odd.experiment)].run().experiment,
-           frf.outputs.name(odd.output), odd.ratio});
+      results.noisy_runs.push_back({odd.realization, of->runs[odd.experiment].run().experiment,
+                                    frf.outputs.name(odd.output), odd.ratio});
     }
     const UsedRun& run = realizations_.front().runs.front();
     results.differences = average_->differences(frf);

@@ -71,8 +71,7 @@ class CommandHistogram {
     std::copy(sum_.begin(), sum_.end(), dft.input().begin());
     const auto values = dft.forward();
     Eigen::VectorXd power(static_cast<Index>(values.size()));
-    for (std::size_t k = 0; k < values.size(); ++k)
-      power[static_cast<Index>(k)] = std::norm(values[k]);
+    for (std::size_t k = 0; k < values.size(); ++k) power[k] = std::norm(values[k]);
     Eigen::VectorXd sorted = power.head(kMostSteps * kPadding);
     const double median =
         order_statistic({sorted.data(), static_cast<std::size_t>(sorted.size())}, 0.5);
@@ -178,8 +177,7 @@ Eigen::MatrixXd spectra_of(const Members& members) {
   RealDft dft(kPadding * static_cast<int>(kBins));
   Eigen::MatrixXd spectra(kPoints, static_cast<Index>(members.size()));
   for (std::size_t m = 0; m < members.size(); ++m)
-    spectra.col(static_cast<Index>(m)) =
-        members[m]->histogram.spectrum(dft).segment(kFirstPoint, kPoints);
+    spectra.col(m) = members[m]->histogram.spectrum(dft).segment(kFirstPoint, kPoints);
   return spectra;
 }
 
@@ -193,7 +191,7 @@ void add_those_explained_by(const ActuatorStep& step, Members& members,
   for (std::size_t m = 0; m < members.size(); ++m) {
     const Tested* t = members[m];
     Index peak = 0;
-    spectra.col(static_cast<Index>(m)).maxCoeff(&peak);
+    spectra.col(m).maxCoeff(&peak);
     const ActuatorStep common = with_own_rounding(step, *t);
     const double by_common = explained(common, {t});
     const std::vector<ActuatorStep> own = refined(static_cast<double>(kFirstPoint + peak), {t});
@@ -223,7 +221,7 @@ Members take_those_at(Index point, const Eigen::MatrixXd& spectra, Members& memb
   Members with;
   Members without;
   for (std::size_t m = 0; m < members.size(); ++m)
-    (has_step_at(point, spectra.col(static_cast<Index>(m))) ? with : without).push_back(members[m]);
+    (has_step_at(point, spectra.col(m)) ? with : without).push_back(members[m]);
   members = std::move(without);
   return with;
 }
@@ -320,8 +318,7 @@ Eigen::MatrixXcd StepSearch::residual(RunWorkspace& w) const {
   line_spectra(w.samples.sensors, outputs_, lines_, 0, w.dft, Z);
   line_spectra(w.samples.actuators, inputs_, lines_, n_y, w.dft, Z);
   Eigen::MatrixXcd E = Z.topRows(n_y);
-  for (Index k = 0; k < E.cols(); ++k)
-    E.col(k).noalias() -= G_[static_cast<std::size_t>(k)] * Z.col(k).tail(Z.rows() - n_y);
+  for (Index k = 0; k < E.cols(); ++k) E.col(k).noalias() -= G_[k] * Z.col(k).tail(Z.rows() - n_y);
   return E;
 }
 
@@ -347,13 +344,11 @@ void StepSearch::collect(const UsedRun& run, RunWorkspace& w, std::vector<Comman
   for (std::size_t p = 0; p < residuals.size(); ++p)
     for (std::size_t a = 0; a < tested_.size(); ++a) {
       if (!excited[a]) continue;
-      for (std::size_t k = 0; k < lines_.size(); ++k) {
-        const auto at = static_cast<Index>(k);
+      for (Index k = 0; k < variance.cols(); ++k) {
         std::complex<double> matched = 0.0;
         for (Index i = 0; i < variance.rows(); ++i)
-          if (variance(i, at) > 0.0)
-            matched +=
-                std::conj(G_[k](i, tested_[a].input)) * residuals[p](i, at) / variance(i, at);
+          if (variance(i, k) > 0.0)
+            matched += std::conj(G_[k](i, tested_[a].input)) * residuals[p](i, k) / variance(i, k);
         half[lines_[k]] = matched;
       }
       own[a].add(commands[p].col(tested_[a].actuator), w.dft.inverse(half), tested_[a].largest);

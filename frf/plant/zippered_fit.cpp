@@ -74,7 +74,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   problem.r.resize(B);
   Eigen::VectorXcd R(B);
   for (Index i = 0; i < B; ++i) {
-    const Index at = window[static_cast<std::size_t>(i)];
+    const Index at = window[i];
     problem.Z.col(i) = run.mean.col(at);
     problem.r[i] = line(at) - line(k);
     R[i] = spectra.excitation(at)(i / bins_, 0);
@@ -82,7 +82,7 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
   problem.r /= problem.r.cwiseAbs().maxCoeff();
   set_polynomials(problem, kRegressors - 1);
   problem.K *= R.asDiagonal();
-  problem.groups.assign(static_cast<std::size_t>(axes), bins_);
+  problem.groups.assign(axes, bins_);
   problem.independent_noise = outputs_;
   problem.pole_channels = outputs_;
   problem.tested_noise = outputs_;
@@ -109,10 +109,10 @@ ZipperedEstimate ZipperedFit::estimate(const RealizationSpectra& spectra, Index 
     }
     double scarcity = 0.0;  // 1 / degrees of freedom
     for (Index i = 0; i < B; ++i) {
-      const Index line = window[static_cast<std::size_t>(i)];
+      const Index line = window[i];
       scatter += share[i] * spectra.scatter(line);
       for (Index j = 0; j < B; ++j) {
-        const Index other = window[static_cast<std::size_t>(j)];
+        const Index other = window[j];
         scarcity += share[i] * share[j] * common_scatter(run, line, other) /
                     std::sqrt(spectra.scatter_dof(line) * spectra.scatter_dof(other));
       }
@@ -188,7 +188,7 @@ void require_enough_lines(const ZipperedLines& lines, const std::vector<std::str
         "{}: zippered lines: {} is excited on {} of the {} lines, but {} are required to "
         "interpolate its responses. Lengthen the period, widen the band, or excite all axes on all "
         "lines in {} experiments (orthogonal_dft)",
-        place, names[static_cast<std::size_t>(p)], there, lines.lines.size(), needed, lines.axes));
+        place, names[p], there, lines.lines.size(), needed, lines.axes));
   }
 }
 

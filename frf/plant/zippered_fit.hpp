@@ -76,7 +76,7 @@ class ZipperedFit {
 
  private:
   std::vector<Eigen::Index> window(Eigen::Index k) const;
-  int line(Eigen::Index k) const { return lines_.lines[static_cast<std::size_t>(k)]; }
+  int line(Eigen::Index k) const { return lines_.lines[k]; }
 
   ZipperedLines lines_;
   std::vector<std::vector<Eigen::Index>> of_axis_;

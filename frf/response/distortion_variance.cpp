@@ -46,7 +46,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   out.distortion.band_hz.resize(std::ssize(bands), 2);
   out.distortion.level.resize(frf.response.rows(), std::ssize(bands));
   for (Eigen::Index b = 0; b < std::ssize(bands); ++b) {
-    const IndexRange& lines = bands[static_cast<std::size_t>(b)];
+    const IndexRange& lines = bands[b];
     out.distortion.band_hz.row(b) << frf.frequency_hz[lines.first], frf.frequency_hz[lines.end - 1];
     for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
       const auto band = [&](const Eigen::MatrixXd& matrix, Eigen::Index i) {

@@ -179,7 +179,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test.odd = test.even;
   }
   for (Eigen::Index b = 0; b < bands; ++b) {
-    const IndexRange& band = octaves[static_cast<std::size_t>(b)];
+    const IndexRange& band = octaves[b];
     const double low_hz = frf.frequency_hz[band.first];
     test.band_hz.row(b) << low_hz, frf.frequency_hz[band.end - 1];
     test_scatter(frf, scatter, band, b, test);

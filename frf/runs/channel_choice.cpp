@@ -105,7 +105,7 @@ std::vector<Eigen::Index> excited_actuators(const LogInfo& info,
                                             const std::vector<Eigen::Index>& axes) {
   const std::vector<Eigen::Index> actuators = actuators_of_excitation(info);
   std::vector<Eigen::Index> found;
-  for (const Eigen::Index axis : axes) found.push_back(actuators[static_cast<std::size_t>(axis)]);
+  for (const Eigen::Index axis : axes) found.push_back(actuators[axis]);
   if (contains(found, -1)) found.clear();
   return found;
 }

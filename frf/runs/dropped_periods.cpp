@@ -27,8 +27,8 @@ void DroppedPeriods::keep_samples(std::size_t place) {
   first.resize(kept.rows(), kept.cols());
   for (Index c = 0; c < n; ++c) {
     const Eigen::Ref<const Eigen::VectorXd> samples =
-        c < n_y ? w_.samples.sensors.col(channels_.outputs[static_cast<std::size_t>(c)])
-                : w_.samples.actuators.col(channels_.estimated[static_cast<std::size_t>(c - n_y)]);
+        c < n_y ? w_.samples.sensors.col(channels_.outputs[c])
+                : w_.samples.actuators.col(channels_.estimated[c - n_y]);
     if (place == 0) first.col(c) = samples;
     kept.col(c) = (samples - first.col(c)).cast<float>();
   }

@@ -67,7 +67,7 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
   ExcitationSpectrum result;
   constexpr Eigen::Index kNone = -2;
   constexpr Eigen::Index kSeveral = -1;
-  std::vector<Eigen::Index> only(static_cast<std::size_t>(last) + 1, kNone);
+  std::vector<Eigen::Index> only(last + 1, kNone);
   for (Eigen::Index c = 0; c < period.cols(); ++c) {
     if (!(largest[c] > kSmallestChannel * largest.maxCoeff())) continue;
     const double step = std::max(smallest_step(period.col(c)), step_of_digits(period.col(c)));
@@ -78,16 +78,16 @@ ExcitationSpectrum excitation_spectrum(const Eigen::MatrixXd& period, RealDft& d
     bool any = false;
     for (Eigen::Index l = 1; l <= last; ++l) {
       if (std::norm(spectra(l, c)) <= threshold * threshold) continue;
-      Eigen::Index& channel = only[static_cast<std::size_t>(l)];
+      Eigen::Index& channel = only[l];
       channel = channel == kNone ? c : kSeveral;
       any = true;
     }
     if (any) result.channels.push_back(c);
   }
   for (int l = 1; l <= last; ++l) {
-    if (only[static_cast<std::size_t>(l)] == kNone) continue;
+    if (only[l] == kNone) continue;
     result.lines.push_back(l);
-    result.only.push_back(only[static_cast<std::size_t>(l)]);
+    result.only.push_back(only[l]);
   }
   result.values.setZero(period.cols(), std::ssize(result.lines));
   for (const Eigen::Index c : result.channels)

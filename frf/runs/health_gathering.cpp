@@ -30,11 +30,9 @@ std::vector<int> thinned(const std::vector<int>& lines) {
 }
 
 void scan_period(const LogSamples& s, const DriveMask& drive, std::vector<ChannelScan>& scan) {
-  for (Eigen::Index c = 0; c < s.sensors.cols(); ++c)
-    scan[static_cast<std::size_t>(c)].add(s.sensors.col(c), drive.any());
+  for (Eigen::Index c = 0; c < s.sensors.cols(); ++c) scan[c].add(s.sensors.col(c), drive.any());
   for (Eigen::Index c = 0; c < s.actuators.cols(); ++c)
-    scan[static_cast<std::size_t>(s.sensors.cols() + c)].add(s.actuators.col(c),
-                                                             drive.of_actuator(c));
+    scan[s.sensors.cols() + c].add(s.actuators.col(c), drive.of_actuator(c));
 }
 
 /// Columns of excited `wanted` lines. @pre they are among the excited ones of `lines`
@@ -89,7 +87,7 @@ void HealthPart::watch_start(const UsedRun& run, const std::vector<int>& lines,
 void HealthPart::end() {
   for (Eigen::Index c = sensors_; c < std::ssize(scan_); ++c) {
     // An actuator that is constant in a run without its excitation has an open loop.
-    ChannelScan& scan = scan_[static_cast<std::size_t>(c)];
+    ChannelScan& scan = scan_[c];
     if (!drive_.excites(c - sensors_) && scan.high().value == scan.low().value)
       scan.forget_constant();
   }
@@ -227,8 +225,7 @@ void HealthGathering::excite(std::size_t realization, const std::vector<RunExcit
       const ExcitationSpectrum& spectrum = runs[e].spectrum;
       const auto found = std::ranges::lower_bound(spectrum.lines, line);
       if (found != spectrum.lines.end() && *found == line)
-        at.R.col(static_cast<Eigen::Index>(e)) =
-            spectrum.values.col(found - spectrum.lines.begin());
+        at.R.col(e) = spectrum.values.col(found - spectrum.lines.begin());
     }
   }
 }
@@ -277,7 +274,7 @@ HealthRecord HealthGathering::finish() {
     for (HealthPart& part : one.parts) {
       for (const Eigen::MatrixXcd& spectra : part.periods_) {
         for (std::size_t k = 0; k < record.lines.size(); ++k)
-          record.lines[k].Z.col(column) = spectra.col(static_cast<Eigen::Index>(k));
+          record.lines[k].Z.col(column) = spectra.col(k);
         ++column;
       }
       part.periods_.clear();

@@ -92,7 +92,7 @@ Eigen::MatrixXcd RealizationRecord::mean(const Eigen::MatrixXcd& columns) const 
   Eigen::MatrixXcd means(columns.rows(), experiments());
   Eigen::Index first = 0;
   for (Eigen::Index e = 0; e < experiments(); ++e) {
-    const Eigen::Index P = periods[static_cast<std::size_t>(e)];
+    const Eigen::Index P = periods[e];
     means.col(e) = columns.middleCols(first, P).rowwise().mean();
     first += P;
   }
@@ -104,7 +104,7 @@ Eigen::MatrixXcd RealizationRecord::scatter(const Eigen::MatrixXcd& columns) con
   const Eigen::MatrixXcd means = mean(columns);
   Eigen::Index first = 0;
   for (Eigen::Index e = 0; e < experiments(); ++e) {
-    const Eigen::Index P = periods[static_cast<std::size_t>(e)];
+    const Eigen::Index P = periods[e];
     deviation.middleCols(first, P).colwise() -= means.col(e);
     first += P;
   }

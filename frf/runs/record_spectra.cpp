@@ -156,7 +156,7 @@ class RecordMeasurement {
                             Eigen::Index bins) const {
     RealDft dft(static_cast<int>(rows));
     Eigen::MatrixXcd Z(n_, bins);
-    std::vector<int> all(static_cast<std::size_t>(bins));
+    std::vector<int> all(bins);
     std::iota(all.begin(), all.end(), 0);
     line_spectra(samples.topRows(rows), first_indices(n_), all, 0, dft, Z);
     return Z;

@@ -31,9 +31,9 @@ class RunMeasurement {
     compare_ = choice == PeriodChoice::consistent && together_ >= 3;
     const auto n_lines = std::ssize(lines.lines);
     const auto n = static_cast<Eigen::Index>(channels.outputs.size() + channels.estimated.size());
-    w_.spectra.resize(static_cast<std::size_t>(together_));
+    w_.spectra.resize(together_);
     for (Eigen::MatrixXcd& spectrum : w_.spectra) spectrum.resize(n, n_lines);
-    if (compare_) w_.record.resize(static_cast<std::size_t>(together_));
+    if (compare_) w_.record.resize(together_);
     w_.deviation_re.resize(n);
     w_.deviation_im.resize(n);
     w_.excluded_sum.setZero(w_.dft.length(), std::ssize(channels.excluded));
@@ -57,8 +57,7 @@ class RunMeasurement {
     if (compare_) dropped_.keep_samples(waiting_.size());
     waiting_.push_back(period);
     for (std::size_t c = 0; c < channels_.excluded.size(); ++c)
-      w_.excluded_sum.col(static_cast<Eigen::Index>(c)) +=
-          w_.samples.actuators.col(channels_.excluded[c]);
+      w_.excluded_sum.col(c) += w_.samples.actuators.col(channels_.excluded[c]);
     if (static_cast<int>(waiting_.size()) == together_) include_waiting();
     return spectra;
   }
@@ -106,8 +105,7 @@ class RunMeasurement {
     Eigen::ArrayXXd share(outputs, P);
     Eigen::ArrayXXd sum = Eigen::ArrayXXd::Zero(outputs, P);
     for (Eigen::Index k = 0; k < excited; ++k) {
-      for (Eigen::Index p = 0; p < P; ++p)
-        deviation.col(p) = periods[static_cast<std::size_t>(p)]->col(k).head(outputs);
+      for (Eigen::Index p = 0; p < P; ++p) deviation.col(p) = periods[p]->col(k).head(outputs);
       const Eigen::VectorXcd mean = deviation.rowwise().mean();
       deviation.colwise() -= mean;
       share = deviation.array().abs2();
@@ -249,8 +247,7 @@ Eigen::Index noise_block(Eigen::Index k, Eigen::Index lines) {
 
 double common_scatter(const RunSpectra& run, Eigen::Index k, Eigen::Index l) {
   if (k == l || run.scatter_window == 0) return k == l ? 1.0 : 0.0;
-  const Eigen::Index apart = std::abs(run.scatter_first[static_cast<std::size_t>(k)] -
-                                      run.scatter_first[static_cast<std::size_t>(l)]);
+  const Eigen::Index apart = std::abs(run.scatter_first[k] - run.scatter_first[l]);
   const double x =
       std::max(0.0, 1.0 - static_cast<double>(apart) / static_cast<double>(run.scatter_window));
   return x * (2.0 + x) / 3.0;

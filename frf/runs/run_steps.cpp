@@ -57,9 +57,8 @@ RunWorkers::RunWorkers(int threads, std::size_t runs, int period_samples) {
 
 void RunWorkers::for_each(std::size_t count,
                           const std::function<void(RunWorkspace&, std::size_t)>& work) {
-  for_each_task(static_cast<int>(workspaces_.size()), count, [&](int worker, std::size_t i) {
-    work(*workspaces_[static_cast<std::size_t>(worker)], i);
-  });
+  for_each_task(static_cast<int>(workspaces_.size()), count,
+                [&](int worker, std::size_t i) { work(*workspaces_[worker], i); });
 }
 
 std::vector<RunExcitation> RunWorkers::read_excitation(const std::vector<UsedRun>& runs,
@@ -84,10 +83,8 @@ void line_spectra(const Eigen::Ref<const Eigen::MatrixXd>& samples,
   for (Eigen::Index first = 0; first < count; first += kTogether) {
     const Eigen::Index n = std::min(kTogether, count - first);
     for (Eigen::Index c = 0; c < n; ++c) {
-      const auto spectrum =
-          transform(samples.col(channels[static_cast<std::size_t>(first + c)]), dft);
-      for (Eigen::Index k = 0; k < some.rows(); ++k)
-        some(k, c) = scale * spectrum[static_cast<std::size_t>(lines[static_cast<std::size_t>(k)])];
+      const auto spectrum = transform(samples.col(channels[first + c]), dft);
+      for (Eigen::Index k = 0; k < some.rows(); ++k) some(k, c) = scale * spectrum[lines[k]];
     }
     for (Eigen::Index k = 0; k < some.rows(); ++k)
       for (Eigen::Index c = 0; c < n; ++c) spectra(first_row + first + c, k) = some(k, c);
@@ -113,8 +110,7 @@ Eigen::VectorXd excluded_power(const std::vector<int>& lines, int periods, RunWo
   Eigen::VectorXd power = Eigen::VectorXd::Zero(w.excluded_sum.cols());
   for (Eigen::Index c = 0; c < power.size(); ++c) {
     const auto spectrum = transform(w.excluded_sum.col(c), w.dft);
-    for (const int line : lines)
-      power[c] += std::norm(scale * spectrum[static_cast<std::size_t>(line)]);
+    for (const int line : lines) power[c] += std::norm(scale * spectrum[line]);
   }
   return power;
 }

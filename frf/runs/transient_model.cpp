@@ -43,13 +43,13 @@ TransientModel::TransientModel(int period_samples, int periods,
       bins_((static_cast<Eigen::Index>(period_samples) * periods + 1) / 2),
       excitation_(excitation),
       outputs_(outputs) {
-  std::vector<char> taken(static_cast<std::size_t>(bins_), 0);
+  std::vector<char> taken(bins_, 0);
   taken[0] = 1;  // an offset, not a transient
   if (periods > 1) {
     // All lines, excited or not, because they contain distortions of the plant.
-    for (Eigen::Index b = 0; b < bins_; b += periods) taken[static_cast<std::size_t>(b)] = 1;
+    for (Eigen::Index b = 0; b < bins_; b += periods) taken[b] = 1;
   } else {
-    for (const int line : excitation.lines) taken[static_cast<std::size_t>(line)] = 1;
+    for (const int line : excitation.lines) taken[line] = 1;
   }
   const auto first = taken.begin() + static_cast<Eigen::Index>(excitation.lines.front());
   const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
@@ -60,7 +60,7 @@ TransientModel::TransientModel(int period_samples, int periods,
                     place));
   }
   for (Eigen::Index b = 0; b < bins_; ++b) {
-    if (taken[static_cast<std::size_t>(b)] == 0) usable_.push_back(b);
+    if (taken[b] == 0) usable_.push_back(b);
   }
   window_ = kOrder + 1 + kResidualDof;
   if (std::ssize(usable_) < window_) {
@@ -78,7 +78,7 @@ Eigen::Index TransientModel::first_of_window(Eigen::Index bin) const {
 
 void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
                                    RunSpectra& run) const {
-  const Eigen::Index bin = Eigen::Index{periods_} * excitation_.lines[static_cast<std::size_t>(k)];
+  const Eigen::Index bin = Eigen::Index{periods_} * excitation_.lines[k];
   const auto first = usable_.begin() + first_of_window(bin);
   const std::vector<Eigen::Index> bins(first, first + window_);
   const double reach =
@@ -92,11 +92,11 @@ void TransientModel::separate_line(const Eigen::MatrixXcd& Z, Eigen::Index k,
   problem.tested_noise = outputs_;
   problem.chance_of_a_pole = kChanceOfAPole;
   for (Eigen::Index i = 0; i < window_; ++i)
-    problem.r[i] = static_cast<double>(bins[static_cast<std::size_t>(i)] - bin) / reach;
+    problem.r[i] = static_cast<double>(bins[i] - bin) / reach;
   set_polynomials(problem, kOrder);
 
   const LocalFit fit = fit_locally(problem, kMostPoles);
-  run.scatter_first[static_cast<std::size_t>(k)] = first - usable_.begin();
+  run.scatter_first[k] = first - usable_.begin();
   run.mean.col(k) = Z.col(bin) - fit.value.col(0);
   run.line_dof[k] = static_cast<double>(kDof) * fit.dof / static_cast<double>(kResidualDof);
   // Scaled for single periods. The line's own noise is the mean of the bins'; that of T is the sum of |weight|^2 times

@@ -47,8 +47,7 @@ class Projection {
   Eigen::MatrixXcd value(const Eigen::MatrixXcd& Z) const {
     Eigen::MatrixXcd value(Z.rows(), std::ssize(groups_));
     for (std::size_t g = 0; g < groups_.size(); ++g)
-      value.col(static_cast<Eigen::Index>(g)) =
-          Z.middleCols(groups_[g].first, groups_[g].Q.rows()) * groups_[g].weight;
+      value.col(g) = Z.middleCols(groups_[g].first, groups_[g].Q.rows()) * groups_[g].weight;
     return value;
   }
   Eigen::VectorXcd weight(std::size_t group) const { return groups_[group].weight; }
@@ -182,11 +181,11 @@ class Fitting {
     DenominatorStep step{Eigen::MatrixXcd(poles, poles), Eigen::VectorXcd(poles),
                          product(weight_, e, e).real()};
     for (Eigen::Index i = 0; i < poles; ++i) {
-      const auto& x_i = x[static_cast<std::size_t>(i)];
+      const auto& x_i = x[i];
       step.right[i] = -product(weight_, e, x_i);
       step.normal(i, i) = product(weight_, x_i, x_i).real();
       for (Eigen::Index j = 0; j < i; ++j) {
-        step.normal(i, j) = product(weight_, x[static_cast<std::size_t>(j)], x_i);
+        step.normal(i, j) = product(weight_, x[j], x_i);
         step.normal(j, i) = std::conj(step.normal(i, j));
       }
     }
@@ -247,8 +246,7 @@ class Fitting {
     Eigen::MatrixXcd information(poles, poles);
     for (Eigen::Index i = 0; i < poles; ++i) {
       for (Eigen::Index j = 0; j < poles; ++j) {
-        information(i, j) =
-            product(weight, x[static_cast<std::size_t>(j)], x[static_cast<std::size_t>(i)]);
+        information(i, j) = product(weight, x[j], x[i]);
       }
     }
     information *=
@@ -271,7 +269,7 @@ double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fi
                     const Eigen::ArrayXd& share) {
   Eigen::ArrayXXd variance(problem.pole_channels, share.size());
   for (Eigen::Index n = 0; n < share.size(); ++n) {
-    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const LocalFit& fit = fits[n];
     variance.col(n) = fit.residual.topRows(problem.pole_channels).rowwise().squaredNorm() / fit.dof;
   }
   const Eigen::ArrayXd mean = variance.matrix() * share.matrix();
@@ -279,9 +277,7 @@ double variance_dof(const LocalProblem& problem, const std::vector<LocalFit>& fi
   double scarcity = 0.0;
   for (Eigen::Index n = 0; n < share.size(); ++n) {
     const Eigen::ArrayXd ratio = variance.col(n) / mean;
-    scarcity +=
-        share[n] *
-        (ratio.square() / fits[static_cast<std::size_t>(n)].dof + (ratio - 1.0).square()).mean();
+    scarcity += share[n] * (ratio.square() / fits[n].dof + (ratio - 1.0).square()).mean();
   }
   return 1.0 / scarcity;
 }
@@ -292,7 +288,7 @@ Eigen::ArrayXd log_probability(const LocalProblem& problem, const Fitting& fitti
                                const std::vector<LocalFit>& fits) {
   Eigen::ArrayXd log_p(std::ssize(fits));
   for (Eigen::Index n = 0; n < log_p.size(); ++n) {
-    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const LocalFit& fit = fits[n];
     const double cost = std::max(fitting.cost(fit), std::numeric_limits<double>::min());
     log_p[n] = fit.poles * std::log(problem.chance_of_a_pole) -
                degrees_of_freedom(problem, fit.poles) * std::log(cost);
@@ -348,7 +344,7 @@ LocalFit average_locally(const LocalProblem& problem, int most_poles) {
   mean.leverage.setZero(mean.value.cols());
   mean.residual.resize(channels, B * share.size());
   for (Eigen::Index n = 0; n < share.size(); ++n) {
-    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const LocalFit& fit = fits[n];
     mean.value += share[n] * fit.value;
     mean.weight += share[n] * fit.weight;
     mean.leverage += share[n] * fit.leverage;
@@ -360,7 +356,7 @@ LocalFit average_locally(const LocalProblem& problem, int most_poles) {
   mean.pole_spread.resize(mean.value.size(), columns + share.size());
   Eigen::Index column = 0;
   for (Eigen::Index n = 0; n < share.size(); ++n) {
-    const LocalFit& fit = fits[static_cast<std::size_t>(n)];
+    const LocalFit& fit = fits[n];
     const double root = std::sqrt(share[n]);
     mean.pole_spread.col(column++) = root * (fit.value - mean.value).reshaped();
     if (fit.poles == 0) continue;

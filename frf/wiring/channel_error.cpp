@@ -75,8 +75,7 @@ void undo(const ChannelError& error, HealthRecord& record) {
   const Eigen::Index count = error.a >= 0 ? 1 : error.of_sensors ? record.n_y() : record.n_u();
   for (std::size_t k = 0; k < record.lines.size(); ++k) {
     Eigen::MatrixXcd& Z = record.lines[k].Z;
-    const double omega_rad_s =
-        2.0 * std::numbers::pi * record.frequency_hz[static_cast<Eigen::Index>(k)];
+    const double omega_rad_s = 2.0 * std::numbers::pi * record.frequency_hz[k];
     switch (error.kind) {
       case ChannelError::Kind::gain:
         Z.middleRows(first, count) /= error.value;

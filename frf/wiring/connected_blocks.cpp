@@ -36,15 +36,15 @@ Scaling scaling_of(const Eigen::MatrixXd& power) {
 
 /// All channels reachable from output `first`.
 ConnectedBlock block_of(Index first, const Eigen::MatrixXi& connects) {
-  std::vector<char> has_output(static_cast<std::size_t>(connects.rows()), 0);
-  std::vector<char> has_input(static_cast<std::size_t>(connects.cols()), 0);
-  has_output[static_cast<std::size_t>(first)] = 1;
+  std::vector<char> has_output(connects.rows(), 0);
+  std::vector<char> has_input(connects.cols(), 0);
+  has_output[first] = 1;
   for (bool grows = true; grows;) {
     grows = false;
     for (Index i = 0; i < connects.rows(); ++i)
       for (Index j = 0; j < connects.cols(); ++j) {
-        char& output = has_output[static_cast<std::size_t>(i)];
-        char& input = has_input[static_cast<std::size_t>(j)];
+        char& output = has_output[i];
+        char& input = has_input[j];
         if (connects(i, j) == 0 || output == input) continue;
         output = input = 1;
         grows = true;
@@ -52,9 +52,9 @@ ConnectedBlock block_of(Index first, const Eigen::MatrixXi& connects) {
   }
   ConnectedBlock block;
   for (Index i = 0; i < connects.rows(); ++i)
-    if (has_output[static_cast<std::size_t>(i)] != 0) block.outputs.push_back(i);
+    if (has_output[i] != 0) block.outputs.push_back(i);
   for (Index j = 0; j < connects.cols(); ++j)
-    if (has_input[static_cast<std::size_t>(j)] != 0) block.inputs.push_back(j);
+    if (has_input[j] != 0) block.inputs.push_back(j);
   return block;
 }
 
@@ -79,11 +79,11 @@ std::vector<ConnectedBlock> connected_blocks(const std::vector<PlantLine>& lines
       scaling.outputs.cwiseAbs2().asDiagonal() * above * scaling.inputs.cwiseAbs2().asDiagonal();
   const Eigen::MatrixXi connects = (scaled.array() > kLeastPower).cast<int>();
   std::vector<ConnectedBlock> blocks;
-  std::vector<char> done(static_cast<std::size_t>(n_y), 0);
+  std::vector<char> done(n_y, 0);
   for (Index i = 0; i < n_y; ++i) {
-    if (done[static_cast<std::size_t>(i)] != 0) continue;
+    if (done[i] != 0) continue;
     ConnectedBlock block = block_of(i, connects);
-    for (const Index output : block.outputs) done[static_cast<std::size_t>(output)] = 1;
+    for (const Index output : block.outputs) done[output] = 1;
     if (block.inputs.empty()) continue;
     const Eigen::VectorXd y = scaling.outputs(block.outputs);
     const Eigen::VectorXd u = scaling.inputs(block.inputs);

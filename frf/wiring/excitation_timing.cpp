@@ -52,7 +52,7 @@ class Alignment {
     for (Index k = 0; k < K; ++k) {
       const double frequency_hz = record.frequency_hz[k];
       if (!controller_known_ && frequency_hz < 0.5 * record.frequency_hz[K - 1]) continue;
-      const LineRecord& line = record.lines[static_cast<std::size_t>(k)];
+      const LineRecord& line = record.lines[k];
       const Eigen::MatrixXcd Z = record.mean(line.Z);
       const Eigen::MatrixXcd U = Z.bottomRows(record.n_u());
       Eigen::MatrixXcd controlled = Eigen::MatrixXcd::Zero(U.rows(), U.cols());
@@ -132,8 +132,7 @@ std::optional<ExcitationDelay> align_excitation(HealthRecord& record,
   if (!delay) return delay;
   const double late_s = delay->samples / record.info.sample_rate_hz;
   for (Index k = 0; k < record.frequency_hz.size(); ++k)
-    record.lines[static_cast<std::size_t>(k)].R *=
-        std::polar(1.0, 2.0 * std::numbers::pi * record.frequency_hz[k] * late_s);
+    record.lines[k].R *= std::polar(1.0, 2.0 * std::numbers::pi * record.frequency_hz[k] * late_s);
   return delay;
 }
 

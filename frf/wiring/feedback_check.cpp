@@ -33,8 +33,7 @@ Eigen::VectorXcd over_periods(const HealthRecord& record, Index r) {
   Index at = 0;
   for (const LineRecord& line : record.lines)
     for (Index e = 0; e < record.experiments(); ++e)
-      for (int p = 0; p < record.periods[static_cast<std::size_t>(e)]; ++p)
-        all[at++] = line.R(r, e);
+      for (int p = 0; p < record.periods[e]; ++p) all[at++] = line.R(r, e);
   return all;
 }
 

@@ -12,7 +12,7 @@ using Index = Eigen::Index;
 
 std::vector<Index> picked(const std::vector<Index>& all, const std::vector<Index>& wanted) {
   std::vector<Index> some;
-  for (const Index i : wanted) some.push_back(all[static_cast<std::size_t>(i)]);
+  for (const Index i : wanted) some.push_back(all[i]);
   return some;
 }
 
@@ -43,7 +43,7 @@ std::vector<PlantLine> plant_lines(const HealthRecord& record, const NominalStag
   for (Index k = 0; k < record.frequency_hz.size(); ++k) {
     const double frequency_hz = record.frequency_hz[k];
     if (frequency_hz < nominal.free_from_hz) continue;
-    const LineRecord& at = record.lines[static_cast<std::size_t>(k)];
+    const LineRecord& at = record.lines[k];
     const Eigen::MatrixXcd Z = at.Z(rows, Eigen::all);
     const LineEstimate estimate =
         estimate_line(at.R(record.axes, Eigen::all), record.mean(Z), std::ssize(outputs));

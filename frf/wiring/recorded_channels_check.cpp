@@ -98,7 +98,7 @@ class Search {
     const auto y = positions_in(nominal.sensors, record.info.sensors.names);
     const std::vector<Index> excited = excited_actuators(record.info, record.axes);
     for (std::size_t k = 0; k < lines_.size(); ++k) {
-      const double frequency_hz = record.frequency_hz[static_cast<Index>(k)];
+      const double frequency_hz = record.frequency_hz[k];
       lines_[k].record = &record.lines[k];
       lines_[k].omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
       lines_[k].known =

@@ -68,7 +68,7 @@ class SkewFit {
       Normal sum(n_y_ + n_u_);
       for (std::size_t b = 0; b < blocks_.size(); ++b)
         if (b != out) sum.add(blocks_[b], 1.0);
-      left_out.col(static_cast<Index>(out)) = relative(skew_ + sum.solution());
+      left_out.col(out) = relative(skew_ + sum.solution());
     }
     const Eigen::VectorXd mean = left_out.rowwise().mean();
     const Eigen::VectorXd squares = (left_out.colwise() - mean).rowwise().squaredNorm();
@@ -89,10 +89,9 @@ class SkewFit {
     Normal sum(n_y_ + n_u_);
     for (Index b = 0; b < kBlocks; ++b) {
       const Eigen::MatrixXd Q = damping_directions(imaginary, b);
-      Normal& block = blocks_[static_cast<std::size_t>(b)] = Normal(n_y_ + n_u_);
+      Normal& block = blocks_[b] = Normal(n_y_ + n_u_);
       for (Index k = first_of(b); k < first_of(b + 1); ++k) {
-        const auto line = static_cast<std::size_t>(k);
-        normals.push_back(normal_of(line, G[line], Q));
+        normals.push_back(normal_of(k, G[k], Q));
         block.add(normals.back(), trust_[k]);
       }
       sum.add(block, 1.0);
@@ -103,8 +102,7 @@ class SkewFit {
     for (const Normal& normal : normals) residuals.push_back(normal.residual(step));
     std::vector<double> sorted = residuals;
     const double middle = std::max(1e-300, median(sorted));
-    for (Index k = 0; k < K; ++k)
-      trust_[k] = 1.0 / (1.0 + residuals[static_cast<std::size_t>(k)] / middle);
+    for (Index k = 0; k < K; ++k) trust_[k] = 1.0 / (1.0 + residuals[k] / middle);
   }
 
   /// G with the skews found so far undone, normalized; reduced if noise dominates.
@@ -125,9 +123,7 @@ class SkewFit {
   /// first, a resonance, then the one with the largest remaining part, and so on. Lines are weighted by their distance
   /// from the block, and half of the entries are reserved for the skews.
   Eigen::MatrixXd damping_directions(const Eigen::MatrixXd& imaginary, Index block) const {
-    const auto log_omega = [&](Index k) {
-      return std::log(lines_[static_cast<std::size_t>(k)].omega_rad_s);
-    };
+    const auto log_omega = [&](Index k) { return std::log(lines_[k].omega_rad_s); };
     double middle = 0.0;
     const Index first = first_of(block);
     const Index last = first_of(block + 1);
@@ -167,7 +163,7 @@ class SkewFit {
   Eigen::VectorXd relative(Eigen::VectorXd skew) const {
     std::vector<double> values(skew.begin(), skew.end());
     const std::span all(values);
-    skew.head(n_y_).array() -= median(all.first(static_cast<std::size_t>(n_y_)));
+    skew.head(n_y_).array() -= median(all.first(n_y_));
     skew.tail(n_u_).array() -= median(all.last(static_cast<std::size_t>(n_u_)));
     return skew;
   }
@@ -202,10 +198,7 @@ SkewCheck check_skew(const std::vector<PlantLine>& lines, const std::vector<Inde
     for (Index i = 0; i < n_y + n_u; ++i) {
       if (!(std::abs(skew[i]) >= std::max(kLeastSkew_s, kSkewDeviations * deviation[i]))) continue;
       const bool of_sensors = i < n_y;
-      const Index in_log =
-          of_sensors
-              ? outputs[static_cast<std::size_t>(block.outputs[static_cast<std::size_t>(i)])]
-              : inputs[static_cast<std::size_t>(block.inputs[static_cast<std::size_t>(i - n_y)])];
+      const Index in_log = of_sensors ? outputs[block.outputs[i]] : inputs[block.inputs[i - n_y]];
       check.errors.push_back(
           {ChannelError::Kind::skew, of_sensors, in_log, -1, skew[i], deviation[i]});
     }

@@ -30,9 +30,7 @@ std::optional<bool> Examination::expected_to_respond(Index sensor) const {
   const Eigen::MatrixXcd G =
       nominal_->rigid_body(record_.frequency_hz[record_.frequency_hz.size() / 2]);
   double here = 0.0;
-  for (const Index a : excited)
-    here = std::max(
-        here, std::abs(G(y[static_cast<std::size_t>(sensor)], u[static_cast<std::size_t>(a)])));
+  for (const Index a : excited) here = std::max(here, std::abs(G(y[sensor], u[a])));
   return here > kResponds * G.cwiseAbs().maxCoeff();
 }
 
@@ -113,7 +111,7 @@ std::optional<bool> Examination::controlled(Index actuator) const {
   double fed_back = 0.0;
   double moved = 0.0;
   for (std::size_t k = 0; k < record_.lines.size(); ++k) {
-    const double frequency_hz = record_.frequency_hz[static_cast<Index>(k)];
+    const double frequency_hz = record_.frequency_hz[k];
     if (frequency_hz < nominal_->controller_from_hz || frequency_hz > nominal_->controller_to_hz)
       continue;
     const Eigen::MatrixXcd F = nominal_->controller(frequency_hz);

@@ -28,8 +28,8 @@ std::vector<PlantLine> lines_of_body(const std::vector<PlantLine>& lines) {
   const auto count = static_cast<Index>(lines.size());
   Eigen::VectorXd omega_rad_s(count), gain(count);
   for (Index k = 0; k < count; ++k) {
-    omega_rad_s[k] = lines[static_cast<std::size_t>(k)].omega_rad_s;
-    gain[k] = lines[static_cast<std::size_t>(k)].G.norm();
+    omega_rad_s[k] = lines[k].omega_rad_s;
+    gain[k] = lines[k].G.norm();
   }
   const Index rigid = rigid_lines(omega_rad_s, gain);
   std::vector<double> sizes;
@@ -58,7 +58,7 @@ Eigen::Vector3d fit_entry(const std::vector<PlantLine>& lines, Index i, Index j,
   Eigen::MatrixXd X(K, terms);
   Eigen::MatrixXd rhs(K, 2);
   for (Index k = 0; k < K; ++k) {
-    const PlantLine& line = lines[static_cast<std::size_t>(k)];
+    const PlantLine& line = lines[k];
     const double omega2 = std::pow(line.omega_rad_s, 2);
     const double x = omega2 / highest;
     const double row_square = line.G.row(i).squaredNorm() / static_cast<double>(line.G.cols());
@@ -188,8 +188,8 @@ std::optional<ChannelError> best_error(const Body& body) {
 ChannelError in_log(ChannelError error, const std::vector<Index>& outputs,
                     const std::vector<Index>& inputs) {
   const std::vector<Index>& at = error.of_sensors ? outputs : inputs;
-  if (error.a >= 0) error.a = at[static_cast<std::size_t>(error.a)];
-  if (error.b >= 0) error.b = at[static_cast<std::size_t>(error.b)];
+  if (error.a >= 0) error.a = at[error.a];
+  if (error.b >= 0) error.b = at[error.b];
   return error;
 }
 
@@ -211,7 +211,7 @@ StageWiringCheck check_stage_wiring(const std::vector<PlantLine>& all,
   Body body = fit_body(lines);
   for (Index j = 0; j < body.all.A.cols(); ++j) {
     if (body.all.A.col(j).norm() > kDead * body.all.A0.col(j).norm()) continue;
-    check.dead_actuators.push_back(inputs[static_cast<std::size_t>(j)]);
+    check.dead_actuators.push_back(inputs[j]);
     for (Gains* gains : {&body.all, &body.halves[0], &body.halves[1]})
       gains->weight.col(j).setZero();
   }

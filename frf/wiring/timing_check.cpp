@@ -47,7 +47,7 @@ Eigen::VectorXd weights(const HealthRecord& record, const std::vector<Index>& ac
   bool all_known = true;
   for (Index r = 0; r < R.size(); ++r) {
     if (!(std::abs(R[r]) > smallest)) continue;
-    const Index a = actuators[static_cast<std::size_t>(r)];
+    const Index a = actuators[r];
     if (a < 0)
       all_known = false;
     else
@@ -75,7 +75,7 @@ bool repeats(const Eigen::MatrixXcd& U, const Eigen::VectorXd& weight) {
 /// Share of nonrepeating lines of experiment `e`; its periods are the columns from `first` on.
 double share_unlike(const HealthRecord& record, const std::vector<Index>& actuators, Index e,
                     Index first) {
-  const Index P = record.periods[static_cast<std::size_t>(e)];
+  const Index P = record.periods[e];
   double unlike = 0.0;
   for (const LineRecord& line : record.lines) {
     const Eigen::MatrixXcd U = line.Z.block(record.n_y(), first, record.n_u(), P);
@@ -107,7 +107,7 @@ std::vector<Finding> check_repetition(const HealthRecord& record) {
   Index first = 0;
   Index seen = 0;
   for (Index e = 0; e < record.experiments(); ++e) {
-    const Index P = record.periods[static_cast<std::size_t>(e)];
+    const Index P = record.periods[e];
     if (P >= 2) {
       least = std::min(least, share_unlike(record, actuators, e, first));
       ++seen;

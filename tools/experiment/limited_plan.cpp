@@ -58,8 +58,7 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config) {
       request.prior, stage.info, outline.grid().frequency_hz(), below_band_hz(outline.grid()));
   Eigen::VectorXd velocity_m_s;
   if (request.velocity_m_s > 0.0)
-    velocity_m_s.setConstant(static_cast<Eigen::Index>(stage.info.sensors.size()),
-                             request.velocity_m_s);
+    velocity_m_s.setConstant(stage.info.sensors.size(), request.velocity_m_s);
   for (Eigen::Index i = 0; i < velocity_m_s.size(); ++i)
     if (is_acceleration(stage.info.sensors[i])) velocity_m_s[i] = kUnlimited;
   try {
