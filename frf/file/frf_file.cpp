@@ -2,13 +2,12 @@
 // outputs. /confidence_radius follows from the other datasets and is not read.
 #include "frf/file/frf_file.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <complex>
 #include <type_traits>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/file_kind.hpp"
 #include "acquisition/files/hdf5_file.hpp"
@@ -107,10 +106,8 @@ struct AttributeReader {
   void operator()(const char* name, int& value) const {
     if (!file.has_attribute("/", name)) return;
     const long long count = file.read_integer_attribute("/", name);
-    if (count < 0 || count > 1'000'000'000) {
-      throw FormatError(file.path(), "/",
-                        fmt::format("attribute {} is {}; expected a count", name, count));
-    }
+    if (count < 0 || count > 1'000'000'000)
+      fail_format(file.path(), "/", "attribute {} is {}; expected a count", name, count);
     value = static_cast<int>(count);
   }
   template <HasWords Enum>
@@ -118,11 +115,9 @@ struct AttributeReader {
     if (!file.has_attribute("/", name)) return;
     const std::string word = file.read_text_attribute("/", name);
     const auto known = from_word<Enum>(word);
-    if (!known) {
-      throw FormatError(
-          file.path(), "/",
-          fmt::format("{} is '{}'; expected {}", name, word, one_of(kWords<Enum>, "'")));
-    }
+    if (!known)
+      fail_format(file.path(), "/", "{} is '{}'; expected {}", name, word,
+                  one_of(kWords<Enum>, "'"));
     value = *known;
   }
 };
@@ -204,10 +199,9 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
   frf.inputs = read_channels(file, "/inputs");
   frf.outputs = read_channels(file, "/outputs");
   const std::vector<hsize_t> lines = file.shape("/frequency_hz");
-  if (lines.size() != 1 || lines[0] == 0) {
-    throw FormatError(path, "/frequency_hz",
-                      fmt::format("shape is {}; expected one number per line", join_shape(lines)));
-  }
+  if (lines.size() != 1 || lines[0] == 0)
+    fail_format(path, "/frequency_hz", "shape is {}; expected one number per line",
+                join_shape(lines));
   frf.frequency_hz = read_vector(file, "/frequency_hz");
   require_shape(file, "/response", {lines[0], size_of(frf.n_outputs()), size_of(frf.n_inputs())});
   frf.response = from_c_order(file.read_complex("/response"), frf.n_outputs(), frf.n_inputs());

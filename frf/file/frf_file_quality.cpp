@@ -1,9 +1,8 @@
 #include "frf/file/frf_file_quality.hpp"
 
-#include <fmt/format.h>
-
 #include <array>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "frf/file/line_datasets.hpp"
 
@@ -65,11 +64,9 @@ void read_nonlinearity(const Hdf5File& file, FrfEstimate& frf) {
   if (!file.exists("/nonlinearity_band_hz")) return;
   NonlinearityTest& test = frf.nonlinearity;
   const std::vector<hsize_t> shape = file.shape("/nonlinearity_band_hz");
-  if (shape.size() != 2 || shape[0] == 0 || shape[1] != 2) {
-    throw FormatError(
-        file.path(), "/nonlinearity_band_hz",
-        fmt::format("shape is {}; expected two frequencies per band", join_shape(shape)));
-  }
+  if (shape.size() != 2 || shape[0] == 0 || shape[1] != 2)
+    fail_format(file.path(), "/nonlinearity_band_hz",
+                "shape is {}; expected two frequencies per band", join_shape(shape));
   test.band_hz = from_c_order(file.read_reals("/nonlinearity_band_hz"), 1, 2).transpose();
   const Eigen::Index bands = test.band_hz.rows();
   const Eigen::Index n_y = frf.n_outputs();
@@ -90,7 +87,7 @@ std::vector<double> read_counts(const Hdf5File& file, const std::string& dataset
   std::vector<double> counts = file.read_reals(dataset);
   for (const double count : counts) {
     if (!(count >= 0.0 && count <= kLargestCount))
-      throw FormatError(file.path(), dataset, fmt::format("{} is not a count", count));
+      fail_format(file.path(), dataset, "{} is not a count", count);
   }
   return counts;
 }

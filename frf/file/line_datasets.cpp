@@ -1,8 +1,6 @@
 #include "frf/file/line_datasets.hpp"
 
-#include <fmt/format.h>
-
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -18,10 +16,8 @@ Eigen::VectorXd read_known(const Hdf5File& file, const std::string& dataset, Eig
 
 Eigen::VectorXd read_vector(const Hdf5File& file, const std::string& dataset) {
   const std::vector<hsize_t> shape = file.shape(dataset);
-  if (shape.size() != 1) {
-    throw FormatError(file.path(), dataset,
-                      fmt::format("shape is {}; expected a list of numbers", join_shape(shape)));
-  }
+  if (shape.size() != 1)
+    fail_format(file.path(), dataset, "shape is {}; expected a list of numbers", join_shape(shape));
   const std::vector<double> values = file.read_reals(dataset);
   return Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
 }

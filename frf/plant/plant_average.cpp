@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
@@ -30,16 +31,15 @@ double lines_that_share(const RealizationSpectra& spectra) {
 [[noreturn]] void refuse(LineStatus status, int realization, int line, double frequency_hz) {
   const std::string where = fmt::format("realization {} (counted from 1), line {} ({} Hz)",
                                         realization + 1, line, frequency_hz);
-  if (status == LineStatus::singular_excitation) {
-    throw std::invalid_argument(
-        fmt::format("singular excitation in {}: the axes are not excited independently. Excite one "
-                    "axis per experiment, or all axes with orthogonal phases",
-                    where));
-  }
-  throw std::invalid_argument(
-      fmt::format("singular inputs in {}: the selected actuators do not move independently. Select "
-                  "other inputs, or excite at the actuators",
-                  where));
+  if (status == LineStatus::singular_excitation)
+    fail_request(
+        "singular excitation in {}: the axes are not excited independently. Excite one "
+        "axis per experiment, or all axes with orthogonal phases",
+        where);
+  fail_request(
+      "singular inputs in {}: the selected actuators do not move independently. Select "
+      "other inputs, or excite at the actuators",
+      where);
 }
 
 }  // namespace

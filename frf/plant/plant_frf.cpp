@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "excitation/threads/parcel.hpp"
 #include "excitation/threads/team.hpp"
@@ -77,12 +78,10 @@ class PlantEstimation {
           run_workers_.read_excitation(realization.runs, true);
       if (!average_) prepare(realization, excitation);
       check_excitation(realization, excitation);
-      if (!zippered_ && realization.runs.size() < excited_.axes.size()) {
-        throw std::invalid_argument(fmt::format(
-            "{} but only {} in realization {} (counted from 1); exclude this realization",
-            counted(excited_.axes.size(), "excited axis", "excited axes"),
-            counted(realization.runs.size(), "experiment"), realization.realization + 1));
-      }
+      if (!zippered_ && realization.runs.size() < excited_.axes.size())
+        fail_request("{} but only {} in realization {} (counted from 1); exclude this realization",
+                     counted(excited_.axes.size(), "excited axis", "excited axes"),
+                     counted(realization.runs.size(), "experiment"), realization.realization + 1);
       if (health != nullptr) health->excite(m, excitation);
       std::vector<Eigen::MatrixXcd> R;
       for (const RunExcitation& run : excitation)
@@ -128,11 +127,9 @@ class PlantEstimation {
   ExcitedPart excited_part(const RealizationRuns& realization,
                            const std::vector<RunExcitation>& excitation) const {
     ExcitedPart part{excitation.front().spectrum.lines, {}};
-    if (part.lines.empty()) {
-      throw std::invalid_argument(fmt::format(
-          "{}/excitation: nothing is excited; record the signal that is added in the loop",
-          realization.runs.front().place()));
-    }
+    if (part.lines.empty())
+      fail_request("{}/excitation: nothing is excited; record the signal that is added in the loop",
+                   realization.runs.front().place());
     part.axes = excited_axes(excitation);
     part.single_axis = std::ranges::all_of(
         excitation, [](const RunExcitation& run) { return run.spectrum.channels.size() == 1; });
@@ -148,33 +145,32 @@ class PlantEstimation {
       const ExcitationSpectrum& spectrum = excitation[e].spectrum;
       const std::string place = realization.runs[e].place() + "/excitation";
       if (spectrum.lines.empty())
-        throw std::invalid_argument(
-            fmt::format("{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
-                        "axis (--inputs with the other axes), or measure the run again",
-                        place, excited_.lines.size(), first));
+        fail_request(
+            "{}: nothing is excited in this run, but {} lines are in {}. Exclude its "
+            "axis (--inputs with the other axes), or measure the run again",
+            place, excited_.lines.size(), first);
       if (spectrum.lines != excited_.lines) {
         std::vector<int> differing;
         std::ranges::set_symmetric_difference(spectrum.lines, excited_.lines,
                                               std::back_inserter(differing));
         const double resolution_hz = info_.sample_rate_hz / info_.period_samples;
-        throw std::invalid_argument(fmt::format(
+        fail_request(
             "{}: {} lines are excited here and {} in {}; line {} ({} Hz) is in only one "
             "of them. All runs must excite the same lines",
             place, spectrum.lines.size(), excited_.lines.size(), first, differing.front(),
-            differing.front() * resolution_hz));
+            differing.front() * resolution_hz);
       }
-      if (!excited_.only.empty() && spectrum.only != excited_.only) {
-        throw std::invalid_argument(
-            fmt::format("{}: the axes have different lines than in {}; in a zippered experiment an "
-                        "axis must have the same lines in all realizations",
-                        place, first));
-      }
+      if (!excited_.only.empty() && spectrum.only != excited_.only)
+        fail_request(
+            "{}: the axes have different lines than in {}; in a zippered experiment an "
+            "axis must have the same lines in all realizations",
+            place, first);
       for (const Eigen::Index axis : spectrum.channels) {
         if (std::ranges::binary_search(excited_.axes, axis)) continue;
-        throw std::invalid_argument(fmt::format(
+        fail_request(
             "{}: channel {} is excited here but not in realization {} (counted from 1); "
             "all realizations must excite the same axes",
-            place, info_.excitation.name(axis), realizations_.front().realization + 1));
+            place, info_.excitation.name(axis), realizations_.front().realization + 1);
       }
     }
   }

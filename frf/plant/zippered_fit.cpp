@@ -1,13 +1,11 @@
 #include "frf/plant/zippered_fit.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <stdexcept>
 #include <utility>
 
+#include "acquisition/files/fail.hpp"
 #include "frf/runs/excitation_spectrum.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/local_fit.hpp"
@@ -184,11 +182,11 @@ void require_enough_lines(const ZipperedLines& lines, const std::vector<std::str
   for (Eigen::Index p = 0; p < lines.axes; ++p) {
     const std::size_t there = lines.of(p).size();
     if (there >= needed) continue;
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}: zippered lines: {} is excited on {} of the {} lines, but {} are required to "
         "interpolate its responses. Lengthen the period, widen the band, or excite all axes on all "
         "lines in {} experiments (orthogonal_dft)",
-        place, names[p], there, lines.lines.size(), needed, lines.axes));
+        place, names[p], there, lines.lines.size(), needed, lines.axes);
   }
 }
 

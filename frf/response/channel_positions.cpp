@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <set>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 
 namespace stageid {
@@ -20,16 +20,15 @@ std::vector<Eigen::Index> channel_positions(const ChannelList& channels,
     const auto at = std::ranges::find(names, name);
     if (at == names.end()) {
       const std::string nearest = nearest_word(name, names);
-      throw std::invalid_argument(fmt::format(
+      fail_request(
           "{}: unknown {} '{}'; {} {}", option, kind, name,
           nearest.empty() ? "available:" : fmt::format("did you mean '{}'? Available:", nearest),
-          fmt::join(names, ", ")));
+          fmt::join(names, ", "));
     }
     found.push_back(at - names.begin());
   }
   if (std::set<Eigen::Index>(found.begin(), found.end()).size() != found.size())
-    throw std::invalid_argument(
-        fmt::format("{}: duplicate channel; name each channel once", option));
+    fail_request("{}: duplicate channel; name each channel once", option);
   return found;
 }
 

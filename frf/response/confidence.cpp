@@ -1,10 +1,10 @@
 #include "frf/response/confidence.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -15,10 +15,8 @@ double squared_error_quantile(double level, double dof) {
 }
 
 Eigen::MatrixXd confidence_radius(const FrfEstimate& frf, double level, VarianceKind kind) {
-  if (!(level > 0.0 && level < 1.0)) {
-    throw std::invalid_argument(fmt::format(
-        "confidence level: {} is out of range; give a probability between 0 and 1", level));
-  }
+  if (!(level > 0.0 && level < 1.0))
+    fail_request("confidence level: {} is out of range; give a probability between 0 and 1", level);
   const bool total = kind == VarianceKind::total;
   const Eigen::MatrixXd& variance = total ? frf.total_variance : frf.noise_variance;
   const double dof = total ? frf.total_dof : frf.noise_dof;
@@ -46,10 +44,10 @@ double mean_relative_variance(const FrfEstimate& frf, VarianceKind kind) {
                                                  frf.n_inputs());
     const Eigen::VectorXd size = frf.at(k).rowwise().squaredNorm();
     if (!(size.minCoeff() > 0.0))
-      throw std::invalid_argument(
-          fmt::format("relative variance: the response of an output is zero at {} Hz; exclude this "
-                      "line or output",
-                      frf.frequency_hz[k]));
+      fail_request(
+          "relative variance: the response of an output is zero at {} Hz; exclude this "
+          "line or output",
+          frf.frequency_hz[k]);
     sum += (line.rowwise().sum().array() / size.array()).mean();
   }
   return sum / static_cast<double>(frf.lines());

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <numbers>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "frf/response/channel_positions.hpp"
 
 namespace stageid {
@@ -15,8 +15,7 @@ using Indices = std::vector<Eigen::Index>;
 
 Indices positions(const ChannelList& channels, const std::vector<std::string>& wanted,
                   const char* option, const char* kind) {
-  if (wanted.empty())
-    throw std::invalid_argument(fmt::format("no {} selected; name at least one", kind));
+  if (wanted.empty()) fail_request("no {} selected; name at least one", kind);
   return channel_positions(channels, wanted, option, kind);
 }
 
@@ -69,8 +68,7 @@ Eigen::Map<const Eigen::MatrixXcd> FrfEstimate::at(Eigen::Index k) const {
 
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
   if (low_hz > high_hz)
-    throw std::invalid_argument(fmt::format(
-        "band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz));
+    fail_request("band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz);
   const auto* const begin = frf.frequency_hz.data();
   const auto* const end = begin + frf.lines();
   const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
@@ -81,9 +79,8 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
                                   ? std::string("no lines")
                                   : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
                                                 frf.frequency_hz[frf.lines() - 1]);
-    throw std::invalid_argument(
-        fmt::format("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
-                    high_hz, range));
+    fail_request("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
+                 high_hz, range);
   }
   for (Eigen::MatrixXcd* const columns :
        {&frf.response, &frf.residual_covariance, &frf.input_factor, &frf.covariance})

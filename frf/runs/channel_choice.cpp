@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <numeric>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "frf/response/channel_positions.hpp"
 
 namespace stageid {
@@ -29,32 +29,27 @@ Indices estimated_actuators(const LogInfo& info, const Indices& excited) {
 void check_counts(const LogInfo& info, const Indices& excited, std::size_t inputs,
                   std::size_t experiments, int realization) {
   const std::string axes = fmt::format("{}", fmt::join(pick(info.excitation, excited).names, ", "));
-  if (inputs > experiments) {
-    throw std::invalid_argument(
-        fmt::format("{} but only {} in realization {} (counted from 1); measure one experiment per "
-                    "input, or select at most {}",
-                    counted(inputs, "input"), counted(experiments, "experiment"), realization + 1,
-                    counted(experiments, "input")));
-  }
-  if (inputs > excited.size()) {
-    throw std::invalid_argument(fmt::format(
-        "{} but only {} ({}); excite one axis per input, or select {}", counted(inputs, "input"),
-        counted(excited.size(), "excited axis", "excited axes"), axes,
-        counted(excited.size(), "input")));
-  }
-  if (inputs < excited.size()) {
-    throw std::invalid_argument(
-        fmt::format("{} but {} excited axes ({}): the effect of the other axes would be attributed "
-                    "to the selected inputs; select {} inputs",
-                    counted(inputs, "input"), excited.size(), axes, excited.size()));
-  }
-  if (experiments < excited.size()) {
-    throw std::invalid_argument(
-        fmt::format("{} but only {} in realization {} (counted from 1); exclude it, or measure one "
-                    "experiment per axis",
-                    counted(excited.size(), "excited axis", "excited axes"),
-                    counted(experiments, "experiment"), realization + 1));
-  }
+  if (inputs > experiments)
+    fail_request(
+        "{} but only {} in realization {} (counted from 1); measure one experiment per "
+        "input, or select at most {}",
+        counted(inputs, "input"), counted(experiments, "experiment"), realization + 1,
+        counted(experiments, "input"));
+  if (inputs > excited.size())
+    fail_request("{} but only {} ({}); excite one axis per input, or select {}",
+                 counted(inputs, "input"), counted(excited.size(), "excited axis", "excited axes"),
+                 axes, counted(excited.size(), "input"));
+  if (inputs < excited.size())
+    fail_request(
+        "{} but {} excited axes ({}): the effect of the other axes would be attributed "
+        "to the selected inputs; select {} inputs",
+        counted(inputs, "input"), excited.size(), axes, excited.size());
+  if (experiments < excited.size())
+    fail_request(
+        "{} but only {} in realization {} (counted from 1); exclude it, or measure one "
+        "experiment per axis",
+        counted(excited.size(), "excited axis", "excited axes"), counted(experiments, "experiment"),
+        realization + 1);
 }
 
 }  // namespace

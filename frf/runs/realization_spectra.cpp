@@ -1,10 +1,9 @@
 #include "frf/runs/realization_spectra.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
@@ -76,11 +75,11 @@ void refuse_constant_inputs(const RealizationRuns& realization, const Realizatio
   for (std::size_t i = 0; i < channels.estimated.size(); ++i) {
     if (moves(spectra, outputs + static_cast<Eigen::Index>(i))) continue;
     const UsedRun& run = realization.runs.front();
-    throw std::invalid_argument(fmt::format(
+    fail_request(
         "{}/actuators: channel {} is constant throughout realization {} (counted from 1), so the "
         "response cannot be estimated. Check its cable and which signal is recorded",
         run.place(), run.log->info().actuators.name(channels.estimated[i]),
-        realization.realization + 1));
+        realization.realization + 1);
   }
 }
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <complex>
 #include <set>
-#include <stdexcept>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 #include "excitation/multisine/frequency_grid.hpp"
 #include "excitation/threads/worker_pool.hpp"
@@ -29,10 +29,9 @@ std::span<const std::complex<double>> transform(const Eigen::Ref<const Eigen::Ve
 
 RunExcitation read_run_excitation(const UsedRun& run, RealDft& dft) {
   RunExcitation excitation{run.log->excitation(run.index), {}};
-  if (excitation.period.rows() != dft.length()) {
-    throw std::invalid_argument(fmt::format("{}/excitation: {} samples; expected one period of {}",
-                                            run.place(), excitation.period.rows(), dft.length()));
-  }
+  if (excitation.period.rows() != dft.length())
+    fail_request("{}/excitation: {} samples; expected one period of {}", run.place(),
+                 excitation.period.rows(), dft.length());
   excitation.spectrum = excitation_spectrum(excitation.period, dft);
   return excitation;
 }

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_error.hpp"
 
 namespace stageid {
@@ -23,10 +24,8 @@ void check_log(const LogReader& log) {
   if (!(info.sample_rate_hz > 0.0) || !std::isfinite(info.sample_rate_hz)) {
     throw FormatError(log.path(), "/", "sample_rate_hz must be positive and finite");
   }
-  if (info.period_samples < 4) {
-    throw FormatError(log.path(), "/",
-                      fmt::format("period_samples is {}; must be at least 4", info.period_samples));
-  }
+  if (info.period_samples < 4)
+    fail_format(log.path(), "/", "period_samples is {}; must be at least 4", info.period_samples);
 }
 
 void check_same_setup(const LogReader& first, const LogReader& other) {
@@ -38,11 +37,9 @@ void check_same_setup(const LogReader& first, const LogReader& other) {
   if (!(a.excitation == b.excitation)) differs = "excitation channels";
   if (!(a.actuators == b.actuators)) differs = "actuator channels";
   if (!(a.sensors == b.sensors)) differs = "sensor channels";
-  if (differs != nullptr) {
-    throw std::invalid_argument(
-        fmt::format("{}: different {} than in {}; logs that are used together must have the same",
-                    other.path().string(), differs, first.path().string()));
-  }
+  if (differs != nullptr)
+    fail_request("{}: different {} than in {}; logs that are used together must have the same",
+                 other.path().string(), differs, first.path().string());
 }
 
 UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions& options) {
@@ -51,20 +48,17 @@ UsedRun measured_part(const LogReader& log, std::size_t index, const FrfOptions&
   const std::string place = fmt::format("/runs/{}", used.run().name);
   const auto period = static_cast<std::uint64_t>(info.period_samples);
   const std::uint64_t samples = used.run().samples;
-  if (samples == 0 || samples % period != 0) {
-    throw FormatError(
+  if (samples == 0 || samples % period != 0)
+    fail_format(
         log.path(), place,
-        fmt::format(
-            "{} are not a whole number of periods of {}; correct period_samples or trim the record",
-            counted(samples, "sample"), counted(period, "sample")));
-  }
+        "{} are not a whole number of periods of {}; correct period_samples or trim the record",
+        counted(samples, "sample"), counted(period, "sample"));
   used.periods = static_cast<int>(samples / period) - used.transient_periods;
-  if (used.periods < 1) {
-    throw FormatError(log.path(), place,
-                      fmt::format("{} recorded, {} transient: no period remains. Measure longer or "
-                                  "lower transient_periods",
-                                  counted(samples / period, "period"), used.transient_periods));
-  }
+  if (used.periods < 1)
+    fail_format(log.path(), place,
+                "{} recorded, {} transient: no period remains. Measure longer or "
+                "lower transient_periods",
+                counted(samples / period, "period"), used.transient_periods);
   return used;
 }
 
@@ -111,11 +105,9 @@ void check_realizations_asked_for(const RunsByRealization& table, const FrfOptio
       if (run.complete) complete.insert(run.realization + 1);
   const std::string log = logs.front()->path().string();
   for (const int realization : options.realizations) {
-    if (!table.contains(realization)) {
-      throw std::invalid_argument(fmt::format(
-          "{}: realization {} has no complete run; those with one are {} (counted from 1)", log,
-          realization + 1, fmt::join(complete, ", ")));
-    }
+    if (!table.contains(realization))
+      fail_request("{}: realization {} has no complete run; those with one are {} (counted from 1)",
+                   log, realization + 1, fmt::join(complete, ", "));
   }
 }
 
@@ -128,12 +120,11 @@ std::size_t needed_experiments(const RunsByRealization& table, std::size_t begun
   const auto best = std::ranges::max_element(
       table, {}, [](const auto& realization) { return realization.second.size(); });
   const std::size_t most = best->second.size();
-  if (most < begun && options.inputs.empty()) {
-    throw std::invalid_argument(
-        fmt::format("{}: no realization is complete; realization {} (counted from 1) has {} of {}. "
-                    "Resume the experiment, or name the inputs",
-                    log, best->first + 1, most, counted(begun, "experiment")));
-  }
+  if (most < begun && options.inputs.empty())
+    fail_request(
+        "{}: no realization is complete; realization {} (counted from 1) has {} of {}. "
+        "Resume the experiment, or name the inputs",
+        log, best->first + 1, most, counted(begun, "experiment"));
   return most;
 }
 
@@ -160,10 +151,8 @@ ChosenRuns choose_runs(const std::vector<const LogReader*>& logs, const FrfOptio
   const RunsByRealization table = complete_runs(logs, options);
   const std::string first = logs.front()->path().string();
   check_realizations_asked_for(table, options, logs);
-  if (table.empty()) {
-    throw std::invalid_argument(
-        fmt::format("{}: no complete run; measure at least one realization to its end", first));
-  }
+  if (table.empty())
+    fail_request("{}: no complete run; measure at least one realization to its end", first);
   const std::set<int> experiments = begun(logs, &LogRun::experiment);
   const std::size_t needed = needed_experiments(table, experiments.size(), options, first);
 

@@ -2,13 +2,11 @@
 // 1, r, ..., r^5.
 #include "frf/runs/transient_model.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "frf/runs/run_steps.hpp"
 #include "frf/statistics/local_fit.hpp"
 
@@ -53,22 +51,20 @@ TransientModel::TransientModel(int period_samples, int periods,
   }
   const auto first = taken.begin() + static_cast<Eigen::Index>(excitation.lines.front());
   const auto last = taken.begin() + static_cast<Eigen::Index>(excitation.lines.back());
-  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 < std::ssize(excitation.lines)) {
-    throw std::invalid_argument(
-        fmt::format("{}: with a single period, method 'lpm' estimates the transient from unexcited "
-                    "lines, but there are too few. Excite only odd lines, or measure two periods",
-                    place));
-  }
+  if (periods == 1 && 2 * std::count(first, last, char{0}) + 1 < std::ssize(excitation.lines))
+    fail_request(
+        "{}: with a single period, method 'lpm' estimates the transient from unexcited "
+        "lines, but there are too few. Excite only odd lines, or measure two periods",
+        place);
   for (Eigen::Index b = 0; b < bins_; ++b) {
     if (taken[b] == 0) usable_.push_back(b);
   }
   window_ = kOrder + 1 + kResidualDof;
-  if (std::ssize(usable_) < window_) {
-    throw std::invalid_argument(
-        fmt::format("{}: method 'lpm' needs {} bins between the lines, but this record of {} has "
-                    "{}; measure more periods",
-                    place, window_, counted(periods, "period"), usable_.size()));
-  }
+  if (std::ssize(usable_) < window_)
+    fail_request(
+        "{}: method 'lpm' needs {} bins between the lines, but this record of {} has "
+        "{}; measure more periods",
+        place, window_, counted(periods, "period"), usable_.size());
 }
 
 Eigen::Index TransientModel::first_of_window(Eigen::Index bin) const {

@@ -6,10 +6,10 @@
 #include <charconv>
 #include <chrono>
 #include <fstream>
-#include <stdexcept>
 #include <thread>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/fail.hpp"
 #include "tools/watch/watch_event.hpp"
 
 namespace stageid {
@@ -32,10 +32,10 @@ double false_alarms_per_period(const std::string& text, double period_s) {
       number > 0.0)
     for (const auto& [unit, seconds] : units)
       if (text.substr(slash + 1) == unit) return number * period_s / seconds;
-  throw std::invalid_argument(
-      fmt::format("--false-alarms: got '{}'; expected NUMBER/period, /hour, /day, /week or /year, "
-                  "such as 1/year",
-                  text));
+  fail_request(
+      "--false-alarms: got '{}'; expected NUMBER/period, /hour, /day, /week or /year, "
+      "such as 1/year",
+      text);
 }
 
 /// As in the event log, without the time of writing.

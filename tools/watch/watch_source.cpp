@@ -1,12 +1,10 @@
 #include "tools/watch/watch_source.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "frf/runs/excitation_spectrum.hpp"
@@ -32,14 +30,13 @@ WatchSource::WatchSource(const AdditiveModel& model, std::filesystem::path log,
     : file_(std::move(log)) {
   open(follow);
   if (log_->runs().empty())
-    throw std::invalid_argument(
-        fmt::format("{}: has no run yet; start the measurement first", file_.string()));
+    fail_request("{}: has no run yet; start the measurement first", file_.string());
   const std::vector<int> lines = watched_lines(*log_, band_hz);
   if (lines.size() < 2)
-    throw std::invalid_argument(
-        fmt::format("{}: excites fewer than 2 lines between {} and {} Hz, the band of the model; "
-                    "use another --band, or excite lines in the band",
-                    file_.string(), band_hz[0], band_hz[1]));
+    fail_request(
+        "{}: excites fewer than 2 lines between {} and {} Hz, the band of the model; "
+        "use another --band, or excite lines in the band",
+        file_.string(), band_hz[0], band_hz[1]);
   spectra_.emplace(model, *log_, lines);
   frequency_hz_ = Eigen::VectorXi::Map(lines.data(), std::ssize(lines)).cast<double>() *
                   (log_->info().sample_rate_hz / log_->info().period_samples);
