@@ -1,20 +1,29 @@
 #include "tools/fleet/fleet_run.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstring>
 #include <deque>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "acquisition/files/counted.hpp"
+#include "acquisition/files/file_descriptor.hpp"
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/files/system_reason.hpp"
 #include "excitation/threads/worker_pool.hpp"
-#include "tools/fleet/child_pool.hpp"
 #include "tools/fleet/fleet_store.hpp"
 #include "tools/fleet/identify_log.hpp"
 #include "tools/terminal/exit_code.hpp"
@@ -43,6 +52,94 @@ std::vector<std::string> arguments_of(const Job& job, const FleetConfig& config)
     out.push_back(name);
   return out;
 }
+
+/// The end of a file in memory.
+std::string last_text(int file) {
+  constexpr off_t kMost = 8192;
+  const off_t size = ::lseek(file, 0, SEEK_END);
+  std::string text(static_cast<std::size_t>(size < kMost ? size : kMost), ' ');
+  const ssize_t read = ::pread(file, text.data(), text.size(), size - std::ssize(text));
+  text.resize(read > 0 ? static_cast<std::size_t>(read) : 0);
+  return text;
+}
+
+std::string last_error(std::string_view text) {
+  constexpr std::string_view kStart = "stageid: ";
+  std::string_view found;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    if (line.starts_with(kStart)) found = line.substr(kStart.size());
+    text.remove_prefix(line.size() < text.size() ? line.size() + 1 : line.size());
+  }
+  return std::string(found);
+}
+
+/// How a child process ended.
+struct ChildEnd {
+  std::size_t task = 0;
+  int exit_code = 0;    ///< of an ordinary end
+  int signal = 0;       ///< that killed it; 0: ordinary end
+  std::string message;  ///< its last error on stderr, without "stageid: "
+};
+
+/// Child processes that run this program. They end with it, whatever ends it.
+class ChildPool {
+ public:
+  // A program that ignores SIGCHLD, as some daemons let it do, cannot wait for its children.
+  ChildPool() { std::signal(SIGCHLD, SIG_DFL); }
+  /// Kills those that are running.
+  ~ChildPool() {
+    for (const auto& [pid, child] : running_) ::kill(pid, SIGKILL);
+    for (const auto& [pid, child] : running_) ::waitpid(pid, nullptr, 0);
+  }
+  ChildPool(ChildPool&&) = delete;
+
+  std::size_t size() const noexcept { return running_.size(); }
+
+  /// Starts this program with arguments. @throws FileError if the system cannot
+  void start(std::size_t task, const std::vector<std::string>& arguments) {
+    // Also this program, and this version, after its file was replaced.
+    constexpr const char* kProgram = "/proc/self/exe";
+    std::vector<char*> argv = {const_cast<char*>("stageid")};
+    for (const std::string& argument : arguments)
+      argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    FileDescriptor messages(::memfd_create("stageid messages", MFD_CLOEXEC));
+    const pid_t parent = ::getpid();
+    const pid_t child = messages ? ::fork() : -1;
+    if (child < 0) throw FileError("cannot start a job: " + system_reason(errno));
+    if (child == 0) {  // only calls that are safe between fork and exec
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      if (::getppid() != parent) ::_exit(1);
+      const int nothing = ::open("/dev/null", O_RDWR);
+      ::dup2(nothing, STDIN_FILENO);
+      ::dup2(nothing, STDOUT_FILENO);
+      ::dup2(messages.get(), STDERR_FILENO);
+      ::execv(kProgram, argv.data());
+      ::_exit(1);
+    }
+    running_[child] = {task, std::move(messages)};
+  }
+
+  /// Waits for one to end. @pre size() > 0
+  ChildEnd wait() {
+    int status = 0;
+    pid_t pid = 0;
+    do pid = ::waitpid(-1, &status, 0);
+    while (!running_.contains(pid));
+    const Running child = std::move(running_.extract(pid).mapped());
+    return {child.task, WIFEXITED(status) ? WEXITSTATUS(status) : 0,
+            WIFSIGNALED(status) ? WTERMSIG(status) : 0,
+            last_error(last_text(child.messages.get()))};
+  }
+
+ private:
+  struct Running {
+    std::size_t task = 0;
+    FileDescriptor messages;  ///< file of its stderr
+  };
+  std::map<pid_t, Running> running_;
+};
 
 class FleetRun {
  public:
