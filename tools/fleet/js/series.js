@@ -1,4 +1,4 @@
-// The numbers of tools/fleet/fleet_series.hpp, decoded per stage when it is shown.
+// The numbers of tools/fleet/fleet_page.cpp, decoded per stage when it is shown.
 
 decoders.u8 = (bytes) => bytes;
 decoders.i16 = (bytes) => Int16Array.from(new Uint16Array(interleaved(bytes, 2)), signFirst);
