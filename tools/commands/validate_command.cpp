@@ -43,8 +43,8 @@ bool is_frf(const std::filesystem::path& file) {
 
 nlohmann::ordered_json prediction_json(const PredictionError& error) {
   return {{"sensors", error.sensors},
-          {"error_rms", std::vector<double>(error.error_rms.begin(), error.error_rms.end())},
-          {"signal_rms", std::vector<double>(error.signal_rms.begin(), error.signal_rms.end())},
+          {"error_rms", error.error_rms},
+          {"signal_rms", error.signal_rms},
           {"normalized", error.normalized()},
           {"runs", error.runs},
           {"band_hz", {error.band_hz[0], error.band_hz[1]}}};

@@ -17,11 +17,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What is not finite is written as null.
-Json numbers(const Eigen::VectorXd& values) {
-  return std::vector<double>(values.begin(), values.end());
-}
-
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 Json margin_json(const Margin& margin) {
@@ -45,9 +40,9 @@ void add_margins(const LoopMargins& margins, Json& loop) {
 }
 
 void add_curve(const Eigen::VectorXcd& curve, const Eigen::VectorXd& radius, Json& out) {
-  out["re"] = numbers(curve.real());
-  out["im"] = numbers(curve.imag());
-  if (radius.size() > 0) out["radius_95"] = numbers(radius);
+  out["re"] = Eigen::VectorXd(curve.real());
+  out["im"] = Eigen::VectorXd(curve.imag());
+  if (radius.size() > 0) out["radius_95"] = radius;
 }
 
 /// Radii of one curve; empty: unknown.
@@ -96,7 +91,7 @@ nlohmann::ordered_json controller_view_json(const ControllerView& of, bool curve
               {"encirclements", view.poles.encirclements()}};
   Json determinant = {{"distance", view.margins ? margin_json(view.margins->distance) : Json()}};
   if (curves) {
-    out["frequency_hz"] = numbers(view.frequency_hz);
+    out["frequency_hz"] = view.frequency_hz;
     add_curve(view.determinant, view.determinant_radius, determinant);
   }
   out["determinant"] = std::move(determinant);

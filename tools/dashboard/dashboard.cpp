@@ -25,8 +25,6 @@ std::string text_of(const Json& json) {
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
-std::vector<double> list(const Eigen::ArrayXd& values) { return {values.begin(), values.end()}; }
-
 /// Limits of a group; null if there are none.
 Json limits(const Eigen::VectorXd& values, std::size_t channels) {
   Json out = Json::array();
@@ -160,9 +158,9 @@ std::string Dashboard::state_json() const {
       {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
       {"speed", rate},
       {"levels",
-       {{"peak", list(shown_levels_.peak)},
-        {"rms", list(shown_levels_.rms)},
-        {"largest_peak", list(shown_levels_.largest_peak)}}},
+       {{"peak", shown_levels_.peak},
+        {"rms", shown_levels_.rms},
+        {"largest_peak", shown_levels_.largest_peak}}},
       {"response", {{"edition", content_.response.get().number}, {"status", response_.status()}}},
       {"accuracy", accuracy_json()},
       {"supervisor", plant_ ? plant_json(plant_()) : Json()},

@@ -20,9 +20,8 @@ using Json = nlohmann::ordered_json;
 Json distortion_json(const Distortion& distortion) {
   Json bands = Json::array();
   for (Eigen::Index b = 0; b < distortion.band_hz.rows(); ++b) {
-    const auto level = distortion.level.col(b);
     bands.push_back({{"band_hz", {distortion.band_hz(b, 0), distortion.band_hz(b, 1)}},
-                     {"level", std::vector<double>(level.begin(), level.end())}});
+                     {"level", Eigen::VectorXd(distortion.level.col(b))}});
   }
   return bands;
 }
@@ -185,7 +184,7 @@ std::vector<std::string> delay_lines(const AdditiveModel& model) {
 nlohmann::ordered_json delays_json(const AdditiveModel& model) {
   Json json = Json::object();
   const auto add = [&json](const char* key, const Eigen::VectorXd& values) {
-    if (values.size() > 0) json[key] = std::vector<double>(values.begin(), values.end());
+    if (values.size() > 0) json[key] = values;
   };
   add("input_delay_s", model.input_delays_s());
   add("output_delay_s", model.output_delays_s());

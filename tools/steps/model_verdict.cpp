@@ -98,7 +98,7 @@ nlohmann::ordered_json validation_json(const Validation& v) {
           {"whitened_above_95", v.whitened_above_95},
           {"whiteness", v.whiteness},
           {"whiteness_limit", v.whiteness_limit},
-          {"channel_error", std::vector<double>(v.channel_error.begin(), v.channel_error.end())}};
+          {"channel_error", v.channel_error}};
 }
 
 }  // namespace stageid

@@ -10,6 +10,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
+#include "acquisition/files/json_text.hpp"
 #include "tools/watch/watch_event.hpp"
 
 namespace stageid {
@@ -36,11 +37,6 @@ double false_alarms_per_period(const std::string& text, double period_s) {
       "--false-alarms: got '{}'; expected NUMBER/period, /hour, /day, /week or /year, "
       "such as 1/year",
       text);
-}
-
-/// As in the event log, without the time of writing.
-std::string line_of(const nlohmann::ordered_json& event) {
-  return event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::vector<EventField> fields_of(const nlohmann::ordered_json& event) {
@@ -84,7 +80,7 @@ void StageWatch::write_events(EventLog& events) {
     auto event = nlohmann::ordered_json::parse(line, nullptr, false);
     if (!event.is_object()) continue;
     event.erase("time_utc");
-    told_before_.insert(line_of(event));
+    told_before_.insert(json_line(event));
   }
 }
 
@@ -148,7 +144,7 @@ void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
   stage_changed_ = stage_changed_ || is_of_stage(change.what.kind);
   nlohmann::ordered_json event = change_json(change, *tracker_, model_, period, period_s_);
   console_.result("{:.6g} s: {}", period.time_s, event["text"].get<std::string>());
-  if (events_ != nullptr && !told_before_.contains(line_of(event)))
+  if (events_ != nullptr && !told_before_.contains(json_line(event)))
     events_->write("change", fields_of(event));
   const std::lock_guard lock(mutex_);
   changes_.push_back(std::move(event));
