@@ -252,8 +252,7 @@ int run_program(int argc, const char* const* argv, const Team& team) {
   // A full disk or a closed pipe at stdout must be reported. A closed terminal is an interrupt and keeps its exit
   // code.
   const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
-  if (lost && !interrupt_flag())
-    throw FileError(fmt::format("stdout: cannot be written: {}", system_reason(errno)));
+  if (lost && !interrupt_flag()) fail_file("stdout", "cannot be written: {}", system_reason(errno));
   return exit_code;
 }
 

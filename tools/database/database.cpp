@@ -5,7 +5,7 @@
 #include <cmath>
 #include <regex>
 
-#include "acquisition/files/file_error.hpp"
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -26,9 +26,9 @@ SqlValue Statement::sql_value(const std::vector<std::complex<float>>& value) {
 }
 
 void fail_busy(const std::string& name) {
-  throw FileError(fmt::format(
-      "{}: another process has been writing for {} s; run the command again when it has ended",
-      name, kPatience_s));
+  fail_file(name,
+            "another process has been writing for {} s; run the command again when it has ended",
+            kPatience_s);
 }
 
 bool is_database_url(const std::filesystem::path& place) {

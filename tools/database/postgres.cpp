@@ -61,19 +61,17 @@ struct Connection {
     const std::string kind = state.substr(0, 2);
     if (state == "55P03") fail_busy(name);
     if (::PQstatus(handle.get()) == CONNECTION_BAD)
-      throw FileError(
-          fmt::format("{}: no connection to the database: {}; check the address and "
-                      "the server, then run the command again",
-                      name, message));
+      fail_file(name,
+                "no connection to the database: {}; check the address and the server, then run the "
+                "command again",
+                message);
     if (state == "42501")
-      throw FileError(
-          fmt::format("{}: {}; ask its owner for the permission, or use a database of "
-                      "your own",
-                      name, message));
+      fail_file(name, "{}; ask its owner for the permission, or use a database of your own",
+                message);
     // 22, 23, 42: the statement is at fault; 25: it would have changed something.
     if (kind == "22" || kind == "23" || kind == "42" || (kind == "25" && reads_only))
       fail_request("{}: {}", name, message);
-    throw FileError(fmt::format("{}: {}", name, message));
+    fail_file(name, "{}", message);
   }
   static bool good(const PGresult* result) {
     const ExecStatusType status = ::PQresultStatus(result);
@@ -277,8 +275,7 @@ class PostgresDatabase final : public Database {
     if (failed && sql != "ROLLBACK") connection_.fail(failed.get());
     const Result done = connection_.checked(::PQexec(handle(), sql.c_str()));
     if (sql == "COMMIT" && std::string_view(::PQcmdStatus(done.get())) != sql)
-      throw FileError(
-          fmt::format("{}: nothing was stored; run the command again", connection_.name));
+      fail_file(connection_.name, "nothing was stored; run the command again");
   }
   void create(const std::string& schema) override {
     std::string sql = schema;

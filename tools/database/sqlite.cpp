@@ -1,5 +1,4 @@
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -31,7 +30,7 @@ int enter_wal_mode(sqlite3* database) {
 [[noreturn]] void fail(const std::string& name, sqlite3* database, int code) {
   switch (code & 0xFF) {
     case SQLITE_FULL:
-      throw FileError(fmt::format("{}: {}", name, system_reason(ENOSPC)));
+      fail_file(name, "{}", system_reason(ENOSPC));
     case SQLITE_BUSY:
       fail_busy(name);
     case SQLITE_NOTADB:
@@ -44,10 +43,10 @@ int enter_wal_mode(sqlite3* database) {
     case SQLITE_READONLY:
     case SQLITE_PERM: {
       const int error = ::sqlite3_system_errno(database);
-      throw FileError(fmt::format(
-          "{}: {}", name,
-          error != 0 ? system_reason(error)
-                     : "cannot be read or written; check permissions and free space of its disk"));
+      fail_file(name, "{}",
+                error != 0
+                    ? system_reason(error)
+                    : "cannot be read or written; check permissions and free space of its disk");
     }
     case SQLITE_NOMEM:
       throw std::bad_alloc();
@@ -188,11 +187,10 @@ class SqliteDatabase final : public Database {
   bool claim(std::int64_t number) override {
     const std::string path = name() + "-claims";
     if (!claims_) claims_.emplace(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-    if (claims_->get() < 0) throw FileError(fmt::format("{}: {}", path, system_reason(errno)));
+    if (claims_->get() < 0) fail_file(path, "{}", system_reason(errno));
     if (lock(number, F_WRLCK)) return true;
     if (errno == EAGAIN || errno == EACCES) return false;
-    throw FileError(fmt::format("{}: cannot be locked: {}; put the store on a local disk", path,
-                                system_reason(errno)));
+    fail_file(path, "cannot be locked: {}; put the store on a local disk", system_reason(errno));
   }
   void release(std::int64_t number) override { static_cast<void>(lock(number, F_UNLCK)); }
 

@@ -48,9 +48,8 @@ class PrivateDirectory {
   PrivateDirectory() {
     std::string name = (std::filesystem::temp_directory_path() / "stageid-plot-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw FileError(
-          fmt::format("{}: cannot be created: {}; set TMPDIR to a directory with free space", name,
-                      std::strerror(errno)));
+      fail_file(name, "cannot be created: {}; set TMPDIR to a directory with free space",
+                std::strerror(errno));
     path_ = name;
   }
   ~PrivateDirectory() { remove(); }

@@ -1,7 +1,6 @@
 #include "tools/terminal/external_program.hpp"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -12,8 +11,8 @@
 #include <cerrno>
 #include <csignal>
 
+#include "acquisition/files/fail.hpp"
 #include "acquisition/files/file_descriptor.hpp"
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/system_reason.hpp"
 
 namespace stageid {
@@ -52,8 +51,7 @@ pid_t spawned(const std::vector<std::string>& words, const std::filesystem::path
       ::posix_spawn(&child, all[0].c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  if (error != 0)
-    throw FileError(fmt::format("{}: cannot be started: {}", name_of(words), system_reason(error)));
+  if (error != 0) fail_file(name_of(words), "cannot be started: {}", system_reason(error));
   return child;
 }
 
@@ -62,8 +60,7 @@ pid_t spawned(const std::vector<std::string>& words, const std::filesystem::path
 ExternalEnd run_external(const std::vector<std::string>& words,
                          const std::filesystem::path& directory, const std::string& package) {
   const FileDescriptor messages(::memfd_create("stageid messages", MFD_CLOEXEC));
-  if (messages.get() < 0)
-    throw FileError(fmt::format("{}: cannot be started: {}", name_of(words), system_reason(errno)));
+  if (messages.get() < 0) fail_file(name_of(words), "cannot be started: {}", system_reason(errno));
   const pid_t child = spawned(words, directory, messages.get());
   running = child;
   ExternalEnd end;
@@ -72,8 +69,7 @@ ExternalEnd run_external(const std::vector<std::string>& words,
   running = -1;
   constexpr int kNotFound = 127;  // of env
   if (WIFEXITED(end.status) && WEXITSTATUS(end.status) == kNotFound)
-    throw FileError(
-        fmt::format("{}: not installed; install the Debian package {}", name_of(words), package));
+    fail_file(name_of(words), "not installed; install the Debian package {}", package);
   end.messages.resize(::lseek(messages.get(), 0, SEEK_END));
   const ssize_t size = ::pread(messages.get(), end.messages.data(), end.messages.size(), 0);
   end.messages.resize(size > 0 ? static_cast<std::size_t>(size) : 0);

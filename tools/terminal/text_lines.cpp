@@ -1,12 +1,9 @@
 #include "tools/terminal/text_lines.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 
-#include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
 
 namespace stageid {
@@ -32,10 +29,6 @@ std::string_view TextLines::next() {
   at_ = std::min(end + 1, text_.size());  // the last line may have no line end
   if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
-}
-
-void TextLines::fail(const std::string& message) const {
-  throw FormatError(file_, fmt::format("{}", line_), message);
 }
 
 std::string_view trimmed(std::string_view text) {

@@ -5,6 +5,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 
@@ -22,7 +25,10 @@ class TextLines {
   std::string_view rest() const noexcept { return std::string_view(text_).substr(at_); }
   void skip(std::size_t bytes) noexcept { at_ += bytes; }  ///< of rest()
   /// @throws FormatError "FILE:LINE: message", always.
-  [[noreturn]] void fail(const std::string& message) const;
+  template <typename... Parts>
+  [[noreturn]] void fail(fmt::format_string<Parts...> what, Parts&&... parts) const {
+    fail_format(file_, std::to_string(line_), what, std::forward<Parts>(parts)...);
+  }
 
  private:
   std::filesystem::path file_;

@@ -73,7 +73,7 @@ std::vector<std::string> names_of(const TextLines& lines, const std::vector<std:
   for (const std::string& field : fields) {
     names.push_back(utf8_of_text(trimmed(field)));
     if (!names.back().empty() && !known.insert(names.back()).second)
-      lines.fail(fmt::format("duplicate column name '{}'; rename one", names.back()));
+      lines.fail("duplicate column name '{}'; rename one", names.back());
   }
   return names;
 }
@@ -94,16 +94,14 @@ void for_each_row(const std::filesystem::path& file, const Use& use) {
 void append_row(const TextLines& lines, const std::vector<std::string>& fields, char separator,
                 std::size_t row, std::vector<std::vector<double>>& columns) {
   if (fields.size() > columns.size())
-    lines.fail(fmt::format("got {} fields; the header has {}", fields.size(), columns.size()));
+    lines.fail("got {} fields; the header has {}", fields.size(), columns.size());
   for (std::size_t c = 0; c < fields.size(); ++c) {
     if (trimmed(fields[c]).empty()) continue;
     const std::optional<double> value = number_of(fields[c], separator);
     if (!value)
-      lines.fail(fmt::format("got '{}' in column {}; expected a finite number",
-                             shortened(fields[c]), c + 1));
+      lines.fail("got '{}' in column {}; expected a finite number", shortened(fields[c]), c + 1);
     if (columns[c].size() != row)
-      lines.fail(
-          fmt::format("column {} continues after an empty field; fill or remove the field", c + 1));
+      lines.fail("column {} continues after an empty field; fill or remove the field", c + 1);
     columns[c].push_back(*value);
   }
 }
@@ -146,8 +144,7 @@ TextTable read_text_table(const std::filesystem::path& file) {
       return;
     }
     if (fields.size() != table.names.size())
-      lines.fail(
-          fmt::format("got {} fields; the header has {}", fields.size(), table.names.size()));
+      lines.fail("got {} fields; the header has {}", fields.size(), table.names.size());
     for (std::string& field : fields) field = utf8_of_text(trimmed(field));
     table.rows.push_back(std::move(fields));
     table.lines.push_back(lines.line_number());

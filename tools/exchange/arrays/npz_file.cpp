@@ -116,7 +116,10 @@ class Bytes {
   Bytes(const std::filesystem::path& file, std::string place, std::string_view data)
       : file_(file), place_(std::move(place)), data_(data) {}
 
-  [[noreturn]] void fail(const std::string& what) const { throw FormatError(file_, place_, what); }
+  template <typename... Parts>
+  [[noreturn]] void fail(fmt::format_string<Parts...> what, Parts&&... parts) const {
+    fail_format(file_, place_, what, std::forward<Parts>(parts)...);
+  }
   std::string_view piece(std::size_t at, std::size_t size) const {
     if (at > data_.size() || size > data_.size() - at)
       fail("unexpected end of file; the file is truncated or damaged");
@@ -206,7 +209,7 @@ struct Layout {
 
 std::string_view value_of(const Bytes& npy, std::string_view header, std::string_view key) {
   const std::size_t at = header.find(fmt::format("'{}':", key));
-  if (at == std::string_view::npos) npy.fail(fmt::format("its header has no '{}'", key));
+  if (at == std::string_view::npos) npy.fail("its header has no '{}'", key);
   std::string_view value = header.substr(at + key.size() + 3);
   value.remove_prefix(std::min(value.find_first_not_of(' '), value.size()));
   return value;
@@ -304,8 +307,8 @@ NamedArray array_of(const std::filesystem::path& file, std::string name, std::st
     const char kind = layout.kind == 'c' ? 'f' : layout.kind == 'b' ? 'u' : layout.kind;
     const NumberType* type = number_type(kind, layout.width / parts);
     if (type == nullptr)
-      npy.fail(fmt::format("unsupported number type '{}{}'; save float64, complex128 or integers",
-                           layout.kind, layout.width));
+      npy.fail("unsupported number type '{}{}'; save float64, complex128 or integers", layout.kind,
+               layout.width);
     if (layout.count > data.size() / (parts * type->width)) npy.fail("its data are truncated");
     const auto read = [&](double* to) {
       for (std::size_t k = 0; k < parts * layout.count; ++k)

@@ -61,7 +61,7 @@ double read_reference(const TextLines& lines, std::istringstream& words) {
   words >> word;
   const std::optional<double> value = parse_number(word);
   if (!value || !(*value > 0.0))
-    lines.fail(fmt::format("'{}' is not a reference resistance. Write for example R 50", word));
+    lines.fail("'{}' is not a reference resistance. Write for example R 50", word);
   return *value;
 }
 
@@ -85,9 +85,9 @@ Options read_options(const TextLines& lines, std::string_view line) {
       options.parameters = parameters;
     else
       lines.fail(
-          fmt::format("unknown Touchstone option '{}'. Use HZ, KHZ, MHZ or GHZ, S, Y, Z, G "
-                      "or H, RI, MA or DB, and R with the reference resistance",
-                      word));
+          "unknown Touchstone option '{}'. Use HZ, KHZ, MHZ or GHZ, S, Y, Z, G "
+          "or H, RI, MA or DB, and R with the reference resistance",
+          word);
   }
   return options;
 }
@@ -102,7 +102,7 @@ void append_numbers(const TextLines& lines, std::string_view line, std::vector<d
   std::istringstream words{std::string(line)};
   for (std::string word; words >> word;) {
     const std::optional<double> value = parse_number(word);
-    if (!value) lines.fail(fmt::format("got '{}'; expected a finite number", word));
+    if (!value) lines.fail("got '{}'; expected a finite number", word);
     numbers.push_back(*value);
   }
 }
@@ -117,9 +117,9 @@ std::size_t lines_of(const TextLines& lines, const std::vector<double>& numbers,
   const bool noise = ports == 2 && count > 0 && count * step < numbers.size() &&
                      numbers[count * step] <= numbers[(count - 1) * step];
   if (count == 0 || (count * step != numbers.size() && !noise))
-    lines.fail(fmt::format(
+    lines.fail(
         "{} numbers are not complete lines of {} with rising frequency; check the ending .s{}p",
-        numbers.size(), step, ports));
+        numbers.size(), step, ports);
   return count;
 }
 
@@ -148,9 +148,8 @@ TouchstoneFrf read_touchstone(const std::filesystem::path& file) {
   }
   const Parameters& parameters = *options.parameters;
   if (parameters.two_ports() && ports != 2)
-    lines.fail(fmt::format(
-        "{} parameters need two ports, the file name declares {}; name a two-port file .s2p",
-        parameters.letter, ports));
+    lines.fail("{} parameters need two ports, the file name declares {}; name a two-port file .s2p",
+               parameters.letter, ports);
   const auto n = static_cast<Eigen::Index>(ports);
   const std::size_t step = 1 + 2 * static_cast<std::size_t>(n * n);
   const std::size_t count = lines_of(lines, numbers, step, ports);

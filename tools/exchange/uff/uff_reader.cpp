@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <bit>
 #include <cmath>
 
@@ -25,7 +23,7 @@ class Record {
     if (field.empty()) return 0.0;
     const std::optional<double> value = parse_number(field);
     if (!value || (kind == "whole" && (*value != std::trunc(*value) || std::abs(*value) > 1e15)))
-      lines_.fail(fmt::format("got '{}'; expected a {} number", field, kind));
+      lines_.fail("got '{}'; expected a {} number", field, kind);
     return *value;
   }
   bool at_end() const { return trimmed(line_).empty(); }
@@ -74,8 +72,8 @@ DataForm read_form(TextLines& lines) {
   const long long type = record.integer(10);
   const long long count = record.integer(10);
   if (type != 2 && type != 4 && type != 5 && type != 6)
-    lines.fail(fmt::format("unsupported ordinate data type {}; expected 2, 4, 5 or 6", type));
-  if (count < 1) lines.fail(fmt::format("got {} values; expected at least 1", count));
+    lines.fail("unsupported ordinate data type {}; expected 2, 4, 5 or 6", type);
+  if (count < 1) lines.fail("got {} values; expected at least 1", count);
   DataForm form;
   form.double_precision = type == 4 || type == 6;
   form.complex = type >= 5;
@@ -84,7 +82,7 @@ DataForm read_form(TextLines& lines) {
   form.minimum = record.number(13);
   form.step = record.number(13);
   if (form.count > lines.rest().size())
-    lines.fail(fmt::format("{} values exceed the file size; the file is truncated", count));
+    lines.fail("{} values exceed the file size; the file is truncated", count);
   return form;
 }
 
@@ -100,8 +98,8 @@ std::vector<double> text_values(TextLines& lines, const DataForm& form) {
   while (values.size() < wanted) {
     const std::string_view line = lines.next();
     if (trimmed(line) == kEdge)
-      lines.fail(fmt::format("the data end after {} of {} numbers; the file is truncated",
-                             values.size(), wanted));
+      lines.fail("the data end after {} of {} numbers; the file is truncated", values.size(),
+                 wanted);
     Record record(lines, line);
     while (values.size() < wanted && !record.at_end())
       values.push_back(record.number(widths[values.size() % widths.size()]));
@@ -142,8 +140,7 @@ std::vector<double> binary_values(TextLines& lines, const DataForm& form, std::e
     lines.skip(form.count * step);
     return values;
   }
-  lines.fail(fmt::format("{} values do not match the end of the dataset; the file is damaged",
-                         form.count));
+  lines.fail("{} values do not match the end of the dataset; the file is damaged", form.count);
 }
 
 void distribute(const std::vector<double>& values, const DataForm& form, UffFunction& f) {
@@ -174,7 +171,7 @@ UffFunction read_function(TextLines& lines, const std::optional<std::endian>& bi
   distribute(binary ? binary_values(lines, form, *binary) : text_values(lines, form), form, f);
   for (std::size_t k = 0; k < f.abscissa.size(); ++k)
     if (!std::isfinite(f.abscissa[k]) || !std::isfinite(std::abs(f.ordinate[k])))
-      lines.fail(fmt::format("value {} of the dataset is not finite", k));
+      lines.fail("value {} of the dataset is not finite", k);
   return f;
 }
 
@@ -204,8 +201,7 @@ std::optional<UffMode> read_mode(TextLines& lines) {
   Record numbers(lines, lines.next());
   const long long n_integers = numbers.integer(10), n_reals = numbers.integer(10);
   if (n_integers < 2 || n_integers > 10 || n_reals < (analysis == 2 ? 3 : 4) || n_reals > 12)
-    lines.fail(
-        fmt::format("{} integer and {} real parameters do not define a mode", n_integers, n_reals));
+    lines.fail("{} integer and {} real parameters do not define a mode", n_integers, n_reals);
   numbers.integer(10);
   mode.number = static_cast<int>(numbers.integer(10));
   const std::vector<double> reals = read_short_values(lines, static_cast<std::size_t>(n_reals));
@@ -242,9 +238,9 @@ std::optional<std::endian> byte_order(const TextLines& lines, std::string_view l
   Record record(lines, line.substr(7));
   const long long order = record.integer(6), format = record.integer(6);
   if (order != 1 && order != 2)
-    lines.fail(fmt::format("unsupported byte order {}; expected 1 (little endian) or 2", order));
+    lines.fail("unsupported byte order {}; expected 1 (little endian) or 2", order);
   if (format != 2)
-    lines.fail(fmt::format("unsupported floating-point format {}; expected 2 (IEEE 754)", format));
+    lines.fail("unsupported floating-point format {}; expected 2 (IEEE 754)", format);
   return order == 2 ? std::endian::big : std::endian::little;
 }
 
@@ -270,7 +266,7 @@ void read_dataset(TextLines& lines, UffContent& content) {
     for (std::string* text : {&content.model_name, &content.description})
       *text = utf8_of_text(trimmed(lines.next()));
   } else if (!parse_number(number)) {
-    lines.fail(fmt::format("got '{}'; expected the number of a dataset", trimmed(line)));
+    lines.fail("got '{}'; expected the number of a dataset", trimmed(line));
   }
   skip_to_edge(lines);
 }
@@ -289,9 +285,9 @@ UffContent read_uff(const std::filesystem::path& file) {
     if (line.empty()) continue;
     if (line != kEdge)
       lines.fail(
-          fmt::format("got '{}'; expected '    -1' at the start of a dataset. Check that this is a "
-                      "universal file",
-                      line.substr(0, 40)));
+          "got '{}'; expected '    -1' at the start of a dataset. Check that this is a "
+          "universal file",
+          line.substr(0, 40));
     read_dataset(lines, content);
   }
   return content;
