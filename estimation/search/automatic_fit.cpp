@@ -72,7 +72,7 @@ class AutomaticFit {
     if (selection_.exactly == 0) {
       reduce();
       if (!simple_) simple_ = best_;
-      if ((race_ || !misses_mode_beside_lines()) && restructure()) reduce();
+      if (!misses_mode_beside_lines() && restructure()) reduce();
     }
     grow();
     if (surplus > 0) restructure();
@@ -112,8 +112,8 @@ class AutomaticFit {
     other.race_ = {&search->best_, other.cost(), other.best_.parameters};
     other.search(0);
     other.race_.reset();
-    if (other.worth_.criterion_of_structure(other.best_) <
-        other.worth_.criterion_of_structure(search->best_))
+    if (other.worth_.criterion_of_structure(other.frf_, other.best_) <
+        other.worth_.criterion_of_structure(other.frf_, search->best_))
       search.emplace(std::move(other));
   }
 

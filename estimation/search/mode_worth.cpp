@@ -80,8 +80,7 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
                      const Eigen::MatrixXd& weights)
-    : frf_(&frf),
-      lines_(static_cast<double>(frf.lines())),
+    : lines_(static_cast<double>(frf.lines())),
       channels_(static_cast<double>(frf.response.rows())),
       data_(frf.independent_numbers()),
       parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) * channels_),
@@ -97,11 +96,11 @@ double ModeWorth::criterion(const FitResult& fit) const {
   return data_ * std::log(squares(fit)) + penalty(fit.model, fit.parameters);
 }
 
-double ModeWorth::criterion_of_structure(const FitResult& fit) const {
+double ModeWorth::criterion_of_structure(const FrfEstimate& frf, const FitResult& fit) const {
   const double of_mode = 2.0 + channels_;
   const double saved = cost_of_mode(of_mode, data_, lines_) - most_by_noise(of_mode);
   const auto beside = std::ranges::count_if(fit.model.submodels, [&](const Submodel& s) {
-    return is_searched_mode(s) && side_of_lines(*frf_, s.natural_frequency_hz()) != 0;
+    return is_searched_mode(s) && side_of_lines(frf, s.natural_frequency_hz()) != 0;
   });
   return criterion(fit) - static_cast<double>(beside) * saved;
 }

@@ -27,21 +27,19 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 /// does not fit its errors.
 class ModeWorth {
  public:
-  /// @param frf remains in use  @param weights n_c x N, of the fits that are compared
+  /// @param weights n_c x N, of the fits that are compared
   ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
             const Eigen::MatrixXd& weights);
 
   /// Smaller is better.
   double criterion(const FitResult& fit) const;
 
-  /// The same, to compare models of different structures. Modes beside the lines belong to the structure: they cost what
-  /// noise may gain with them, like the B_1 that can stand in for them.
-  double criterion_of_structure(const FitResult& fit) const;
+  /// The criterion for the choice between general damping and modes beside the lines, which describe the same data. So
+  /// both have the same kind of price: what noise may gain with their parameters.
+  double criterion_of_structure(const FrfEstimate& frf, const FitResult& fit) const;
 
   /// The cost at which a fit of this model has that criterion.
   double cost_at(double criterion, const AdditiveModel& model, Eigen::Index parameters) const;
-
-  double parameters_of_mode() const { return parameters_of_mode_; }
 
   /// Of a mode, in the units of the criterion; also its B_1 by BIC, because they are searched with its place.
   double cost_of_one() const;
@@ -62,7 +60,6 @@ class ModeWorth {
   double squares(const FitResult& fit) const;  ///< sum W |E|^2, not below rounding
   double penalty(const AdditiveModel& model, Eigen::Index parameters) const;
 
-  const FrfEstimate* frf_;
   double lines_ = 0.0;
   double channels_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers
