@@ -104,7 +104,7 @@ class Database {
   virtual std::unique_ptr<Statement> prepare(const std::string& sql) = 0;
   virtual void execute(const std::string& sql) = 0;  ///< one or several statements
   /// Executes CREATE statements in the words of SQLite.
-  virtual void create(const std::string& schema) = 0;
+  virtual void create(std::string_view schema) = 0;
   virtual std::vector<std::string> tables() = 0;  ///< and views, in the order of their names
   /// Claims a number until release(), or until this process ends in any way. @returns false if another one has it
   virtual bool claim(std::int64_t number) = 0;

@@ -173,7 +173,7 @@ class SqliteDatabase final : public Database {
   void execute(const std::string& sql) override {
     check(::sqlite3_exec(handle_.get(), sql.c_str(), nullptr, nullptr, nullptr));
   }
-  void create(const std::string& schema) override { execute(schema); }
+  void create(std::string_view schema) override { execute(std::string(schema)); }
   void begin() override { execute("BEGIN IMMEDIATE"); }
   std::vector<std::string> tables() override {
     std::vector<std::string> out;

@@ -39,7 +39,7 @@ void create_tables(Database& database) {
   if (!database.tables().empty()) return;  // without waiting for other writers
   Transaction transaction(database);
   if (database.tables().empty()) {
-    database.create(kFleetSchema);
+    database.create(fleet_schema);
     database.prepare("INSERT INTO store VALUES (?, ?)")
         ->run(std::string(kStoreFormat), kFleetSchemaVersion);
   }

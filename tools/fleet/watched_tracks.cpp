@@ -39,7 +39,7 @@ std::size_t add_watched(FleetStore& store, const WatchedLog& log) {
   const double start = start_of(log, tracks);
   Database& database = store.database();
   Transaction transaction(database);
-  database.create(kWatchedSchema);
+  database.create(watched_schema);
   database.prepare("INSERT INTO stage (name, changed) VALUES (?, 0) ON CONFLICT DO NOTHING")
       ->run(log.stage);
   const auto add = database.prepare(

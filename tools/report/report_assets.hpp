@@ -4,8 +4,8 @@
 
 namespace stageid::report {
 
-// The sources of the page and the plot library, embedded by tools/report/embed.cmake.
-extern const std::string_view page_html;  ///< template with {{title}}, {{css}}, {{library_js}}, ...
+// The sources of the page and the plot library, embedded by stageid_embed().
+extern const std::string_view page_html;  ///< see html_page()
 extern const std::string_view dashboard_css;
 extern const std::string_view dashboard_js;
 extern const std::string_view fleet_js;
