@@ -9,8 +9,14 @@
 #include <vector>
 
 #include "tools/terminal/shell_word.hpp"
+#include "tools/terminal/text_template.hpp"
 
 namespace stageid {
+
+// From the files of these names.
+extern const std::string_view completion_bash;
+extern const std::string_view completion_zsh;
+
 namespace {
 
 /// name:description for _describe of zsh, shortened to the first clause.
@@ -68,6 +74,13 @@ Cases cases_of(const CommandTree& program, const char* path_variable,
   return cases;
 }
 
+std::string script(std::string_view text, const CommandTree& program, const Cases& cases) {
+  return fill_template(text, {{"program", program.name},
+                              {"paths", cases.paths},
+                              {"words", cases.words},
+                              {"values", cases.values}});
+}
+
 }  // namespace
 
 std::string bash_completion(const CommandTree& program) {
@@ -79,23 +92,7 @@ std::string bash_completion(const CommandTree& program) {
     return fmt::format("words='{}' flags='{}'", fmt::join(words, " "), fmt::join(flags, " "));
   };
   const Cases cases = cases_of(program, "path", assign_words, "words='{}' flags=''");
-  return fmt::format(R"(# Completion of {0} for bash, written by '{0} manual'.
-_{0}() {{
-  local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}} path='' words='' flags='' i
-  for ((i = 1; i < COMP_CWORD; i++)); do
-    case "$path ${{COMP_WORDS[i]}}" in
-{1}    esac
-  done
-  case "$path" in
-{2}  esac
-  case "$path $prev" in
-{3}  esac
-  [[ $cur == -* ]] && words=$flags
-  mapfile -t COMPREPLY < <(compgen -W "$words" -- "$cur")
-}}
-complete -o default -F _{0} {0}
-)",
-                     program.name, cases.paths, cases.words, cases.values);
+  return script(completion_bash, program, cases);
 }
 
 std::string zsh_completion(const CommandTree& program) {
@@ -110,32 +107,7 @@ std::string zsh_completion(const CommandTree& program) {
     return fmt::format("next=({})\n      flags=({})", fmt::join(next, " "), fmt::join(flags, " "));
   };
   const Cases cases = cases_of(program, "place", assign_words, "values=({})");
-  return fmt::format(R"(#compdef {0}
-# Completion of {0} for zsh, written by '{0} manual'.
-_{0}() {{
-  local place='' i
-  local -a next flags values
-  for ((i = 2; i < CURRENT; i++)); do
-    case "$place ${{words[i]}}" in
-{1}    esac
-  done
-  case "$place" in
-{2}  esac
-  case "$place ${{words[CURRENT-1]}}" in
-{3}  esac
-  if [[ ${{words[CURRENT]}} == -* ]]; then
-    _describe -o flag flags
-  elif (( ${{#values}} )); then
-    compadd -a values
-  elif (( ${{#next}} )); then
-    _describe command next || _files
-  else
-    _files
-  fi
-}}
-_{0} "$@"
-)",
-                     program.name, cases.paths, cases.words, cases.values);
+  return script(completion_zsh, program, cases);
 }
 
 }  // namespace stageid

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "tools/report/report_assets.hpp"
+#include "tools/terminal/text_template.hpp"
 
 namespace stageid {
 namespace {
@@ -29,23 +29,6 @@ std::string replaced(std::string_view text,
 /// For use between and inside elements.
 std::string escape_html(std::string_view text) {
   return replaced(text, {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}});
-}
-
-/// Replaces every {{name}} of the template once, from left to right; inserted text is not scanned again. Unknown names
-/// are replaced by nothing.
-std::string fill_page(std::string_view page,
-                      const std::vector<std::pair<std::string_view, std::string_view>>& parts) {
-  std::string out;
-  while (true) {
-    const std::size_t begin = page.find("{{");
-    const std::size_t end = page.find("}}", begin);
-    out += page.substr(0, begin);
-    if (begin == std::string_view::npos || end == std::string_view::npos) return out;
-    const std::string_view name = page.substr(begin + 2, end - begin - 2);
-    for (const auto& [key, value] : parts)
-      if (key == name) out += value;
-    page.remove_prefix(end + 2);
-  }
 }
 
 std::string block_elements(const std::vector<report::Block>& blocks) {
@@ -97,18 +80,18 @@ std::string script_safe(std::string_view json) { return replaced(json, {{'<', "\
 std::string html_page(HtmlPage page, std::string_view title, std::string_view content,
                       const std::vector<report::Block>& blocks) {
   const PageKind kind = kind_of(page);
-  return fill_page(report::page_html, {{"title", escape_html(title)},
-                                       {"object", kind.object},
-                                       {"policy", kind.policy},
-                                       {"without_script", kind.without_script},
-                                       {"library_css", report::library_css},
-                                       {"css", report::page_css},
-                                       {"more_css", kind.css},
-                                       {"library_js", report::library_js},
-                                       {"js", kind.js},
-                                       {"licence", escape_html(report::library_licence)},
-                                       {"content", content},
-                                       {"blocks", block_elements(blocks)}});
+  return fill_template(report::page_html, {{"title", escape_html(title)},
+                                           {"object", kind.object},
+                                           {"policy", kind.policy},
+                                           {"without_script", kind.without_script},
+                                           {"library_css", report::library_css},
+                                           {"css", report::page_css},
+                                           {"more_css", kind.css},
+                                           {"library_js", report::library_js},
+                                           {"js", kind.js},
+                                           {"licence", escape_html(report::library_licence)},
+                                           {"content", content},
+                                           {"blocks", block_elements(blocks)}});
 }
 
 }  // namespace stageid

@@ -11,8 +11,12 @@
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/version.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
+#include "tools/terminal/text_template.hpp"
 
 namespace stageid {
+
+extern const std::string_view model_code_h;  // from model_code.h.in
+
 namespace {
 
 /// A name in a comment of the code: what would end or continue the comment is replaced.
@@ -68,65 +72,6 @@ std::string transition(const std::string& name, const StateSpace& system) {
   return table(name, "a", pairs) + integers(name, "a_first", first);
 }
 
-constexpr const char* kHead =
-    R"(/* A sampled model of {outputs} outputs and {inputs} inputs, written by stageid {version}.
- *
- * x[n+1] = A x[n] + B v[n],  y_i[n + output_delay_i] = C_i x[n] + D_i v[n],  v_j[n] = u_j[n - input_delay_j],
- * at {rate} Hz, behind a zero-order hold. SI units. C99 and C++17; allocates nothing.
- * Inputs u:
-{input_list} * Outputs y:
-{output_list} */
-#ifndef STAGEID_MODEL_{NAME}
-#define STAGEID_MODEL_{NAME}
-
-enum {{ {name}_inputs = {inputs}, {name}_outputs = {outputs}, {name}_states = {states} }};
-
-typedef struct {{
-  double x[{x_size}];
-  double u[{name}_inputs][{u_delay}]; /* the latest inputs, a ring */
-  double y[{name}_outputs][{y_delay}]; /* the outputs to come, a ring */
-  int u_at;
-  int y_at;
-}} {name}_state;
-
-#define {name}_sample_rate_hz {rate_hex}
-)";
-
-constexpr const char* kTail = R"(
-static inline void {name}_reset({name}_state *state) {{
-  static const {name}_state zero = {{{{0.0}}, {{{{0.0}}}}, {{{{0.0}}}}, 0, 0}};
-  *state = zero;
-}}
-
-/* One sample: reads u[{name}_inputs], writes y[{name}_outputs]. */
-static inline void {name}_step({name}_state *state, const double *u, double *y) {{
-  double v[{name}_inputs];
-  double next[{x_size}];
-  state->u_at = (state->u_at + 1) % {u_delay};
-  for (int j = 0; j < {name}_inputs; ++j) {{
-    state->u[j][state->u_at] = u[j];
-    v[j] = state->u[j][(state->u_at + {u_delay} - {name}_input_delay[j]) % {u_delay}];
-  }}
-  state->y_at = (state->y_at + 1) % {y_delay};
-  for (int i = 0; i < {name}_outputs; ++i) {{
-    double sum = 0.0;
-    for (int k = 0; k < {name}_states; ++k) sum += {name}_c[i][k] * state->x[k];
-    for (int j = 0; j < {name}_inputs; ++j) sum += {name}_d[i][j] * v[j];
-    state->y[i][(state->y_at + {name}_output_delay[i]) % {y_delay}] = sum;
-    y[i] = state->y[i][state->y_at];
-  }}
-  for (int k = 0; k < {name}_states; ++k) {{
-    const double *from = state->x + {name}_a_first[k];
-    double sum = {name}_a[k][0] * from[0] + {name}_a[k][1] * from[1];
-    for (int j = 0; j < {name}_inputs; ++j) sum += {name}_b[k][j] * v[j];
-    next[k] = sum;
-  }}
-  for (int k = 0; k < {name}_states; ++k) state->x[k] = next[k];
-}}
-
-#endif
-)";
-
 /// At least one entry.
 Eigen::MatrixXd not_empty(const Eigen::MatrixXd& m) {
   return m.size() > 0 ? m
@@ -157,26 +102,26 @@ std::string model_code(const AdditiveModel& model, const std::string& name) {
   const StateSpace& system = sampled.system;
   std::string upper = name;
   for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  const auto format = [&](const char* text) {
-    return fmt::format(fmt::runtime(text), fmt::arg("name", name), fmt::arg("NAME", upper),
-                       fmt::arg("version", version()), fmt::arg("inputs", model.n_inputs()),
-                       fmt::arg("outputs", model.n_outputs()), fmt::arg("states", system.order()),
-                       fmt::arg("x_size", std::max<Eigen::Index>(system.order(), 2)),
-                       fmt::arg("rate", model.sample_rate_hz),
-                       fmt::arg("rate_hex", number(model.sample_rate_hz)),
-                       fmt::arg("input_list", channel_comment(model.inputs)),
-                       fmt::arg("output_list", channel_comment(model.outputs)),
-                       fmt::arg("u_delay", sampled.input_delay_samples.maxCoeff() + 1),
-                       fmt::arg("y_delay", sampled.output_delay_samples.maxCoeff() + 1));
-  };
-  std::string text = format(kHead);
-  text += transition(name, system);
-  text += table(name, "b", not_empty(system.B));
-  text += table(name, "c", not_empty(system.C));
-  text += table(name, "d", system.D);
-  text += integers(name, "input_delay", sampled.input_delay_samples);
-  text += integers(name, "output_delay", sampled.output_delay_samples);
-  return text + format(kTail);
+  const std::string tables = transition(name, system) + table(name, "b", not_empty(system.B)) +
+                             table(name, "c", not_empty(system.C)) + table(name, "d", system.D) +
+                             integers(name, "input_delay", sampled.input_delay_samples) +
+                             integers(name, "output_delay", sampled.output_delay_samples);
+  const auto text = [](auto value) { return fmt::format("{}", value); };
+  return fill_template(model_code_h,
+                       {{"name", name},
+                        {"NAME", upper},
+                        {"version", version()},
+                        {"inputs", text(model.n_inputs())},
+                        {"outputs", text(model.n_outputs())},
+                        {"states", text(system.order())},
+                        {"x_size", text(std::max<Eigen::Index>(system.order(), 2))},
+                        {"rate", text(model.sample_rate_hz)},
+                        {"rate_hex", number(model.sample_rate_hz)},
+                        {"input_list", channel_comment(model.inputs)},
+                        {"output_list", channel_comment(model.outputs)},
+                        {"u_delay", text(sampled.input_delay_samples.maxCoeff() + 1)},
+                        {"y_delay", text(sampled.output_delay_samples.maxCoeff() + 1)},
+                        {"tables", tables}});
 }
 
 }  // namespace stageid
