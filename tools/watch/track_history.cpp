@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <iterator>
+#include <ranges>
+#include <vector>
 
 namespace stageid {
 
@@ -17,27 +18,17 @@ void TrackHistory::add(double time_s, const Eigen::VectorXd& change,
 }
 
 std::string TrackHistory::json() const {
-  std::string text;
   const auto list = [&](auto value) {
-    text += '[';
-    for (std::size_t k = 0; k < rows_.size(); ++k)
-      fmt::format_to(std::back_inserter(text), "{}{:.5g}", k > 0 ? "," : "", value(rows_[k]));
-    text += ']';
+    return fmt::format("[{:.5g}]", fmt::join(rows_ | std::views::transform(value), ","));
   };
   const auto lists = [&](Eigen::VectorXd Row::*of) {
-    const Eigen::Index columns = rows_.empty() ? 0 : rows_[0].change.size();
-    for (Eigen::Index p = 0; p < columns; ++p) {
-      text += p > 0 ? ",\n" : "\n";
-      list([&](const Row& row) { return (row.*of)[p]; });
-    }
+    std::vector<std::string> texts;
+    for (Eigen::Index p = 0; !rows_.empty() && p < rows_[0].change.size(); ++p)
+      texts.push_back(list([&](const Row& row) { return (row.*of)[p]; }));
+    return fmt::format("[{}]", fmt::join(texts, ",\n"));
   };
-  text = R"({"time_s":)";
-  list([](const Row& row) { return row.time_s; });
-  text += R"(,"change":[)";
-  lists(&Row::change);
-  text += R"(],"deviation":[)";
-  lists(&Row::deviation);
-  return text + "]}";
+  return fmt::format(R"({{"time_s":{},"change":{},"deviation":{}}})", list(&Row::time_s),
+                     lists(&Row::change), lists(&Row::deviation));
 }
 
 }  // namespace stageid
