@@ -8,7 +8,6 @@
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "estimation/request/request_flags.hpp"
-#include "tools/fit/fit_words.hpp"
 #include "tools/workbench/model_request.hpp"
 
 namespace stageid {
@@ -70,16 +69,10 @@ Edit set_band(const Json& action, FitRequest request) {
   return {std::move(request), fmt::format("band {:.6g} to {:.6g} Hz", low_hz, high_hz)};
 }
 
-/// The words of a request, without those that name files or that the page does not change.
+/// The words of a request. Weights of a file are not among the controls.
 FitWords words_of(const FitRequest& request) {
-  const nlohmann::ordered_json flags = flags_of(request);
-  FitWords words;
-  words.weighting = request.weighting == Weighting::user ? "" : text_in(flags, "--weighting");
-  words.delay = text_in(flags, "--delay");
-  words.rigid_body = text_in(flags, "--rigid-body");
-  words.damping = text_in(flags, "--damping");
-  words.direct_term = text_in(flags, "--direct-term");
-  if (request.residue_rank > 0) words.residue_rank = fmt::format("{}", request.residue_rank);
+  FitWords words = words_of_flags(flags_of(request));
+  if (request.weighting == Weighting::user) words.weighting.clear();
   return words;
 }
 

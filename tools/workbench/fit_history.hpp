@@ -53,9 +53,18 @@ class FitHistory {
   explicit FitHistory(FitState first) { states_.push_back(std::move(first)); }
   /// Appends after the current state and makes it current. Forgets the undone states, and beyond kMost the oldest ones
   /// after the first.
-  void push(FitState state);
+  void push(FitState state) {
+    states_.resize(index_ + 1);
+    if (states_.size() >= kMost) states_.erase(states_.begin() + 1);
+    states_.push_back(std::move(state));
+    index_ = states_.size() - 1;
+  }
   /// @returns false if there is no such state
-  bool go(std::size_t index);
+  bool go(std::size_t index) {
+    if (index >= states_.size()) return false;
+    index_ = index;
+    return true;
+  }
   bool undo() { return index_ > 0 && go(index_ - 1); }
   bool redo() { return go(index_ + 1); }
 

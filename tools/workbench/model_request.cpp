@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
-#include "tools/fit/fit_words.hpp"
 
 namespace stageid {
 namespace {
@@ -26,7 +24,12 @@ std::optional<std::array<double, 2>> band_in(const OrderedJson& flags) {
   return std::nullopt;
 }
 
-/// A model is foreign, so no word may name a file to read now.
+bool is_constant(const Eigen::VectorXd& delays) {
+  return delays.size() == 0 || delays.isConstant(delays[0], 0.0);
+}
+
+}  // namespace
+
 FitWords words_of_flags(const OrderedJson& flags) {
   FitWords words;
   const auto take = [&](const char* flag, std::string& word) {
@@ -48,12 +51,6 @@ FitWords words_of_flags(const OrderedJson& flags) {
       if (text.is_string()) words.submodels.push_back(text.get<std::string>());
   return words;
 }
-
-bool is_constant(const Eigen::VectorXd& delays) {
-  return delays.size() == 0 || delays.isConstant(delays[0], 0.0);
-}
-
-}  // namespace
 
 FitRequest request_of(const AdditiveModel& model) {
   const auto provenance = parse_json_object<OrderedJson>(model.provenance_json);
