@@ -12,8 +12,8 @@ namespace stageid {
 namespace {
 
 void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
-  v.text("output", channel.output, Presence::required, "name of the output");
-  v.text("input", channel.input, Presence::required, "name of the input");
+  v.text("output", channel.output, kRequired, "name of the output");
+  v.text("input", channel.input, kRequired, "name of the input");
   v.text("response", channel.response, kOptional, "array of complex numbers");
   v.text("real", channel.real, kOptional, "or array of real parts");
   v.text("imaginary", channel.imaginary, kOptional, "and array of imaginary parts");
@@ -32,8 +32,7 @@ void describe_channel(ConfigVisitor& v, ImportMap::Channel& channel) {
 }
 
 void describe_signals(ConfigVisitor& v, ImportMap::Signals& signals) {
-  v.texts("arrays", signals.arrays, {1}, Presence::required,
-          "arrays of samples, or of samples x channels");
+  v.texts("arrays", signals.arrays, {1}, kRequired, "arrays of samples, or of samples x channels");
   v.texts("names", signals.names, {1}, kOptional,
           "names of the channels; omitted: those of the arrays");
   v.texts("axes", signals.axes, {1, 5}, kOptional,
@@ -77,14 +76,13 @@ void require_another_run(ConfigVisitor& v, const std::vector<ImportMap::Run>& ru
 
 void describe_scalar(ConfigVisitor& v, const char* key, ImportMap::Scalar& scalar,
                      const char* help) {
-  FlexibleValue value;
-  value.word = scalar.variable;
-  FlexibleRule rule;
-  rule.number = true;
-  rule.any_text = true;
-  rule.text_meaning = "the name of a variable";
-  rule.rule = not_negative("Hz");
-  v.flexible(key, value, rule, kOptional, help);
+  FlexibleValue value = {scalar.variable};
+  v.flexible(key, value,
+             {.any_text = true,
+              .text_meaning = "the name of a variable",
+              .number = true,
+              .rule = not_negative("Hz")},
+             kOptional, help);
   scalar.variable = value.word;
   if (!value.numbers.empty()) scalar.number = value.numbers.front();
 }
@@ -180,7 +178,7 @@ ImportMap read_import_map(const std::filesystem::path& file) {
   map.file = file;
   const YamlDocument document = YamlDocument::read(file);
   read_config(document, [&map](ConfigVisitor& v) {
-    choose(v, "kind", map.kind, Presence::required, "content of the file");
+    choose(v, "kind", map.kind, kRequired, "content of the file");
     v.text("files", map.files, kOptional,
            "pattern of the files of a log, such as run_{realization}_{experiment}.mat, relative to "
            "this map");

@@ -122,7 +122,6 @@ SiUnit si_unit(const std::string& place, const std::string& text) {
 std::vector<double> take_si_units(const std::string& place, ChannelList& channels,
                                   std::vector<std::string>& notes) {
   std::vector<double> factors;
-  std::vector<std::string> converted;
   for (std::string& unit : channels.units) {
     const SiUnit si = si_unit(place, unit);
     factors.push_back(si.factor);
