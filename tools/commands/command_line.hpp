@@ -59,6 +59,13 @@ inline CLI::Option* add_band(CLI::App& command, std::vector<double>& band_hz,
       ->check(kNotNegative);
 }
 
+/// An option or argument that must be given.
+template <typename Value>
+void add_required(CLI::App& command, const std::string& name, Value& value,
+                  const std::string& help) {
+  command.add_option(name, value, help)->required();
+}
+
 /// An option whose value has this name in help.
 template <typename Value, typename... Checks>
 CLI::Option* add_value(CLI::App& command, const std::string& name, Value& value, const char* type,

@@ -153,12 +153,12 @@ void config_command(CLI::App& app, Console& console) {
       ->check(CLI::IsMember({"experiment", "stage", "controller", "fleet"}));
   auto [check, check_flags] = add_command(config, console, "check",
                                           "Check experiment, stage and fleet files", check_config);
-  check.add_option("files", check_flags.files, "YAML files")->required();
+  add_required(check, "files", check_flags.files, "YAML files");
   const auto add_can_file = [&](const char* name, const char* help, const char* output,
                                 void (*write)(const ConfigFlags&, Console&)) {
     auto [command, flags] = add_command(config, console, name, help, write);
-    command.add_option("stage", flags.stage_file, "stage file with a group 'can'")->required();
-    command.add_option("-o,--output", flags.output, output)->required();
+    add_required(command, "stage", flags.stage_file, "stage file with a group 'can'");
+    add_required(command, "-o,--output", flags.output, output);
   };
   add_can_file("dbc",
                "Write the CAN frames of a stage file as a DBC database (can-utils, SavvyCAN)",

@@ -188,11 +188,9 @@ void design_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(
       app, console, "design",
       "Design the multisines; check the predicted forces and motions against the limits", design);
-  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
-  command
-      .add_option("-o,--output", flags.output,
-                  "HDF5 file to write; with --watch an experiment file")
-      ->required();
+  add_required(command, "config", flags.config, "experiment file (.yaml)");
+  add_required(command, "-o,--output", flags.output,
+               "HDF5 file to write; with --watch an experiment file");
   add_value(command, "--accuracy", flags.accuracy, "VARIANCE",
             "print the measuring time for this mean relative variance of the response, e.g. "
             "1e-6 for 0.1 % rms; needs level.limits",

@@ -158,12 +158,10 @@ void export_command(CLI::App& app, Console& console) {
                   "Export a model or a frequency response to other programs: state "
                   "space, mode shapes, response",
                   export_file);
-  command.add_option("input", flags.input, "model.json or frf.h5")->required();
-  command
-      .add_option("-o,--output", flags.output,
-                  "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
-                  "a model also .json, .py, .m, .h (C99)")
-      ->required();
+  add_required(command, "input", flags.input, "model.json or frf.h5");
+  add_required(command, "-o,--output", flags.output,
+               "file to write: .h5, .mat, .npz, .csv, .unv (UFF text), .uff (UFF binary); for "
+               "a model also .json, .py, .m, .h (C99)");
   command.add_option(
       "--frf", flags.frf,
       "for a model: evaluate the response at the lines of this FRF, within the band of the fit");

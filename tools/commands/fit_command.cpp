@@ -107,8 +107,8 @@ void fit(const FitCommandFlags& flags, Console& console) {
 
 void fit_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(app, console, "fit", "Fit a modal model to an FRF", fit);
-  command.add_option("frf", flags.frf, "frf.h5")->required();
-  command.add_option("-o,--output", flags.output, "model.json to write")->required();
+  add_required(command, "frf", flags.frf, "frf.h5");
+  add_required(command, "-o,--output", flags.output, "model.json to write");
   command.add_option("--covariance", flags.covariance,
                      "FILE.h5 to write: covariance of all parameters, and variance and 95 % "
                      "radius of the model response");
@@ -136,11 +136,9 @@ void fit_command(CLI::App& app, Console& console) {
   command.add_option("--direct-term", flags.words.direct_term,
                      "none | full: a constant, the compliance of modes above the band. Default: "
                      "chosen from the data; full if the outputs are accelerations");
-  command
-      .add_option("--residue-rank", flags.words.residue_rank,
-                  "full | 1: each residue is phi psi^T with one pair of mode shapes, as for a "
-                  "mechanical mode")
-      ->capture_default_str();
+  add_setting(command, "--residue-rank", flags.words.residue_rank, "TEXT",
+              "full | 1: each residue is phi psi^T with one pair of mode shapes, as for a "
+              "mechanical mode");
   add_value(command, "--submodel", flags.words.submodels, "TERM",
             "add the term (B_0 + ... + B_m s^m) / (s^l A) with a polynomial A of order n, "
             "e.g. n=4,m=3,f=120:180,zeta=0.01; repeatable. l: number of integrators, default "
@@ -151,10 +149,8 @@ void fit_command(CLI::App& app, Console& console) {
   command.add_option("--damping", flags.words.damping,
                      "proportional: numerators B_0 | general: B_0 + B_1 s. Default: chosen from "
                      "the data; general if the outputs are accelerations");
-  command
-      .add_option("--method", flags.words.method,
-                  "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner")
-      ->capture_default_str();
+  add_setting(command, "--method", flags.words.method, "TEXT",
+              "riv: refined instrumental variables | gn: Gauss-Newton | sk: Sanathanan-Koerner");
   add_setting(command, "--max-iterations", flags.request.max_iterations, "COUNT",
               "iterations per fit");
   add_setting(command, "--search-seconds", flags.request.search_seconds, "SECONDS",

@@ -247,8 +247,8 @@ void fleet_command(CLI::App& app, Console& console) {
   auto [job, job_flags] =
       add_command(fleet, console, "job",
                   "Run one job, as 'stageid fleet' does for every log; for schedulers", run_job);
-  job.add_option("config", job_flags.config, "fleet file (.yaml)")->required();
-  job.add_option("log", job_flags.log.file, "its log")->required();
+  add_required(job, "config", job_flags.config, "fleet file (.yaml)");
+  add_required(job, "log", job_flags.log.file, "its log");
   add_value(job, "--stage", job_flags.log.stage, "NAME",
             "name of the stage; default: see 'stage_name'");
   add_value(job, "--time", job_flags.log.time_utc, "TIME",
@@ -259,19 +259,16 @@ void fleet_command(CLI::App& app, Console& console) {
   auto [add, add_flags] = add_command(
       fleet, console, "add", "Add the hourly values of a watched log, from 'stageid watch -o'",
       add_watched_log);
-  add.add_option("store", add_flags.store, "store of a fleet (.db, or postgresql://...)")
-      ->required();
-  add.add_option("tracks", add_flags.log.file, "watch.h5")->required();
+  add_required(add, "store", add_flags.store, "store of a fleet (.db, or postgresql://...)");
+  add_required(add, "tracks", add_flags.log.file, "watch.h5");
   add_value(add, "--stage", add_flags.log.stage, "NAME", "name of the stage")->required();
   add_value(add, "--time", add_flags.log.time_utc, "TIME",
             "start of the log, ISO 8601 in UTC; default: that in the log");
 
   auto [report, report_flags] = add_command(
       fleet, console, "report", "Write an interactive HTML page of a store", report_fleet);
-  report.add_option("store", report_flags.store, "store of a fleet (.db, or postgresql://...)")
-      ->required();
-  report.add_option("-o,--output", report_flags.request.output, "page to write (.html)")
-      ->required();
+  add_required(report, "store", report_flags.store, "store of a fleet (.db, or postgresql://...)");
+  add_required(report, "-o,--output", report_flags.request.output, "page to write (.html)");
   add_value(report, "--stage", report_flags.request.stages, "NAME", "stages to show; default: all");
   add_value(report, "--since", report_flags.request.since, "TIME",
             "first time to show, such as 2026-05-04");
@@ -280,14 +277,11 @@ void fleet_command(CLI::App& app, Console& console) {
 
   auto [query, query_flags] = add_command(
       fleet, console, "query", "Print a table of a store, or write it as CSV", query_fleet);
-  query.add_option("store", query_flags.store, "store of a fleet (.db, or postgresql://...)")
-      ->required();
-  query
-      .add_option("sql", query_flags.sql,
-                  "stages | modes | stage_modes | identifications | outliers | watched | another "
-                  "table | an "
-                  "SQL statement, which cannot change the store")
-      ->capture_default_str();
+  add_required(query, "store", query_flags.store, "store of a fleet (.db, or postgresql://...)");
+  add_setting(
+      query, "sql", query_flags.sql, "TEXT",
+      "stages | modes | stage_modes | identifications | outliers | watched | another table | an "
+      "SQL statement, which cannot change the store");
   query.add_option("--csv", query_flags.csv, "file to write instead of printing");
 }
 

@@ -123,8 +123,8 @@ void estimate_response(const FrfFlags& flags, Console& console) {
 void frf_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(
       app, console, "frf", "Estimate the plant's FRF from closed-loop logs", estimate_response);
-  command.add_option("logs", flags.logs, "logs (.slog or .h5)")->required();
-  command.add_option("-o,--output", flags.output, "HDF5 file to write")->required();
+  add_required(command, "logs", flags.logs, "logs (.slog or .h5)");
+  add_required(command, "-o,--output", flags.output, "HDF5 file to write");
   add_value(command, "--inputs", flags.options.inputs, "CHANNELS",
             "actuators A,B,...; default: the excited ones")
       ->delimiter(',');

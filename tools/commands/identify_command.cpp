@@ -373,8 +373,8 @@ void identify_command(CLI::App& app, Console& console) {
                   "Perform the complete identification: design, run, frf, modes, "
                   "fit, validate, export, report",
                   identify);
-  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
-  command.add_option("-o,--output", flags.output, "directory for all results")->required();
+  add_required(command, "config", flags.config, "experiment file (.yaml)");
+  add_required(command, "-o,--output", flags.output, "directory for all results");
   command.add_flag("--resume", flags.resume,
                    "continue an interrupted identification; steps that are up to date are kept");
   add_force(command, flags.force);

@@ -209,7 +209,7 @@ void log_command(CLI::App& app, Console& console) {
   log.require_subcommand(1);
   auto [info, info_flags] =
       add_command(log, console, "info", "List the contents of a log, run by run", list_log);
-  info.add_option("file", info_flags.file, "log (.slog or .h5)")->required();
+  add_required(info, "file", info_flags.file, "log (.slog or .h5)");
   info.add_flag("--health", info_flags.health, "read all samples and report health findings");
   info.add_option(
       "--stage", info_flags.stage,
@@ -217,21 +217,19 @@ void log_command(CLI::App& app, Console& console) {
 
   auto [verify, verify_flags] =
       add_command(log, console, "verify", "Read every byte and verify the checksums", verify_file);
-  verify.add_option("file", verify_flags.file, "log (.slog or .h5)")->required();
+  add_required(verify, "file", verify_flags.file, "log (.slog or .h5)");
 
   auto [recover, recover_flags] =
       add_command(log, console, "recover", "Save the intact part of a damaged log", recover_file);
-  recover.add_option("file", recover_flags.file, "damaged log (.slog)")->required();
-  recover.add_option("-o,--output", recover_flags.output, "new log to write (.slog)")->required();
+  add_required(recover, "file", recover_flags.file, "damaged log (.slog)");
+  add_required(recover, "-o,--output", recover_flags.output, "new log to write (.slog)");
 
   auto [convert, convert_flags] =
       add_command(log, console, "convert",
                   "Convert a log to HDF5, CSV or MATLAB, or an HDF5 log to .slog", convert_file);
-  convert.add_option("file", convert_flags.file, "log (.slog or .h5)")->required();
-  convert
-      .add_option("-o,--output", convert_flags.output,
-                  "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)")
-      ->required();
+  add_required(convert, "file", convert_flags.file, "log (.slog or .h5)");
+  add_required(convert, "-o,--output", convert_flags.output,
+               "file to write (.h5, .csv, .mat; from an HDF5 log also .slog)");
   convert.add_flag("--complete-only", convert_flags.complete_only, "skip incomplete runs");
   add_mat_version(convert, convert_flags.mat_version);
 }

@@ -43,11 +43,9 @@ void manual_command(CLI::App& app, Console& console) {
   const auto output = std::make_shared<std::filesystem::path>();
   CLI::App& command =
       add_command(app, "manual", "Write man pages and completions for bash and zsh");
-  command
-      .add_option("-o,--output", *output,
-                  "directory such as /usr/share or ~/.local/share; the files go to its "
-                  "subdirectories man/man1, bash-completion/completions and zsh/vendor-completions")
-      ->required();
+  add_required(command, "-o,--output", *output,
+               "directory such as /usr/share or ~/.local/share; the files go to its "
+               "subdirectories man/man1, bash-completion/completions and zsh/vendor-completions");
   command.final_callback([output, &app, &console] { write_manual(app, *output, console); });
 }
 

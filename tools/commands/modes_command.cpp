@@ -63,7 +63,7 @@ void modes_command(CLI::App& app, Console& console) {
   auto [command, flags] =
       add_command(app, console, "modes",
                   "Find candidate modes of an FRF with a mode indicator function", find_modes);
-  command.add_option("frf", flags.frf, "frf.h5")->required();
+  add_required(command, "frf", flags.frf, "frf.h5");
   command.add_option("-o,--output", flags.output, "modes.json to write");
   add_band(command, flags.band_hz, "all lines");
   add_choice(

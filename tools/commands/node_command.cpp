@@ -132,9 +132,8 @@ void add_modbus_options(CLI::App& command, ModbusFlags& flags) {
             "Modbus TCP port on the loopback interface; 0: a free one", CLI::Range(0, 65535));
   add_value(command, "--modbus-rtu", flags.rtu_device, "DEVICE", "Modbus RTU on this serial line");
   add_setting(command, "--modbus-baud", flags.baud, "BAUD", "baud rate of the serial line");
-  command.add_option("--modbus-parity", flags.parity, "N | E | O")
-      ->check(CLI::IsMember({"N", "E", "O"}))
-      ->capture_default_str();
+  add_setting(command, "--modbus-parity", flags.parity, "TEXT", "N | E | O",
+              CLI::IsMember({"N", "E", "O"}));
   add_setting(command, "--modbus-unit", flags.unit, "ADDRESS", "unit identifier of the node",
               CLI::Range(1, 247));
   add_value(command, "--modbus-fault", flags.faults, "FAULT",
@@ -288,7 +287,7 @@ void node_command(CLI::App& app, Console& console) {
       app, console, "node",
       "Serve the simulated stage of a stage file over CAN or Modbus, until SIGINT or SIGTERM",
       serve);
-  command.add_option("config", flags.config, "stage file (.yaml)")->required();
+  add_required(command, "config", flags.config, "stage file (.yaml)");
   add_value(command, "--can", flags.can_interfaces, "INTERFACE",
             "CAN FD interfaces, one per bus, in the order of the stage file, such as can0,can1")
       ->delimiter(',');

@@ -34,11 +34,9 @@ void open_command(CLI::App& app, Console& console) {
       add_command(app, console, "open",
                   "Edit a fit in the browser: modes, band and options, until SIGINT or SIGTERM",
                   open_workbench);
-  command
-      .add_option("inputs", flags.inputs,
-                  "output directory of 'stageid identify', or files as of 'stageid report', with "
-                  "an FRF")
-      ->required();
+  add_required(command, "inputs", flags.inputs,
+               "output directory of 'stageid identify', or files as of 'stageid report', with "
+               "an FRF");
   command.add_option("--compare", flags.compare,
                      "results to compare with, each an output directory of 'stageid identify', an "
                      "FRF or a model");
@@ -47,11 +45,9 @@ void open_command(CLI::App& app, Console& console) {
                      "directory for saved models; default: that of the FRF");
   command.add_option("--controller-view", flags.stage,
                      "stage file (.yaml): show the loop of each fit with its controller");
-  command
-      .add_option("--port", flags.port,
-                  "port on this machine, which others cannot reach; 0: any free one")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
+  add_setting(command, "--port", flags.port, "INT",
+              "port on this machine, which others cannot reach; 0: any free one",
+              CLI::Range(0, 65535));
   add_threads(command, flags.threads);
 }
 

@@ -167,16 +167,12 @@ void plot(const PlotFlags& flags, Console& console) {
 void plot_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(
       app, console, "plot", "Draw one figure of a response for print (needs gnuplot)", plot);
-  command
-      .add_option("figure", flags.figure,
-                  "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
-                  "entry: one element with residual and standard deviation")
-      ->required();
-  command
-      .add_option("inputs", flags.inputs,
-                  "output directory of 'stageid identify', or files: FRF, model, modes "
-                  "(the candidates shown in cmif)")
-      ->required();
+  add_required(command, "figure", flags.figure,
+               "cmif: mode indicator function with the modes; bode: matrix of magnitudes; "
+               "entry: one element with residual and standard deviation");
+  add_required(command, "inputs", flags.inputs,
+               "output directory of 'stageid identify', or files: FRF, model, modes "
+               "(the candidates shown in cmif)");
   add_value(command, "--output-channel", flags.output_channels, "CHANNEL",
             "entry: the output; bode: outputs A,B,... (default: all)")
       ->delimiter(',')
@@ -185,8 +181,7 @@ void plot_command(CLI::App& app, Console& console) {
             "entry: the input; bode: inputs A,B,... (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command.add_option("-o,--output", flags.output, "picture to write: .pdf, .svg or .png")
-      ->required();
+  add_required(command, "-o,--output", flags.output, "picture to write: .pdf, .svg or .png");
   add_band(command, flags.band_hz, "all lines, or the band of the model");
   add_choice(
       command, "--preset", flags.preset,

@@ -45,15 +45,13 @@ void report(const ReportFlags& flags, Console& console) {
 void report_command(CLI::App& app, Console& console) {
   auto [command, flags] =
       add_command(app, console, "report", "Write a self-contained interactive HTML page", report);
-  command
-      .add_option("inputs", flags.inputs,
-                  "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
-                  "modes, log, controller view, stage file (channel positions)")
-      ->required();
+  add_required(command, "inputs", flags.inputs,
+               "output directory of 'stageid identify', or files: FRF, held-back FRF, model, "
+               "modes, log, controller view, stage file (channel positions)");
   command.add_option("--compare", flags.compare,
                      "results to compare with: another output directory of 'stageid identify', or "
                      "its FRF and model");
-  command.add_option("-o,--output", flags.output, "page to write (.html)")->required();
+  add_required(command, "-o,--output", flags.output, "page to write (.html)");
 }
 
 }  // namespace stageid

@@ -94,8 +94,8 @@ void measure_and_log(const RunFlags& flags, Console& console) {
 void run_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(
       app, console, "run", "Perform the experiment and log every sample", measure_and_log);
-  command.add_option("config", flags.config, "experiment file (.yaml)")->required();
-  command.add_option("-o,--output", flags.request.log, "log to write (.slog)")->required();
+  add_required(command, "config", flags.config, "experiment file (.yaml)");
+  add_required(command, "-o,--output", flags.request.log, "log to write (.slog)");
   command.add_option("--backend", flags.backend,
                      "sim | can | modbus | plugin | replay; default: from the stage file");
   command.add_option("--replay", flags.request.replay, "log to replay with --backend replay");

@@ -145,11 +145,9 @@ void validate_command(CLI::App& app, Console& console) {
   auto [command, flags] =
       add_command(app, console, "validate", "Validate a model on data that it was not fitted to",
                   validate_model);
-  command.add_option("model", flags.model, "model.json")->required();
-  command
-      .add_option("data", flags.data,
-                  "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)")
-      ->required();
+  add_required(command, "model", flags.model, "model.json");
+  add_required(command, "data", flags.data,
+               "frf.h5, a log (.slog or .h5), or mode shapes of another program (.unv, .uff)");
   add_band(command, flags.band_hz, "the band of the fit");
   command.add_option(
       "--stage", flags.stage,

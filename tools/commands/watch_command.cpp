@@ -71,8 +71,8 @@ std::vector<CLI::Option*> add_watch_options(CLI::App& command, WatchOptions& opt
 void watch_command(CLI::App& app, Console& console) {
   auto [command, flags] = add_command(
       app, console, "watch", "Track a working stage around its model; tell what changes", watch);
-  command.add_option("model", flags.options.model, "model.json")->required();
-  command.add_option("log", flags.log, "log of the working stage (.slog or .h5)")->required();
+  add_required(command, "model", flags.options.model, "model.json");
+  add_required(command, "log", flags.log, "log of the working stage (.slog or .h5)");
   command.add_flag("--follow", flags.follow,
                    "the log (.slog) is being written: wait for more until it ends");
   command.add_option("-o,--output", flags.output, "watch.h5: what was tracked, a row per period");
