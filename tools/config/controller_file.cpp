@@ -15,7 +15,6 @@
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/words.hpp"
 #include "frf/file/frf_file.hpp"
-#include "tools/config/config_visitor.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/stage_expectation.hpp"
 

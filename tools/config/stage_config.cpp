@@ -8,7 +8,6 @@
 #include "hal/simulator/fault_script.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "hal/stage/limits.hpp"
-#include "tools/config/config_visitor.hpp"
 #include "tools/config/loop_controller.hpp"
 #include "tools/config/stage_keys.hpp"
 #include "tools/config/yaml_document.hpp"

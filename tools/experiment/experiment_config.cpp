@@ -11,7 +11,6 @@
 #include "acquisition/files/fingerprint.hpp"
 #include "acquisition/files/key_suggestion.hpp"
 #include "frf/plant/zippered_fit.hpp"
-#include "tools/config/config_visitor.hpp"
 #include "tools/config/yaml_document.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/fit/fit_words.hpp"

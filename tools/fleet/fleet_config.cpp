@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "tools/config/config_visitor.hpp"
 #include "tools/config/yaml_document.hpp"
 #include "tools/database/database.hpp"
 #include "tools/experiment/experiment_config.hpp"

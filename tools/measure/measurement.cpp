@@ -23,7 +23,6 @@
 #include "tools/measure/until_variance.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
-#include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
 namespace {

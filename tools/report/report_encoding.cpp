@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <complex>
-#include <cstdint>
 #include <limits>
 #include <new>
 #include <utility>

@@ -9,7 +9,6 @@
 #include "estimation/model/cmif.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
-#include "tools/report/html_page.hpp"
 #include "tools/report/report_comparison.hpp"
 #include "tools/report/report_diagrams.hpp"
 #include "tools/report/report_encoding.hpp"

@@ -1,6 +1,5 @@
 #include "tools/terminal/console.hpp"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,7 +8,6 @@
 #include <cstdlib>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "tools/terminal/interrupt.hpp"
 

@@ -4,8 +4,6 @@
 #include <complex>
 #include <limits>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_matrices.hpp"

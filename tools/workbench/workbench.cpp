@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -12,7 +11,6 @@
 #include "estimation/request/request_flags.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/problem_commands.hpp"
-#include "tools/workbench/edit.hpp"
 #include "tools/workbench/fit_details.hpp"
 #include "tools/workbench/model_request.hpp"
 #include "tools/workbench/warm_start.hpp"

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "acquisition/files/counted.hpp"
-#include "acquisition/files/fail.hpp"
 
 namespace stageid {
 namespace {
