@@ -83,8 +83,6 @@ class PlayingStage final : public MeasuredStage {
   ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) override {
     return run_resident_experiment(plan_, *stage_, log, options);
   }
-  void explain(MeasurementResult& /*result*/) const override {}
-  LimitViolation violation() const noexcept override { return {}; }
 
  private:
   const ExperimentPlan& plan_;

@@ -15,10 +15,10 @@ class MeasuredStage {
   virtual ~MeasuredStage() = default;
   virtual const StageInfo& info() const noexcept = 0;
   virtual ExperimentResult perform(RunWriter& log, const RunExperimentOptions& options) = 0;
-  /// Adds the stage's own reason for the end to message and exit code, after perform().
-  virtual void explain(MeasurementResult& result) const = 0;
-  /// The first limit violation detected by the host.
-  virtual LimitViolation violation() const noexcept = 0;
+  /// Adds the stage's own reason for the end, if it has one, to message and exit code, after perform().
+  virtual void explain(MeasurementResult& /*result*/) const {}
+  /// The first limit violation that the host detected.
+  virtual LimitViolation violation() const noexcept { return {}; }
 };
 
 /// @throws std::invalid_argument if the stage file does not have what the back end needs.
