@@ -1,7 +1,6 @@
 #include "tools/commands/commands.hpp"
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -22,6 +21,7 @@
 #include "tools/fleet/fleet_jobs.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/format_errors.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -35,8 +35,8 @@ std::string format_of(const std::filesystem::path& file) {
       "key 'format' is missing; write 'format: stageid-experiment' or 'format: stageid-stage'");
 }
 
-nlohmann::ordered_json schema_json(const std::vector<SchemaEntry>& entries) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json schema_json(const std::vector<SchemaEntry>& entries) {
+  Json list = Json::array();
   for (const SchemaEntry& e : entries)
     list.push_back({{"depth", e.depth},
                     {"key", e.key},
@@ -68,7 +68,7 @@ struct ConfigFlags {
 };
 
 void print_schema(const ConfigFlags& flags, Console& console) {
-  nlohmann::ordered_json json;
+  Json json;
   for (const FileKind& kind : kFileKinds) {
     if (!flags.kind.empty() && flags.kind != kind.name) continue;
     const std::vector<SchemaEntry> entries = config_schema(kind.describe);
@@ -103,9 +103,9 @@ void check_file(const std::filesystem::path& file, Console& console) {
 }
 
 void check_config(const ConfigFlags& flags, Console& console) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  Json json = Json::array();
   for (const std::filesystem::path& file : flags.files) {
-    nlohmann::ordered_json messages = nlohmann::ordered_json::array();
+    Json messages = Json::array();
     const auto tell = [&](const std::string& what) {
       console.warning(what);
       messages.push_back(what);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
@@ -21,12 +20,11 @@
 #include "tools/experiment/loop_check.hpp"
 #include "tools/experiment/watch_plan.hpp"
 #include "tools/measure/measurement.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 std::string limit_text(const Eigen::VectorXd& limits, std::size_t index) {
   return limits.size() == 0 ? "-" : fmt::format("{:.4g}", limits[index]);

@@ -21,6 +21,7 @@
 #include "tools/exchange/model/covariance_file.hpp"
 #include "tools/exchange/model/model_export.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -97,7 +98,7 @@ void export_controller_view(const ExportFlags& flags, Console& console) {
   write_controller_view(flags.output, view);
   for (const std::string& line : controller_view_lines(view)) console.result(line);
   console.result("wrote {}", flags.output.string());
-  nlohmann::ordered_json json = {{"output", flags.output.string()}};
+  Json json = {{"output", flags.output.string()}};
   json.update(controller_view_json(view, false));
   console.result(json);
   if (view.view.poles.stable()) return;

@@ -14,6 +14,7 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -79,16 +80,16 @@ void fit(const FitCommandFlags& flags, Console& console) {
   files.frf = flags.frf;
   files.model = flags.output;
   const ModelVerdict verdict = judge_model(result.model, {}, {}, {}, files);
-  nlohmann::ordered_json json = {{"output", flags.output.string()},
-                                 {"status", to_string(result.status())},
-                                 {"message", result.message()},
-                                 {"relative_rms_error", result.model.fit.relative_rms_error},
-                                 {"cost", result.cost},
-                                 {"decisions", result.decisions},
-                                 {"findings", result.findings},
-                                 {"modes", modes_json(result.model)},
-                                 {"delays", delays_json(result.model)},
-                                 {"seconds", step.seconds}};
+  Json json = {{"output", flags.output.string()},
+               {"status", to_string(result.status())},
+               {"message", result.message()},
+               {"relative_rms_error", result.model.fit.relative_rms_error},
+               {"cost", result.cost},
+               {"decisions", result.decisions},
+               {"findings", result.findings},
+               {"modes", modes_json(result.model)},
+               {"delays", delays_json(result.model)},
+               {"seconds", step.seconds}};
   json.update(verdict_json(verdict));
   console.result(json);
   if (!explain_the_rest(verdict.problems)) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -24,12 +23,11 @@
 #include "tools/fleet/watched_tracks.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 void require_time(const char* flag, const std::string& text) {
   if (!text.empty() && !days_of(text))

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +22,7 @@
 #include "tools/steps/frf_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -30,7 +30,7 @@ namespace {
 
 /// The delay of the stage that a stageid log declares; 0 for other logs.
 double declared_delay_s(const std::filesystem::path& log) {
-  const auto json = parse_json<nlohmann::json>(open_log(log)->info().metadata_json);
+  const auto json = parse_json<Json>(open_log(log)->info().metadata_json);
   return number_in(json, "transport_delay_s").value_or(0.0);
 }
 
@@ -43,20 +43,20 @@ double median_relative_std(const FrfEstimate& frf, const Eigen::MatrixXd& varian
   return ratio.empty() ? std::numeric_limits<double>::infinity() : order_statistic(ratio, 0.5);
 }
 
-nlohmann::ordered_json frf_json(const FrfStep& step, const std::vector<std::string>& notes,
-                                const std::filesystem::path& output) {
+Json frf_json(const FrfStep& step, const std::vector<std::string>& notes,
+              const std::filesystem::path& output) {
   const FrfEstimate& frf = step.frf;
-  nlohmann::ordered_json json = {{"output", output.string()},
-                                 {"inputs", frf.inputs.names},
-                                 {"outputs", frf.outputs.names},
-                                 {"lines", frf.lines()},
-                                 {"first_hz", frf.frequency_hz[0]},
-                                 {"last_hz", frf.frequency_hz[frf.lines() - 1]},
-                                 {"realizations", frf.realizations},
-                                 {"periods", frf.periods},
-                                 {"bytes_read", step.bytes},
-                                 {"seconds", step.seconds},
-                                 {"notes", notes}};
+  Json json = {{"output", output.string()},
+               {"inputs", frf.inputs.names},
+               {"outputs", frf.outputs.names},
+               {"lines", frf.lines()},
+               {"first_hz", frf.frequency_hz[0]},
+               {"last_hz", frf.frequency_hz[frf.lines() - 1]},
+               {"realizations", frf.realizations},
+               {"periods", frf.periods},
+               {"bytes_read", step.bytes},
+               {"seconds", step.seconds},
+               {"notes", notes}};
   if (frf.noise_variance.size() > 0)
     json["median_relative_noise_std"] = median_relative_std(frf, frf.noise_variance);
   if (frf.total_variance.size() > 0)
@@ -113,7 +113,7 @@ void estimate_response(const FrfFlags& flags, Console& console) {
     for (const std::string& line : health_lines(step.findings)) console.result(line);
   if (any_fault(step.findings)) console.exit_code = kNotTrustworthy;
   for (const std::string& note : notes) console.message("note: " + note);
-  nlohmann::ordered_json json = frf_json(step, notes, flags.output);
+  Json json = frf_json(step, notes, flags.output);
   if (!flags.no_health) json["health"] = health_json(step.findings);
   console.result(json);
 }

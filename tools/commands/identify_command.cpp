@@ -6,7 +6,6 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -42,12 +41,12 @@
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using SteadyClock = std::chrono::steady_clock;
 
 double seconds_since(SteadyClock::time_point start) {
@@ -346,7 +345,7 @@ class Identification {
   Eigen::MatrixXd model_variance_;
   std::optional<Validation> validation_;
   std::optional<TruthComparison> truth_;
-  nlohmann::ordered_json summary_;
+  Json summary_;
 };
 
 void identify(const IdentifyFlags& flags, Console& console) {

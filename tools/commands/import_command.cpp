@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "acquisition/files/fail.hpp"
@@ -19,6 +18,7 @@
 #include "tools/exchange/import/mapped_log.hpp"
 #include "tools/exchange/import/si_unit.hpp"
 #include "tools/exchange/model/mode_correlation.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -34,7 +34,7 @@ ImportSummary write_imported(const std::filesystem::path& output, FrfEstimate fr
     throw FormatError(input, "", error.what());
   }
   if (frf.provenance_json == "{}")
-    frf.provenance_json = nlohmann::ordered_json{
+    frf.provenance_json = Json{
         {"imported", input.filename().string()},
         {"fingerprint", fingerprint_of_file(input)},
         {"version",
@@ -54,7 +54,7 @@ struct ImportFlags {
 void list_arrays(const ImportFlags& flags, Console& console) {
   if (!flags.map.empty()) fail_request("--map: needs an output file; add -o FILE");
   std::vector<std::vector<std::string>> rows = {{"array", "size", "holds"}};
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  Json json = Json::array();
   const ArrayList arrays = read_foreign_arrays(flags.input);
   for (const NamedArray& array : arrays.arrays) {
     const char* holds = array.is_text() ? "text" : array.is_complex() ? "complex" : "real";
@@ -64,7 +64,7 @@ void list_arrays(const ImportFlags& flags, Console& console) {
   for (const UnreadVariable& variable : arrays.unread) {
     rows.push_back({variable.name, "", variable.what});
     json.push_back({{"name", variable.name},
-                    {"size", nlohmann::ordered_json::array()},
+                    {"size", Json::array()},
                     {"holds", variable.what},
                     {"remedy", variable.remedy}});
   }
@@ -116,7 +116,7 @@ void import_file(const ImportFlags& flags, Console& console) {
   const auto bytes = std::filesystem::file_size(flags.output);
   for (const std::string& line : summary.lines) console.result(line);
   console.result("wrote {}, {} bytes", flags.output.string(), bytes);
-  nlohmann::ordered_json json = {{"output", flags.output.string()}, {"bytes", bytes}};
+  Json json = {{"output", flags.output.string()}, {"bytes", bytes}};
   json.update(summary.json);
   console.result(json);
 }

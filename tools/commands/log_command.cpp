@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
@@ -22,12 +21,11 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json counts_json(const RunHealth& health) {
   return {{"cycles", health.cycles},       {"late", health.late},

@@ -1,7 +1,6 @@
 #include "tools/commands/commands.hpp"
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "acquisition/files/output_file.hpp"
@@ -10,6 +9,7 @@
 #include "tools/manual/command_tree.hpp"
 #include "tools/manual/manual_pages.hpp"
 #include "tools/manual/shell_completion.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -24,7 +24,7 @@ void write_manual(const CLI::App& app, const std::filesystem::path& output, Cons
   const std::filesystem::path functions = output / "zsh" / "vendor-completions";
   require_directory(completions);
   require_directory(functions);
-  nlohmann::ordered_json written = nlohmann::ordered_json::array();
+  Json written = Json::array();
   const auto write = [&](const std::filesystem::path& file, const std::string& text) {
     write_text_file(file, text);
     written.push_back(file.string());
@@ -34,7 +34,7 @@ void write_manual(const CLI::App& app, const std::filesystem::path& output, Cons
   write(completions / program.name, bash_completion(program));
   write(functions / ("_" + program.name), zsh_completion(program));
   console.result("wrote {} files below {}", written.size(), output.string());
-  console.result(nlohmann::ordered_json{{"written", written}});
+  console.result(Json{{"written", written}});
 }
 
 }  // namespace

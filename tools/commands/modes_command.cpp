@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "frf/file/frf_file.hpp"
 #include "frf/response/dc_line.hpp"
 #include "tools/commands/command_line.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -44,7 +44,7 @@ void find_modes(const ModesFlags& flags, Console& console) {
   if (!flags.output.empty() && console.team->rank() == 0) write_modes(flags.output, modes);
 
   std::vector<std::vector<std::string>> rows = {{"mode", "frequency/Hz", "damping", "curve"}};
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  Json list = Json::array();
   for (const ModeCandidate& mode : modes) {
     rows.push_back({fmt::format("{}", rows.size()), fmt::format("{:.4f}", mode.frequency_hz),
                     fmt::format("{:.5f}", mode.damping_ratio), fmt::format("{}", mode.cmif_curve)});

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "acquisition/files/counted.hpp"
@@ -13,6 +12,7 @@
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/experiment/loop_check.hpp"
 #include "tools/measure/measurement.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 
 namespace stageid {
@@ -68,18 +68,18 @@ void measure_and_log(const RunFlags& flags, Console& console) {
       result.seconds, static_cast<double>(result.log_bytes) / 1e6);
   if (result.variance) console.result(result.message);
   if (request.watch) console.result("watch: " + result.watch_summary);
-  nlohmann::ordered_json json = {{"log", request.log.string()},
-                                 {"exit_code", result.exit_code},
-                                 {"message", result.message},
-                                 {"runs_complete", complete},
-                                 {"runs_total", result.runs_total},
-                                 {"cycles", health.cycles},
-                                 {"late", health.late},
-                                 {"missing", health.missing},
-                                 {"marked", health.marked},
-                                 {"stage_seconds", stage_s},
-                                 {"seconds", result.seconds},
-                                 {"log_bytes", result.log_bytes}};
+  Json json = {{"log", request.log.string()},
+               {"exit_code", result.exit_code},
+               {"message", result.message},
+               {"runs_complete", complete},
+               {"runs_total", result.runs_total},
+               {"cycles", health.cycles},
+               {"late", health.late},
+               {"missing", health.missing},
+               {"marked", health.marked},
+               {"stage_seconds", stage_s},
+               {"seconds", result.seconds},
+               {"log_bytes", result.log_bytes}};
   if (result.variance) json["relative_variance"] = *result.variance;
   if (request.watch) json["watch"] = result.watch;
   console.result(json);

@@ -7,7 +7,6 @@
 #include <array>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,6 +27,7 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -41,7 +41,7 @@ bool is_frf(const std::filesystem::path& file) {
   return hdf5.exists("/response");
 }
 
-nlohmann::ordered_json prediction_json(const PredictionError& error) {
+Json prediction_json(const PredictionError& error) {
   return {{"sensors", error.sensors},
           {"error_rms", error.error_rms},
           {"signal_rms", error.signal_rms},
@@ -115,10 +115,10 @@ void validate_model(const ValidateFlags& flags, Console& console) {
   const Validation validation =
       validate(model, select_band(std::move(frf), low_hz, high_hz), distortion_of(model));
   for (const std::string& line : validation_lines(validation)) console.result(line);
-  nlohmann::ordered_json json = {{"model", flags.model.string()},
-                                 {"data", flags.data.string()},
-                                 {"band_hz", {low_hz, high_hz}},
-                                 {"frequency_domain", validation_json(validation)}};
+  Json json = {{"model", flags.model.string()},
+               {"data", flags.data.string()},
+               {"band_hz", {low_hz, high_hz}},
+               {"frequency_domain", validation_json(validation)}};
   std::vector<LogRun> runs;
   if (!from_frf) {
     for (const std::string& line : health_lines(health)) console.result(line);

@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "tools/commands/commands.hpp"
 #include "tools/terminal/exit_code.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/output_paths.hpp"
 #include "tools/watch/stage_watch.hpp"
 
@@ -47,7 +47,7 @@ void watch(const WatchFlags& flags, Console& console) {
   }
   for (const std::string& line : watch.lines()) console.result(line);
   console.result(watch.summary());
-  nlohmann::ordered_json json = watch.json();
+  Json json = watch.json();
   json["log"] = flags.log.string();
   console.result(json);
   if (interrupt_flag()) console.exit_code = kInterrupted;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
@@ -12,6 +11,7 @@
 #include "tools/config/controller_file.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/yaml_document.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -87,7 +87,7 @@ std::optional<NominalStage> nominal_stage_of(const LogInfo& info,
     const StageConfig config = load_stage_config(stage_file);
     return nominal_stage(config.spec, config.plant);
   }
-  const auto json = parse_json<nlohmann::json>(info.metadata_json);
+  const auto json = parse_json<Json>(info.metadata_json);
   const std::string stage = text_in(json, "stage");
   if (stage.empty()) return std::nullopt;
   try {

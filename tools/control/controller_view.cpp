@@ -15,10 +15,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
 Json margin_json(const Margin& margin) {
   return {{"value", margin.value},
           {"radius_95", or_null(margin.radius_95())},
@@ -76,7 +72,7 @@ ControllerView controller_view(const StageConfig& stage, const AdditiveModel& mo
   }
 }
 
-nlohmann::ordered_json controller_view_json(const ControllerView& of, bool curves) {
+Json controller_view_json(const ControllerView& of, bool curves) {
   const LoopView& view = of.view;
   Json out = {{"format", "stageid-controller-view"},
               {"format_version", 1},

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "estimation/loop/loop_view.hpp"
 #include "tools/config/stage_config.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -25,7 +25,7 @@ ControllerView controller_view(const StageConfig& stage, const AdditiveModel& mo
                                const Eigen::VectorXd& frequency_hz);
 
 /// stageid-controller-view as in docs/formats.md: poles, margins and, with `curves`, the curves with their discs.
-nlohmann::ordered_json controller_view_json(const ControllerView& view, bool curves);
+Json controller_view_json(const ControllerView& view, bool curves);
 /// The curves as a table, one row per line.
 std::string controller_view_csv(const ControllerView& view);
 /// For people: one line per loop, one on the multivariable loop.

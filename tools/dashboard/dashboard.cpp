@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "acquisition/files/json_text.hpp"
@@ -15,29 +14,27 @@ namespace stageid {
 
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr std::size_t kEventsShown = 60;
 // A page that is loaded again has no stream for a moment.
 constexpr std::chrono::seconds kReload{2};
 
-std::string text_of(const Json& json) {
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+std::string text_of(const SortedJson& json) {
+  return json.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
 }
 
 /// Limits of a group; null if there are none.
-Json limits(const Eigen::VectorXd& values, std::size_t channels) {
-  Json out = Json::array();
+SortedJson limits(const Eigen::VectorXd& values, std::size_t channels) {
+  SortedJson out = SortedJson::array();
   for (std::size_t i = 0; i < channels; ++i) {
     const auto index = static_cast<Eigen::Index>(i);
     const bool known = index < values.size() && std::isfinite(values[index]);
-    out.push_back(known ? Json(values[index]) : Json());
+    out.push_back(known ? SortedJson(values[index]) : SortedJson());
   }
   return out;
 }
 
-Json channels(const std::vector<Channel>& list) {
-  Json out = Json::array();
+SortedJson channels(const std::vector<Channel>& list) {
+  SortedJson out = SortedJson::array();
   for (const Channel& channel : list)
     out.push_back({{"name", channel.name}, {"unit", channel.unit}});
   return out;
@@ -48,7 +45,8 @@ bool same_run(const LogRun& ended, const RunId& run) {
 }
 
 /// Total counts of the completed runs and the current one.
-void add_counts(const LiveLevels::Ended& ended, const ExperimentProgress& progress, Json& json) {
+void add_counts(const LiveLevels::Ended& ended, const ExperimentProgress& progress,
+                SortedJson& json) {
   RunHealth health = ended.health;
   RunTiming timing = ended.timing;
   if (ended.runs == 0 || !same_run(ended.last, progress.run)) {
@@ -65,8 +63,8 @@ void add_counts(const LiveLevels::Ended& ended, const ExperimentProgress& progre
 }
 
 /// The page shows all values under their names.
-Json plant_json(const PlantSnapshot& plant) {
-  Json values = Json::array();
+SortedJson plant_json(const PlantSnapshot& plant) {
+  SortedJson values = SortedJson::array();
   const auto add = [&](const char* name, const std::vector<double>& numbers, const char* unit) {
     for (std::size_t i = 0; i < numbers.size(); ++i)
       values.push_back(
@@ -85,18 +83,19 @@ std::string dashboard_content_json(const ExperimentConfig& config, const Experim
                                    const StageInfo& stage) {
   const StageLimits& bounds = config.stage.spec.limits;
   const bool wall = stage.clock == Clock::wall;
-  Json json = {{"stage", stage.name},
-               {"backend", stage.backend},
-               {"experiment", config.file.filename().string()},
-               {"sample_rate_hz", stage.sample_rate_hz},
-               {"period_s", wall ? Json(1.0 / (stage.sample_rate_hz * stage.pace)) : Json()},
-               {"realizations", plan.spec().realizations},
-               {"actuators", channels(stage.actuators)},
-               {"sensors", channels(stage.sensors)},
-               {"limits",
-                {{"actuator_n", limits(bounds.actuator_n, stage.actuators.size())},
-                 {"thermal_rms_n", limits(bounds.thermal_rms_n, stage.actuators.size())},
-                 {"position_window_m", limits(bounds.position_window_m, stage.sensors.size())}}}};
+  SortedJson json = {
+      {"stage", stage.name},
+      {"backend", stage.backend},
+      {"experiment", config.file.filename().string()},
+      {"sample_rate_hz", stage.sample_rate_hz},
+      {"period_s", wall ? SortedJson(1.0 / (stage.sample_rate_hz * stage.pace)) : SortedJson()},
+      {"realizations", plan.spec().realizations},
+      {"actuators", channels(stage.actuators)},
+      {"sensors", channels(stage.sensors)},
+      {"limits",
+       {{"actuator_n", limits(bounds.actuator_n, stage.actuators.size())},
+        {"thermal_rms_n", limits(bounds.thermal_rms_n, stage.actuators.size())},
+        {"position_window_m", limits(bounds.position_window_m, stage.sensors.size())}}}};
   return script_safe(text_of(json));
 }
 
@@ -134,12 +133,12 @@ Dashboard::Dashboard(const DashboardAddress& address, const ExperimentConfig& co
 }
 
 /// Mean relative variance so far, and the one at which the measurement ends; null: unknown.
-nlohmann::json Dashboard::accuracy_json() const {
+SortedJson Dashboard::accuracy_json() const {
   const std::optional<LiveAccuracy> reached = response_.accuracy();
   if (!reached) return {};
   return {{"variance", reached->variance},
           {"realizations", reached->realizations},
-          {"wanted", wanted_variance_ ? Json(*wanted_variance_) : Json()}};
+          {"wanted", or_null(wanted_variance_)}};
 }
 
 /// What changes during a measurement, for the script of the page: one line.
@@ -147,7 +146,7 @@ std::string Dashboard::state_json() const {
   const ExperimentProgress& p = progress_;
   const StageWatch* const watch = watch_;
   const double rate = wall_s_ > 0.0 ? p.seconds_done / wall_s_ : 0.0;
-  Json json = {
+  SortedJson json = {
       {"state", state_},
       {"node_state", to_string(p.node_state)},
       {"run", {{"realization", p.run.realization}, {"experiment", p.run.experiment}}},
@@ -155,7 +154,8 @@ std::string Dashboard::state_json() const {
       {"runs_total", p.runs_total + runs_before_},
       {"seconds_done", p.seconds_done},
       {"seconds_total", p.seconds_total},
-      {"seconds_left", rate > 0.0 ? Json((p.seconds_total - p.seconds_done) / rate) : Json()},
+      {"seconds_left",
+       rate > 0.0 ? SortedJson((p.seconds_total - p.seconds_done) / rate) : SortedJson()},
       {"speed", rate},
       {"levels",
        {{"peak", shown_levels_.peak},
@@ -163,17 +163,17 @@ std::string Dashboard::state_json() const {
         {"largest_peak", shown_levels_.largest_peak}}},
       {"response", {{"edition", content_.response.get().number}, {"status", response_.status()}}},
       {"accuracy", accuracy_json()},
-      {"supervisor", plant_ ? plant_json(plant_()) : Json()},
-      {"watch", watch != nullptr ? Json(watch->state()) : Json()},
+      {"supervisor", plant_ ? plant_json(plant_()) : SortedJson()},
+      {"watch", watch != nullptr ? SortedJson(watch->state()) : SortedJson()},
       {"watchers", server_ ? server_->watchers() : 0},
       {"message", message_},
-      {"exit_code", exit_code_ ? Json(*exit_code_) : Json()},
+      {"exit_code", or_null(exit_code_)},
       {"stays", stays_}};
   add_counts(levels_.ended(), p, json);
-  json["events"] = Json::array();
+  json["events"] = SortedJson::array();
   if (const EventLog* const log = events_)
     for (const std::string& event : log->latest(kEventsShown))
-      json["events"].push_back(parse_json<Json>(event));
+      json["events"].push_back(parse_json<SortedJson>(event));
   return text_of(json);
 }
 

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "tools/dashboard/live_traces.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
@@ -60,7 +60,7 @@ class Dashboard {
   using SteadyClock = std::chrono::steady_clock;
   void publish();
   std::string state_json() const;
-  nlohmann::json accuracy_json() const;
+  SortedJson accuracy_json() const;
 
   DashboardContent content_;
   const char* state_ = "starting";  ///< starting, running, stopping, estimating, ended

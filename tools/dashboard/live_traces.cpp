@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <vector>
+
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -52,7 +53,7 @@ std::string LiveTraces::json(Eigen::Index channel) const {
       high.push_back(high_(channel, bin % kBins));
     }
   }
-  return nlohmann::json{{"bin_s", bin_s_}, {"bins", kBins}, {"low", low}, {"high", high}}.dump();
+  return SortedJson{{"bin_s", bin_s_}, {"bins", kBins}, {"low", low}, {"high", high}}.dump();
 }
 
 }  // namespace stageid

@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 
 #include <iterator>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "acquisition/files/json_text.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::json;
 
 /// A family of samples with its head.
 class Metric {
@@ -21,7 +19,7 @@ class Metric {
     print("# HELP stageid_{} {}\n# TYPE stageid_{} {}\n", name, help, name, type);
   }
   /// @param labels 'name="value",...,'
-  void add(const Json& value, const std::string& labels = "") {
+  void add(const SortedJson& value, const std::string& labels = "") {
     if (!value.is_number()) return;
     print("stageid_{}", name_);
     if (!labels.empty()) print("{{{}}}", labels);
@@ -48,16 +46,16 @@ std::string label(const char* name, const std::string& value) {
 }
 
 /// One sample per property that has `key`.
-void add_properties(const Json& list, const char* key, Metric metric) {
-  for (const Json& property : list) {
+void add_properties(const SortedJson& list, const char* key, Metric metric) {
+  for (const SortedJson& property : list) {
     std::string labels;
     for (const char* name : {"kind", "name"})
       if (property.contains(name)) labels += label(name, property[name].get<std::string>());
-    metric.add(property.value(key, Json()), labels);
+    metric.add(property.value(key, SortedJson()), labels);
   }
 }
 
-void add_watch(const Json& watch, std::string& text) {
+void add_watch(const SortedJson& watch, std::string& text) {
   Metric(text, "watch_periods_total", "counter", "Periods watched.").add(watch["periods"]);
   Metric(text, "watch_skipped_periods_total", "counter", "Periods with marked samples.")
       .add(watch["skipped"]);
@@ -84,23 +82,27 @@ void add_watch(const Json& watch, std::string& text) {
 }  // namespace
 
 std::string metrics_text(std::string_view state) {
-  const Json json = parse_json_object<Json>(state);
+  const SortedJson json = parse_json_object<SortedJson>(state);
   std::string text;
   if (json.contains("state"))
     Metric(text, "state", "gauge", "1 with the state of the measurement.")
         .add(1, label("state", json["state"].get<std::string>()));
-  const Json health = json.value("health", Json::object());
+  const SortedJson health = json.value("health", SortedJson::object());
   for (const auto& [name, help] :
        {std::pair("cycles", "Rows recorded."), std::pair("late", "Cycles that were late."),
         std::pair("missing", "Cycles without a sample."),
         std::pair("marked", "Samples marked as invalid."),
         std::pair("irregular", "Cycles beyond the limit of jitter.")})
     Metric(text, fmt::format("{}_total", name).c_str(), "counter", help)
-        .add(health.value(name, Json()));
-  Metric(text, "runs_done_total", "counter", "Complete runs.").add(json.value("runs_done", Json()));
-  Metric(text, "runs", "gauge", "Runs of the experiment.").add(json.value("runs_total", Json()));
-  Metric(text, "exit_code", "gauge", "Exit code, at the end.").add(json.value("exit_code", Json()));
-  if (const Json watch = json.value("watch", Json()); watch.is_object()) add_watch(watch, text);
+        .add(health.value(name, SortedJson()));
+  Metric(text, "runs_done_total", "counter", "Complete runs.")
+      .add(json.value("runs_done", SortedJson()));
+  Metric(text, "runs", "gauge", "Runs of the experiment.")
+      .add(json.value("runs_total", SortedJson()));
+  Metric(text, "exit_code", "gauge", "Exit code, at the end.")
+      .add(json.value("exit_code", SortedJson()));
+  if (const SortedJson watch = json.value("watch", SortedJson()); watch.is_object())
+    add_watch(watch, text);
   return text;
 }
 

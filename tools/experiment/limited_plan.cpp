@@ -15,8 +15,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kDoubtfulMisfit = 0.05;
 
 std::string limit_text(double limit) {

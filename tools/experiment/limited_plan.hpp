@@ -1,12 +1,12 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "acquisition/prediction/limited_excitation.hpp"
 #include "excitation/plan/limited_design.hpp"
 #include "tools/experiment/experiment_config.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -23,6 +23,6 @@ LimitedPlan make_limited_plan(const ExperimentConfig& config);
 
 /// The signals relative to their limits, and the predicted accuracy; `accuracy` 0: no requested accuracy.
 std::vector<std::string> limited_table(const LimitedPlan& limited, double accuracy);
-nlohmann::ordered_json limited_json(const LimitedPlan& limited, double accuracy);
+Json limited_json(const LimitedPlan& limited, double accuracy);
 
 }  // namespace stageid

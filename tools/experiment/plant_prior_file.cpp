@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -15,6 +14,7 @@
 #include "frf/plant/low_frequency_plant.hpp"
 #include "frf/response/hold_compensation.hpp"
 #include "hal/simulator/rigid_body.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -107,7 +107,7 @@ auto interpolated(const Columns& columns, const Between& at) {
 }
 
 double period_s_of(const FrfEstimate& frf) {
-  const auto json = parse_json_object<nlohmann::json>(frf.provenance_json);
+  const auto json = parse_json_object<Json>(frf.provenance_json);
   if (!json.contains("options")) return 0.0;
   return number_in(json["options"], "period_samples").value_or(0.0) / frf.sample_rate_hz;
 }

@@ -1,15 +1,12 @@
 #include "tools/experiment/run_metadata.hpp"
 
-#include <nlohmann/json.hpp>
-
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
 #include "acquisition/record/utc_time.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
-
-using Json = nlohmann::ordered_json;
 
 std::string run_metadata(const ExperimentConfig& config, Backend backend, const StageInfo& stage) {
   Json json = {

@@ -13,8 +13,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr std::size_t kMostLines = 10;
 
 /// The least probable verdict of a column.

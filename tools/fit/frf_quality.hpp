@@ -1,10 +1,10 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "frf/response/frf_estimate.hpp"
+#include "tools/terminal/json.hpp"
 
 /// Quality of a measured frequency response, for people and for scripts.
 namespace stageid {
@@ -21,6 +21,6 @@ std::vector<std::string> dropped_lines(const FrfEstimate& frf);
 /// "false_alarm_rate" per verdict, and "bands": band_hz, tests, nonlinear; output, input, p_value and distortion of the
 /// least probable pair; even and odd: p_value and level of the least probable one, or null without such lines.
 /// "dropped_periods", "replaced_samples" and "left_out_realizations": lists with places, counted from 1, and reasons.
-nlohmann::ordered_json quality_json(const FrfEstimate& frf);
+Json quality_json(const FrfEstimate& frf);
 
 }  // namespace stageid

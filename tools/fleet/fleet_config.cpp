@@ -1,12 +1,12 @@
 #include "tools/fleet/fleet_config.hpp"
 
-#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "tools/config/yaml_document.hpp"
 #include "tools/database/database.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/fit/fit_words.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -54,8 +54,8 @@ void describe_fleet(ConfigVisitor& v, FleetFile& file) {
 }
 
 /// The values below a node, without comments and layout.
-nlohmann::json values_of(const YamlDocument& document, const YamlNode& node) {
-  nlohmann::json out;
+SortedJson values_of(const YamlDocument& document, const YamlNode& node) {
+  SortedJson out;
   if (node.kind == YamlNode::Kind::scalar) out = node.text;
   for (const std::size_t item : node.items) out.push_back(values_of(document, document.node(item)));
   for (const YamlNode::Entry& entry : node.entries)

@@ -17,11 +17,10 @@
 #include "tools/fleet/fleet_time.hpp"
 #include "tools/report/html_page.hpp"
 #include "tools/report/report_encoding.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr unsigned char kNoFolder = 255;
 
@@ -64,8 +63,9 @@ class FleetSeries {
   /// by at most 5 %.
   /// @param present per identification of the stage
   /// @return number of values, least value and step, for the page
-  Json add_track(const std::vector<std::uint8_t>& present, const std::vector<double>& frequency_hz,
-                 const std::vector<double>& frequency_std_hz) {
+  SortedJson add_track(const std::vector<std::uint8_t>& present,
+                       const std::vector<double>& frequency_hz,
+                       const std::vector<double>& frequency_std_hz) {
     const auto [least, most] = std::ranges::minmax(frequency_hz);
     std::vector<double> std_hz = frequency_std_hz;
     const double step = std::max({median(std_hz) / 3.0, (most - least) / kMostSteps, 1e-12 * most});
@@ -82,7 +82,7 @@ class FleetSeries {
   }
 
   /// @param arrays descriptions for the page, per block
-  std::vector<report::Block> blocks(Json& arrays) const {
+  std::vector<report::Block> blocks(SortedJson& arrays) const {
     std::vector<report::Block> out;
     const auto add = [&](const char* id, const char* type, std::string text) {
       arrays[id]["type"] = type;
@@ -113,21 +113,21 @@ class FleetPage {
       : database_(store.database()), request_(request) {}
 
   std::string html() {
-    Json stages = Json::array();
+    SortedJson stages = SortedJson::array();
     for (const auto& [name, id] : chosen_stages())
-      if (Json content = stage(id, name); content["count"] > 0)
+      if (SortedJson content = stage(id, name); content["count"] > 0)
         stages.push_back(std::move(content));
     if (count_ == 0)
       fail_request("{}: contains no identification of this time; change --since and --until",
                    database_.name());
-    Json content = {{"version", version()},
-                    {"title", title()},
-                    {"stages", stages},
-                    {"track_keys",
-                     {"mode", "frequency_hz", "spread_hz", "damping_ratio", "deviation", "seen",
-                      "least", "step"}},
-                    {"outliers", outliers_},
-                    {"folders", folder_links()}};
+    SortedJson content = {{"version", version()},
+                          {"title", title()},
+                          {"stages", stages},
+                          {"track_keys",
+                           {"mode", "frequency_hz", "spread_hz", "damping_ratio", "deviation",
+                            "seen", "least", "step"}},
+                          {"outliers", outliers_},
+                          {"folders", folder_links()}};
     const std::vector<report::Block> blocks = series_.blocks(content["arrays"]);
     return html_page(HtmlPage::fleet, fmt::format("{}: fleet", title()),
                      script_safe(json_line(content)), blocks);
@@ -181,8 +181,8 @@ class FleetPage {
   }
 
   /// From the folder of the page.
-  Json folder_links() const {
-    Json links = Json::array();
+  SortedJson folder_links() const {
+    SortedJson links = SortedJson::array();
     const auto of = [](const std::filesystem::path& file) {
       return std::filesystem::absolute(file).lexically_normal().parent_path();
     };
@@ -194,7 +194,7 @@ class FleetPage {
     return links;
   }
 
-  Json stage(std::int64_t id, const std::string& name) {
+  SortedJson stage(std::int64_t id, const std::string& name) {
     const auto rows = of_period(
         "SELECT i.id, i.time_utc, i.verdict, i.outlier, i.reasons, i.job, i.results "
         "FROM identification i ",
@@ -223,9 +223,9 @@ class FleetPage {
             {"doubtful", counts[1]}, {"failed", counts[2]}, {"tracks", tracks(id, place)}};
   }
 
-  Json tracks(std::int64_t stage, const std::map<std::int64_t, std::size_t>& place) {
+  SortedJson tracks(std::int64_t stage, const std::map<std::int64_t, std::size_t>& place) {
     struct Track {
-      Json about;
+      SortedJson about;
       std::vector<std::uint8_t> present;
       std::vector<double> frequency_hz;
       std::vector<double> std_hz;
@@ -241,7 +241,7 @@ class FleetPage {
       Track& track = by_track[in_order.back()];
       track.about = {known->integer(1), rounded(known->number(2)), rounded(known->number(3)),
                      rounded(known->number(4)),
-                     known->is_null(5) ? Json() : Json(rounded(known->number(5)))};
+                     known->is_null(5) ? SortedJson() : SortedJson(rounded(known->number(5)))};
       track.present.resize(place.size(), 0);
     }
     const auto rows = of_period(
@@ -256,11 +256,12 @@ class FleetPage {
       track->second.frequency_hz.push_back(rows->number(2));
       track->second.std_hz.push_back(rows->number(3));
     }
-    Json out = Json::array();
+    SortedJson out = SortedJson::array();
     for (const std::int64_t number : in_order) {
       Track& track = by_track[number];
       if (track.frequency_hz.empty()) continue;
-      for (const Json& value : series_.add_track(track.present, track.frequency_hz, track.std_hz))
+      for (const SortedJson& value :
+           series_.add_track(track.present, track.frequency_hz, track.std_hz))
         track.about.push_back(value);
       out.push_back(std::move(track.about));
     }
@@ -272,7 +273,7 @@ class FleetPage {
   FleetSeries series_;
   std::size_t count_ = 0;
   std::vector<std::string> folders_;
-  Json outliers_ = Json::array();
+  SortedJson outliers_ = SortedJson::array();
 };
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "acquisition/files/fail.hpp"
@@ -27,6 +26,7 @@
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
 #include "tools/terminal/exit_code.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
@@ -46,7 +46,7 @@ std::string changed_utc(const std::filesystem::path& log) {
 /// Stage and time that neither table nor key determine.
 void complete_from_log(Identification& job, const FleetConfig& config, const FleetLog& given,
                        const LogReader& log) {
-  const auto metadata = parse_json<nlohmann::json>(log.info().metadata_json);
+  const auto metadata = parse_json<Json>(log.info().metadata_json);
   if (const std::string stage = text_in(metadata, "stage");
       given.stage.empty() && config.stage_name == StageName::log && !stage.empty()) {
     try {

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "tools/dashboard/dashboard_address.hpp"
 #include "tools/experiment/experiment_config.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/watch/stage_watch.hpp"
 
 namespace stageid {
@@ -39,7 +39,7 @@ struct MeasurementResult {
   std::string message;  ///< one line, the reason of the end
   std::optional<double> variance = {};  ///< mean relative, of the last estimate; with `until` only
   std::string watch_summary = {};       ///< one line; empty: not watched
-  nlohmann::ordered_json watch = {};    ///< changes and tracked properties
+  Json watch = {};                      ///< changes and tracked properties
   double seconds = 0.0;
   std::uint64_t log_bytes = 0;
   std::function<void()> show_end = [] {};  ///< on the dashboard, until its pages are closed

@@ -12,8 +12,6 @@
 namespace stageid::report {
 namespace {
 
-using Json = nlohmann::json;
-
 /// Largest relative distance of two lines that are considered equal.
 constexpr double kSameLine = 1e-9;
 
@@ -62,27 +60,27 @@ const Submodel& submodel_of(const AdditiveModel& model, const ModeShape& mode) {
   return model.submodels[mode.submodel];
 }
 
-Json modes_json(const AdditiveModel& model, const std::vector<ModeShape>& modes) {
-  Json out = Json::array();
+SortedJson modes_json(const AdditiveModel& model, const std::vector<ModeShape>& modes) {
+  SortedJson out = SortedJson::array();
   for (const ModeShape& mode : modes) {
     const Submodel& submodel = submodel_of(model, mode);
     out.push_back({{"frequency_hz", mode.natural_frequency_hz},
-                   {"frequency_std_hz", number_json(submodel.natural_frequency_std_hz)},
+                   {"frequency_std_hz", or_null(submodel.natural_frequency_std_hz)},
                    {"damping_ratio", mode.damping_ratio},
-                   {"damping_std", number_json(submodel.damping_ratio_std)}});
+                   {"damping_std", or_null(submodel.damping_ratio_std)}});
   }
   return out;
 }
 
-Json deviation(double difference, const std::optional<double>& first,
-               const std::optional<double>& second) {
-  if (!first || !second) return Json();
+SortedJson deviation(double difference, const std::optional<double>& first,
+                     const std::optional<double>& second) {
+  if (!first || !second) return SortedJson();
   const double std = std::hypot(*first, *second);
-  return std > 0.0 ? Json(difference / std) : Json();
+  return std > 0.0 ? SortedJson(difference / std) : SortedJson();
 }
 
-Json pair_json(const ModePair& pair, const ReportData& own, const std::vector<ModeShape>& ours,
-               const std::vector<ModeShape>& theirs) {
+SortedJson pair_json(const ModePair& pair, const ReportData& own,
+                     const std::vector<ModeShape>& ours, const std::vector<ModeShape>& theirs) {
   const ModeShape& first = ours[pair.first];
   const ModeShape& second = theirs[pair.second];
   const Submodel& a = submodel_of(*own.model, first);
@@ -95,7 +93,7 @@ Json pair_json(const ModePair& pair, const ReportData& own, const std::vector<Mo
           {"frequency_deviation",
            deviation(shift_hz, a.natural_frequency_std_hz, b.natural_frequency_std_hz)},
           {"damping_difference",
-           first.damping_ratio > 0.0 ? Json(shift / first.damping_ratio) : Json()},
+           first.damping_ratio > 0.0 ? SortedJson(shift / first.damping_ratio) : SortedJson()},
           {"damping_deviation", deviation(shift, a.damping_ratio_std, b.damping_ratio_std)},
           {"output_mac", pair.output_mac},
           {"input_mac", pair.input_mac}};
@@ -118,14 +116,14 @@ ReportComparison make_comparison(ReportData& own, std::string title,
   return comparison;
 }
 
-Json comparison_json(const ReportData& own) {
-  Json out = {{"title", own.comparison->title}};
+SortedJson comparison_json(const ReportData& own) {
+  SortedJson out = {{"title", own.comparison->title}};
   if (!own.model || !own.comparison->model) return out;
   const std::vector<ModeShape> ours = shapes_by_frequency(*own.model);
   const std::vector<ModeShape> theirs = shapes_by_frequency(*own.comparison->model);
   out["own"] = modes_json(*own.model, ours);
   out["modes"] = modes_json(*own.comparison->model, theirs);
-  out["pairs"] = Json::array();
+  out["pairs"] = SortedJson::array();
   if (ours.empty() || theirs.empty()) return out;
   for (const ModePair& pair : pair_modes(ours, theirs))
     out["pairs"].push_back(pair_json(pair, own, ours, theirs));

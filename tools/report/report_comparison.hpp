@@ -1,8 +1,7 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "tools/report/report_page.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid::report {
 
@@ -20,6 +19,6 @@ ReportComparison make_comparison(ReportData& own, std::string title,
 /// Both lists are sorted by frequency. Differences are other minus own, relative; deviations are in standard
 /// deviations of the difference of two independent estimates, null if one is unknown. Without two models: only the
 /// title.
-nlohmann::json comparison_json(const ReportData& own);
+SortedJson comparison_json(const ReportData& own);
 
 }  // namespace stageid::report

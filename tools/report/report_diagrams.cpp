@@ -8,27 +8,26 @@
 namespace stageid::report {
 namespace {
 
-using Json = nlohmann::json;
-
 /// For shapes of norm one; a pixel is a thousandth.
 constexpr int kShapeDigits = 5;
 
-Json rounded(double value, int digits) {
-  if (!std::isfinite(value)) return Json();
+SortedJson rounded(double value, int digits) {
+  if (!std::isfinite(value)) return SortedJson();
   const double scale = std::pow(10.0, digits);
   return std::round(value * scale) / scale;
 }
 
 /// Four digits; null if it is not finite.
-Json significant(double value) {
-  if (!std::isfinite(value) || value == 0.0) return std::isfinite(value) ? Json(0.0) : Json();
+SortedJson significant(double value) {
+  if (!std::isfinite(value) || value == 0.0)
+    return std::isfinite(value) ? SortedJson(0.0) : SortedJson();
   const double scale = std::pow(10.0, 3.0 - std::floor(std::log10(std::abs(value))));
   const double rounded = std::round(value * scale) / scale;
-  return std::isfinite(rounded) ? Json(rounded) : Json(value);
+  return std::isfinite(rounded) ? SortedJson(rounded) : SortedJson(value);
 }
 
-Json pairs(const Eigen::VectorXcd& shape) {
-  Json out = Json::array();
+SortedJson pairs(const Eigen::VectorXcd& shape) {
+  SortedJson out = SortedJson::array();
   for (const std::complex<double> value : shape) {
     out.push_back(rounded(value.real(), kShapeDigits));
     out.push_back(rounded(value.imag(), kShapeDigits));
@@ -36,35 +35,33 @@ Json pairs(const Eigen::VectorXcd& shape) {
   return out;
 }
 
-Json places(const std::vector<Channel>& places, const ChannelList& channels) {
-  Json out = Json::array();
+SortedJson places(const std::vector<Channel>& places, const ChannelList& channels) {
+  SortedJson out = SortedJson::array();
   for (const std::string& name : channels.names) {
     const auto place = std::ranges::find(places, name, &Channel::name);
-    out.push_back(place == places.end()
-                      ? Json()
-                      : Json{{"position_m", place->position_m}, {"direction", place->direction}});
+    out.push_back(place == places.end() ? SortedJson()
+                                        : SortedJson{{"position_m", place->position_m},
+                                                     {"direction", place->direction}});
   }
   return out;
 }
 
 }  // namespace
 
-Json number_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+SortedJson rounded_mac(double value) { return rounded(value, 4); }
 
-Json rounded_mac(double value) { return rounded(value, 4); }
-
-Json matrix_json(const Eigen::MatrixXd& matrix, Json (*rounding)(double)) {
-  Json out = Json::array();
+SortedJson matrix_json(const Eigen::MatrixXd& matrix, SortedJson (*rounding)(double)) {
+  SortedJson out = SortedJson::array();
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    Json line = Json::array();
+    SortedJson line = SortedJson::array();
     for (const double value : matrix.row(row)) line.push_back(rounding(value));
     out.push_back(std::move(line));
   }
   return out;
 }
 
-Json stabilization_json(const std::vector<StabilizationPole>& poles) {
-  Json out = Json::array();
+SortedJson stabilization_json(const std::vector<StabilizationPole>& poles) {
+  SortedJson out = SortedJson::array();
   for (const StabilizationPole& pole : poles)
     out.push_back({pole.order, std::round(1e4 * pole.frequency_hz) / 1e4,
                    significant(pole.damping_ratio),
@@ -72,8 +69,8 @@ Json stabilization_json(const std::vector<StabilizationPole>& poles) {
   return out;
 }
 
-Json nonlinearity_json(const NonlinearityTest& test) {
-  Json settled = Json::array();
+SortedJson nonlinearity_json(const NonlinearityTest& test) {
+  SortedJson settled = SortedJson::array();
   for (Eigen::Index b = 0; b < test.band_hz.rows(); ++b) settled.push_back(test.settled(b));
   return {{"bands", matrix_json(test.band_hz, significant)},
           {"settled", std::move(settled)},
@@ -88,9 +85,9 @@ std::vector<ModeShape> shapes_by_frequency(const AdditiveModel& model) {
   return modes;
 }
 
-Json shapes_json(const AdditiveModel& model) {
+SortedJson shapes_json(const AdditiveModel& model) {
   const std::vector<ModeShape> modes = shapes_by_frequency(model);
-  Json list = Json::array();
+  SortedJson list = SortedJson::array();
   for (const ModeShape& mode : modes)
     list.push_back({{"frequency_hz", mode.natural_frequency_hz},
                     {"damping_ratio", mode.damping_ratio},
@@ -105,14 +102,14 @@ Json shapes_json(const AdditiveModel& model) {
           {"input_mac", matrix_json(modal_assurance(inputs, inputs), rounded_mac)}};
 }
 
-Json geometry_json(const StageInfo& geometry, const ChannelList& outputs,
-                   const ChannelList& inputs) {
-  Json out = {{"outputs", places(geometry.sensors, outputs)},
-              {"inputs", places(geometry.actuators, inputs)}};
-  const auto known = [](const Json& list) {
-    return std::ranges::any_of(list, [](const Json& place) { return !place.is_null(); });
+SortedJson geometry_json(const StageInfo& geometry, const ChannelList& outputs,
+                         const ChannelList& inputs) {
+  SortedJson out = {{"outputs", places(geometry.sensors, outputs)},
+                    {"inputs", places(geometry.actuators, inputs)}};
+  const auto known = [](const SortedJson& list) {
+    return std::ranges::any_of(list, [](const SortedJson& place) { return !place.is_null(); });
   };
-  return known(out["outputs"]) || known(out["inputs"]) ? out : Json();
+  return known(out["outputs"]) || known(out["inputs"]) ? out : SortedJson();
 }
 
 }  // namespace stageid::report

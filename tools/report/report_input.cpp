@@ -27,15 +27,13 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::json;
-
 /// The format in the file: "stageid-frf", "stageid-log", ...; empty if there is none.
 std::string kind_of(const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending == ".slog") return "stageid-log";
   if (ending == ".yaml" || ending == ".yml") return "stageid-stage";
   if (ending == ".json") {
-    const Json json = parse_json<Json>(read_whole_file(file));
+    const SortedJson json = parse_json<SortedJson>(read_whole_file(file));
     if (json.is_discarded())
       throw FormatError(file, "", "is not JSON, or is truncated; copy it again or write it again");
     return text_in(json, "format");
@@ -136,8 +134,7 @@ void add_stabilization(ReportData& data) {
 
 /// Reads the parts that only a summary has: the truth of a simulated plant, and the duration of the steps. Notes that
 /// are in the table of findings are not repeated.
-void add_summary(ReportData& data, const std::filesystem::path& file,
-                 const nlohmann::ordered_json& json) {
+void add_summary(ReportData& data, const std::filesystem::path& file, const Json& json) {
   const JsonNode summary(file, "/", json);
   if (summary.has("truth")) {
     const JsonNode truth = summary.member("truth");
@@ -159,7 +156,7 @@ void add_summary(ReportData& data, const std::filesystem::path& file,
 
 /// A log contains the stage file. That of another version may have unknown keys; the shapes are then shown without
 /// positions.
-StageInfo geometry_of_log(const std::filesystem::path& file, const Json& metadata) {
+StageInfo geometry_of_log(const std::filesystem::path& file, const SortedJson& metadata) {
   const std::string stage = text_in(metadata, "stage");
   if (stage.empty()) return {};
   try {
@@ -173,7 +170,7 @@ void add_log(ReportData& data, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   data.runs = log->runs();
   data.sample_rate_hz = log->info().sample_rate_hz;
-  const Json metadata = parse_json<Json>(log->info().metadata_json);
+  const SortedJson metadata = parse_json<SortedJson>(log->info().metadata_json);
   if (!metadata.is_object()) return;
   data.period_s = wall_period_s(log->info());
   data.geometry = geometry_of_log(file, metadata);
@@ -231,8 +228,7 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files) {
   return input;
 }
 
-void complete_report(ReportData& data, const ReportInput& input,
-                     const nlohmann::ordered_json& summary) {
+void complete_report(ReportData& data, const ReportInput& input, const Json& summary) {
   complete_response(data);
   data.title = "stageid";
   data.files.log = input.log;
@@ -258,7 +254,7 @@ ReportData read_response_data(const ReportInput& input) {
 
 ReportData read_report_data(const ReportInput& input) {
   ReportData data = read_response(input);
-  nlohmann::ordered_json summary;
+  Json summary;
   if (!input.summary.empty()) summary = JsonFile(input.summary, "stageid-summary").root().raw();
   complete_report(data, input, summary);
   return data;

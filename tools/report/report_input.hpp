@@ -1,10 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "tools/report/report_page.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -31,8 +31,7 @@ ReportInput report_input(const std::vector<std::filesystem::path>& files);
 /// @param input log and stage are read; the file of the summary is only named in errors
 /// @param summary of `identify`; null: none
 /// @throws FileError, FormatError, std::invalid_argument
-void complete_report(ReportData& data, const ReportInput& input,
-                     const nlohmann::ordered_json& summary);
+void complete_report(ReportData& data, const ReportInput& input, const Json& summary);
 
 /// A result of files for comparison; each part may be missing, but not both.
 struct ComparedResult {

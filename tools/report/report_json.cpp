@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "acquisition/files/json_text.hpp"
 #include "acquisition/files/version.hpp"
@@ -18,6 +17,7 @@
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/steps/model_verdict.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -29,10 +29,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReportDocument, name, text)
 namespace stageid::report {
 namespace {
 
-using Json = nlohmann::json;
-
-Json channels(const ChannelList& list) {
-  Json out = Json::array();
+SortedJson channels(const ChannelList& list) {
+  SortedJson out = SortedJson::array();
   for (std::size_t i = 0; i < list.size(); ++i)
     out.push_back({{"name", list.names[i]}, {"unit", i < list.units.size() ? list.units[i] : ""}});
   return out;
@@ -54,7 +52,8 @@ constexpr ComplexType kBlock16 = {"c40", encode_complex_block16};
 
 /// Blocks with their descriptions, always added together.
 struct Arrays {
-  void add(const std::string& id, const char* type, std::string text, Json more = Json::object()) {
+  void add(const std::string& id, const char* type, std::string text,
+           SortedJson more = SortedJson::object()) {
     more["type"] = type;
     description[id] = std::move(more);
     blocks.push_back({id, std::move(text)});
@@ -63,7 +62,7 @@ struct Arrays {
   Eigen::MatrixXcd add(const std::string& id, const ComplexType& type,
                        const Eigen::MatrixXcd& values, int order, const Based& base = {}) {
     ComplexCode code = type.encode(values, {base.values, order});
-    Json more = {{"order", order}};
+    SortedJson more = {{"order", order}};
     if (base.values != nullptr) more["base"] = base.id;
     add(id, type.name, std::move(code.text), std::move(more));
     return std::move(code.decoded);
@@ -78,7 +77,7 @@ struct Arrays {
     add(id, "log8", std::move(bytes.text), {{"low", bytes.low}, {"step", bytes.step}});
   }
 
-  Json description = Json::object();
+  SortedJson description = SortedJson::object();
   std::vector<Block> blocks;
 };
 
@@ -127,41 +126,43 @@ void add_response(const ReportData& data, Arrays& arrays) {
                          (data.validation_frf->response - data.model_response).cwiseAbs());
 }
 
-Json frf_json(const FrfEstimate& frf) {
-  Json excluded = Json::array();
+SortedJson frf_json(const FrfEstimate& frf) {
+  SortedJson excluded = SortedJson::array();
   for (std::size_t i = 0; i < frf.excluded_channels.size(); ++i) {
     const auto index = static_cast<Eigen::Index>(i);
     excluded.push_back(
         {{"name", frf.excluded_channels[i]},
-         {"power", index < frf.excluded_power.size() ? Json(frf.excluded_power[index]) : Json()}});
+         {"power", index < frf.excluded_power.size() ? SortedJson(frf.excluded_power[index])
+                                                     : SortedJson()}});
   }
   const ChannelFlags responding = responding_channels(frf);
-  return {{"inputs", channels(frf.inputs)},
-          {"outputs", channels(frf.outputs)},
-          {"responds", std::vector<bool>(responding.begin(), responding.end())},
-          {"lines", frf.lines()},
-          {"band_hz", {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]}},
-          {"realizations", frf.realizations},
-          {"periods", frf.periods},
-          {"experiments", frf.experiments},
-          {"sample_rate_hz", frf.sample_rate_hz},
-          {"hold", frf.hold == Hold::zoh ? "zero-order hold" : "none"},
-          {"compensated",
-           frf.compensated == Compensation::hold ? "delay and hold" : to_string(frf.compensated)},
-          {"delay_s", frf.delay_s},
-          {"deviation", uncertainty(frf).kind},
-          {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
-          {"noise_dof", frf.noise_dof},
-          {"correlated_lines", frf.correlated_lines},
-          {"total_dof", frf.total_dof},
-          {"worst_condition",
-           frf.input_condition.size() > 0 ? Json(frf.input_condition.maxCoeff()) : Json()},
-          {"excluded", excluded}};
+  return {
+      {"inputs", channels(frf.inputs)},
+      {"outputs", channels(frf.outputs)},
+      {"responds", std::vector<bool>(responding.begin(), responding.end())},
+      {"lines", frf.lines()},
+      {"band_hz", {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]}},
+      {"realizations", frf.realizations},
+      {"periods", frf.periods},
+      {"experiments", frf.experiments},
+      {"sample_rate_hz", frf.sample_rate_hz},
+      {"hold", frf.hold == Hold::zoh ? "zero-order hold" : "none"},
+      {"compensated",
+       frf.compensated == Compensation::hold ? "delay and hold" : to_string(frf.compensated)},
+      {"delay_s", frf.delay_s},
+      {"deviation", uncertainty(frf).kind},
+      {"band_factor", std::sqrt(squared_error_quantile(0.95, uncertainty(frf).dof))},
+      {"noise_dof", frf.noise_dof},
+      {"correlated_lines", frf.correlated_lines},
+      {"total_dof", frf.total_dof},
+      {"worst_condition",
+       frf.input_condition.size() > 0 ? SortedJson(frf.input_condition.maxCoeff()) : SortedJson()},
+      {"excluded", excluded}};
 }
 
-Json model_json(const AdditiveModel& model) {
+SortedJson model_json(const AdditiveModel& model) {
   int modes = 0;
-  Json others = Json::array();
+  SortedJson others = SortedJson::array();
   for (const Submodel& submodel : model.submodels) {
     if (submodel.is_mode())
       ++modes;
@@ -182,25 +183,25 @@ Json model_json(const AdditiveModel& model) {
           {"seconds", model.fit.seconds}};
 }
 
-Json modes_json(const ReportData& data) {
-  Json out = Json::array();
+SortedJson modes_json(const ReportData& data) {
+  SortedJson out = SortedJson::array();
   for (const ModeRow& row : mode_rows(*data.model, data.true_modes)) {
-    Json truth;
+    SortedJson truth;
     if (row.truth)
       truth = {{"frequency_hz", row.truth->natural_frequency_hz},
                {"damping_ratio", row.truth->damping_ratio}};
-    out.push_back({{"frequency_hz", number_json(row.frequency_hz)},
-                   {"frequency_std_hz", number_json(row.frequency_std_hz)},
-                   {"damping_ratio", number_json(row.damping_ratio)},
-                   {"damping_std", number_json(row.damping_std)},
+    out.push_back({{"frequency_hz", or_null(row.frequency_hz)},
+                   {"frequency_std_hz", or_null(row.frequency_std_hz)},
+                   {"damping_ratio", or_null(row.damping_ratio)},
+                   {"damping_std", or_null(row.damping_std)},
                    {"truth", truth},
-                   {"frequency_deviation", number_json(row.frequency_deviation())},
-                   {"damping_deviation", number_json(row.damping_deviation())}});
+                   {"frequency_deviation", or_null(row.frequency_deviation())},
+                   {"damping_deviation", or_null(row.damping_deviation())}});
   }
   return out;
 }
 
-Json run_json(const LogRun& run, double sample_rate_hz) {
+SortedJson run_json(const LogRun& run, double sample_rate_hz) {
   const double recorded_s =
       sample_rate_hz > 0.0 ? static_cast<double>(run.samples) / sample_rate_hz : 0.0;
   return {{"name", run.name},
@@ -218,11 +219,11 @@ Json run_json(const LogRun& run, double sample_rate_hz) {
           {"recorded_s", recorded_s}};
 }
 
-Json provenances_json(const ReportData& data) {
-  Json out = Json::array();
+SortedJson provenances_json(const ReportData& data) {
+  SortedJson out = SortedJson::array();
   // As JSON if it can be parsed, else as text.
   const auto add = [&out](const char* of, const std::string& text) {
-    Json content = parse_json<Json>(text);
+    SortedJson content = parse_json<SortedJson>(text);
     if (content.is_discarded()) content = text;
     if (!content.empty()) out.push_back({{"of", of}, {"content", std::move(content)}});
   };
@@ -232,26 +233,26 @@ Json provenances_json(const ReportData& data) {
   return out;
 }
 
-Json candidates_json(const std::vector<ModeCandidate>& candidates) {
-  Json out = Json::array();
+SortedJson candidates_json(const std::vector<ModeCandidate>& candidates) {
+  SortedJson out = SortedJson::array();
   for (const ModeCandidate& mode : candidates)
     out.push_back({{"frequency_hz", mode.frequency_hz}, {"curve", mode.cmif_curve}});
   return out;
 }
 
 /// Always valid UTF-8, and safe inside <script>.
-std::string text_of(const Json& json) {
-  return script_safe(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+std::string text_of(const SortedJson& json) {
+  return script_safe(json.dump(-1, ' ', true, SortedJson::error_handler_t::replace));
 }
 
 }  // namespace
 
 PageContent page_content(const ReportData& data) {
   Arrays arrays;
-  Json json = {{"notes", data.notes},
-               {"figures", data.figures},
-               {"steps", data.steps},
-               {"documents", data.documents}};
+  SortedJson json = {{"notes", data.notes},
+                     {"figures", data.figures},
+                     {"steps", data.steps},
+                     {"documents", data.documents}};
   const Verdict verdict = judge(data);
   json["verdict"] = verdict_json(verdict);
   json["title"] = data.title;
@@ -263,8 +264,8 @@ PageContent page_content(const ReportData& data) {
   RunTiming timing;
   for (const LogRun& run : data.runs) timing += run.timing;
   json["timing"] = timing_json(timing);
-  json["period_s"] = data.period_s > 0.0 ? Json(data.period_s) : Json();
-  json["runs"] = Json::array();
+  json["period_s"] = data.period_s > 0.0 ? SortedJson(data.period_s) : SortedJson();
+  json["runs"] = SortedJson::array();
   for (const LogRun& run : data.runs) json["runs"].push_back(run_json(run, data.sample_rate_hz));
   json["sample_rate_hz"] = data.sample_rate_hz;
   if (data.frf) {
@@ -282,7 +283,7 @@ PageContent page_content(const ReportData& data) {
   json["findings"] = health_json(data.findings);
   if (!data.stabilization.empty()) json["stabilization"] = stabilization_json(data.stabilization);
   if (data.nonlinearity) json["nonlinearity"] = nonlinearity_json(*data.nonlinearity);
-  if (!data.controller_view.empty()) json["loop"] = parse_json<Json>(data.controller_view);
+  if (!data.controller_view.empty()) json["loop"] = parse_json<SortedJson>(data.controller_view);
   if (data.comparison) json["comparison"] = comparison_json(data);
   if (data.validation) json["validation"] = validation_json(*data.validation);
   json["arrays"] = std::move(arrays.description);

@@ -88,8 +88,8 @@ Verdict judge(const ReportData& data) {
   return verdict;
 }
 
-nlohmann::ordered_json verdict_json(const Verdict& verdict) {
-  nlohmann::ordered_json json = {{"level", to_string(verdict.level)}, {"text", verdict.text}};
+Json verdict_json(const Verdict& verdict) {
+  Json json = {{"level", to_string(verdict.level)}, {"text", verdict.text}};
   json.update(head_json(verdict.problems));
   for (const std::string& remark : verdict.remarks) json["reasons"].push_back(remark);
   return json;

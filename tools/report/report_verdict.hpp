@@ -8,6 +8,7 @@
 #include "excitation/words/words.hpp"
 #include "tools/report/report_page.hpp"
 #include "tools/steps/problem.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -30,6 +31,6 @@ inline constexpr std::array kWords<Verdict::Level> = {"none", "good", "doubt", "
 /// Bad: judge_model() does not trust the model, or without a model the data have a fault. Remarks are incomplete runs,
 /// the truth if known (3 standard deviations and 1e-4) and the doubts of the job that no problem contains.
 Verdict judge(const ReportData& data);
-nlohmann::ordered_json verdict_json(const Verdict& verdict);
+Json verdict_json(const Verdict& verdict);
 
 }  // namespace stageid

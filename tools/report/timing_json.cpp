@@ -3,10 +3,8 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::json;
-
-Json histogram_json(const TimingHistogram& histogram) {
-  Json bins = Json::array();
+SortedJson histogram_json(const TimingHistogram& histogram) {
+  SortedJson bins = SortedJson::array();
   for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin)
     if (histogram.count(bin) > 0)
       bins.push_back({1e-9 * static_cast<double>(TimingHistogram::lower_ns(bin)),
@@ -21,7 +19,7 @@ Json histogram_json(const TimingHistogram& histogram) {
 
 }  // namespace
 
-nlohmann::json timing_json(const RunTiming& timing) {
+SortedJson timing_json(const RunTiming& timing) {
   if (timing.empty()) return nullptr;
   return {{"execution", histogram_json(timing.execution)},
           {"lateness", histogram_json(timing.lateness)},

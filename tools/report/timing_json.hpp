@@ -1,13 +1,12 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "acquisition/record/run_timing.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
 /// For pages and --json: quantiles in seconds and the bins [[from_s, to_s, count], ...] of both histograms, and
 /// skipped cycles; null without timing (virtual time).
-nlohmann::json timing_json(const RunTiming& timing);
+SortedJson timing_json(const RunTiming& timing);
 
 }  // namespace stageid

@@ -15,8 +15,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 Json distortion_json(const Distortion& distortion) {
   Json bands = Json::array();
   for (Eigen::Index b = 0; b < distortion.band_hz.rows(); ++b) {
@@ -51,8 +49,6 @@ std::string with_deviation(double value, double deviation) {
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 12);
   return fmt::format("{:.{}f} +- {:.{}f}", value, decimals, deviation, decimals);
 }
-
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 /// A mode has its own pole; those of other submodels are from the fit.
 std::vector<PoleEstimate> poles_of(const Submodel& s) {
@@ -181,7 +177,7 @@ std::vector<std::string> delay_lines(const AdditiveModel& model) {
   return lines;
 }
 
-nlohmann::ordered_json delays_json(const AdditiveModel& model) {
+Json delays_json(const AdditiveModel& model) {
   Json json = Json::object();
   const auto add = [&json](const char* key, const Eigen::VectorXd& values) {
     if (values.size() > 0) json[key] = values;
@@ -200,14 +196,14 @@ std::string cost_line(const std::vector<double>& cost) {
                      cost.size() - 1);
 }
 
-nlohmann::ordered_json modes_json(const AdditiveModel& model) {
+Json modes_json(const AdditiveModel& model) {
   Json list = Json::array();
   for (const Submodel& s : model.submodels)
     if (s.is_mode())
       list.push_back({{"natural_frequency_hz", s.natural_frequency_hz()},
-                      {"natural_frequency_std_hz", optional_json(s.natural_frequency_std_hz)},
+                      {"natural_frequency_std_hz", or_null(s.natural_frequency_std_hz)},
                       {"damping_ratio", s.damping_ratio()},
-                      {"damping_ratio_std", optional_json(s.damping_ratio_std)}});
+                      {"damping_ratio_std", or_null(s.damping_ratio_std)}});
   return list;
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -51,8 +51,8 @@ std::string cost_line(const std::vector<double>& cost);
 /// empty without a delay.
 std::vector<std::string> delay_lines(const AdditiveModel& model);
 /// The same for --json.
-nlohmann::ordered_json modes_json(const AdditiveModel& model);
+Json modes_json(const AdditiveModel& model);
 /// Keys as in model.json: input_delay_s, output_delay_s, and input_delay_std_s, output_delay_std_s if known.
-nlohmann::ordered_json delays_json(const AdditiveModel& model);
+Json delays_json(const AdditiveModel& model);
 
 }  // namespace stageid

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -17,11 +16,10 @@
 #include "tools/config/stage_expectation.hpp"
 #include "tools/steps/health_step.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// The reproducible part of the metadata of a log: everything except times.
 Json lasting_metadata(const LogReader& log) {

@@ -18,8 +18,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// The cause is for programs only; stored findings need severity and texts.
 Finding finding_of(const Json& object) {
   Finding finding;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -25,7 +25,7 @@ std::vector<Finding> examine(const FrfEstimate& frf, HealthRecord record,
 
 /// The table with one line per finding; a single line if there are none.
 std::vector<std::string> health_lines(const std::vector<Finding>& findings);
-nlohmann::ordered_json health_json(const std::vector<Finding>& findings);
+Json health_json(const std::vector<Finding>& findings);
 
 /// Faults and doubts as sentences, for notes; or only those of one severity.
 std::vector<std::string> health_notes(const std::vector<Finding>& findings,

@@ -52,9 +52,8 @@ std::vector<std::string> verdict_lines(const ModelVerdict& verdict) {
   return head_lines(trusted + (verdict.problems.empty() ? "" : ". Check: "), verdict.problems);
 }
 
-nlohmann::ordered_json verdict_json(const ModelVerdict& verdict) {
-  nlohmann::ordered_json json = {{"trustworthy", verdict.trustworthy},
-                                 {"validated", verdict.validated}};
+Json verdict_json(const ModelVerdict& verdict) {
+  Json json = {{"trustworthy", verdict.trustworthy}, {"validated", verdict.validated}};
   json.update(head_json(verdict.problems));
   return json;
 }
@@ -87,7 +86,7 @@ std::vector<std::string> validation_lines(const Validation& v) {
   return lines;
 }
 
-nlohmann::ordered_json validation_json(const Validation& v) {
+Json validation_json(const Validation& v) {
   return {{"relative_rms_error", v.relative_rms_error},
           {"normalized_error", v.normalized_error},
           {"chi_square_per_dof", v.chi_square_per_dof},

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "frf/periods/health_finding.hpp"
 #include "tools/steps/problem.hpp"
 #include "tools/steps/problem_commands.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -36,10 +36,10 @@ ModelVerdict judge_model(const AdditiveModel& model, const std::vector<Finding>&
 
 /// The head for people: "verdict: trustworthy, ...", or the first problems with their commands.
 std::vector<std::string> verdict_lines(const ModelVerdict& verdict);
-nlohmann::ordered_json verdict_json(const ModelVerdict& verdict);
+Json verdict_json(const ModelVerdict& verdict);
 
 /// The comparison with held-back data, for people.
 std::vector<std::string> validation_lines(const Validation& validation);
-nlohmann::ordered_json validation_json(const Validation& validation);
+Json validation_json(const Validation& validation);
 
 }  // namespace stageid

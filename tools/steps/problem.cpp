@@ -17,8 +17,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kNoise = "noise";
 constexpr const char* kOneRealization = "one_realization";
 constexpr const char* kDelay = "delay";

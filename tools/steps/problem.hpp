@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -9,6 +8,7 @@
 #include "frf/periods/health_finding.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -57,8 +57,8 @@ std::vector<std::string> head_lines(std::string prefix, const std::vector<Proble
 void warn_of(const std::vector<Problem>& problems, const std::filesystem::path& file,
              const Console& console);
 /// The same for programs, "head": cause, what, remedy, command; and "reasons": the texts of all problems.
-nlohmann::ordered_json head_json(const std::vector<Problem>& problems);
+Json head_json(const std::vector<Problem>& problems);
 /// As stored in a model.
-nlohmann::ordered_json stored(const std::vector<Problem>& problems);
+Json stored(const std::vector<Problem>& problems);
 
 }  // namespace stageid

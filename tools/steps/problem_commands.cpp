@@ -17,7 +17,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Path = std::filesystem::path;
 
 constexpr double kMoreIterations = 4.0;  // times those of the fit

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "estimation/model/additive_model.hpp"
 #include "tools/steps/problem.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -23,7 +23,7 @@ struct ResultFiles {
 /// @param flags "options.flags" of a provenance: {"--band": "30 2000", ...}
 /// @param changed flags with values, instead of those of the same name
 std::string fit_command_line(const std::filesystem::path& frf, const std::filesystem::path& model,
-                             const nlohmann::ordered_json& flags, const std::string& changed = "");
+                             const Json& flags, const std::string& changed = "");
 
 /// Adds the commands for problems of a measured response or of a fit to it.
 /// @param files those that the provenance names are added if they are beside the others

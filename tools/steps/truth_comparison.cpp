@@ -14,8 +14,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// Largest relative frequency difference of two modes that are considered the same.
 constexpr double kFarthest = 0.05;
 
@@ -181,7 +179,7 @@ std::string truth_error_line(const TruthComparison& comparison) {
                      relative, comparison.normalized_error);
 }
 
-nlohmann::ordered_json truth_json(const TruthComparison& comparison) {
+Json truth_json(const TruthComparison& comparison) {
   Json modes = Json::array();
   for (const ModeRow& m : comparison.modes) {
     Json mode = {{"true_frequency_hz", m.truth->natural_frequency_hz},

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +8,7 @@
 #include "estimation/model/additive_model.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "hal/simulator/plant_spec.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -59,6 +59,6 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
 
 std::vector<std::string> truth_table(const TruthComparison& comparison);
 std::string truth_error_line(const TruthComparison& comparison);
-nlohmann::ordered_json truth_json(const TruthComparison& comparison);
+Json truth_json(const TruthComparison& comparison);
 
 }  // namespace stageid

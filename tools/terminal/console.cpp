@@ -80,11 +80,9 @@ void print_result(fmt::format_string<Values...> format, Values&&... values) {
 void Console::result(const std::string& line) const {
   if (!json) print_result("{}\n", shown(line));
 }
-void Console::result(const nlohmann::ordered_json& object) const {
+void Console::result(const Json& object) const {
   // Names from foreign files may contain anything: invalid UTF-8 is replaced instead of an exception.
-  if (json)
-    print_result("{}\n",
-                 object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (json) print_result("{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 void Console::message(const std::string& line) const {
   if (verbosity >= Verbosity::normal) tell("{}\n", shown(line));

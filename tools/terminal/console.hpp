@@ -5,13 +5,13 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "excitation/threads/team.hpp"
 #include "excitation/words/words.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -31,7 +31,7 @@ class Console {
   void result(const std::string& line) const;
   void result(const char* line) const { result(std::string(line)); }
   /// The whole result with --json; else nothing.
-  void result(const nlohmann::ordered_json& object) const;
+  void result(const Json& object) const;
   void message(const std::string& line) const;  ///< unless quiet
   void warning(const std::string& line) const;  ///< always
 

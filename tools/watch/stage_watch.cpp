@@ -39,7 +39,7 @@ double false_alarms_per_period(const std::string& text, double period_s) {
       text);
 }
 
-std::vector<EventField> fields_of(const nlohmann::ordered_json& event) {
+std::vector<EventField> fields_of(const Json& event) {
   std::vector<EventField> fields;
   for (const auto& [name, value] : event.items()) {
     if (name == "event") continue;
@@ -77,7 +77,7 @@ void StageWatch::write_events(EventLog& events) {
   events_ = &events;
   std::ifstream file(events.path());
   for (std::string line; std::getline(file, line);) {
-    auto event = nlohmann::ordered_json::parse(line, nullptr, false);
+    auto event = Json::parse(line, nullptr, false);
     if (!event.is_object()) continue;
     event.erase("time_utc");
     told_before_.insert(json_line(event));
@@ -132,7 +132,7 @@ void StageWatch::add(const WatchedPeriod& period) {
   if (tracks_) tracks_->add(period, tracked, *tracker_);
   if (tracked.change) tell(*tracked.change, period);
   if (!shown_) return;
-  nlohmann::ordered_json state = state_of(tracked);
+  Json state = state_of(tracked);
   const std::lock_guard lock(mutex_);
   state_ = std::move(state);
   if (!tracked.learning)
@@ -142,7 +142,7 @@ void StageWatch::add(const WatchedPeriod& period) {
 
 void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
   stage_changed_ = stage_changed_ || is_of_stage(change.what.kind);
-  nlohmann::ordered_json event = change_json(change, *tracker_, model_, period, period_s_);
+  Json event = change_json(change, *tracker_, model_, period, period_s_);
   console_.result("{:.6g} s: {}", period.time_s, event["text"].get<std::string>());
   if (events_ != nullptr && !told_before_.contains(json_line(event)))
     events_->write("change", fields_of(event));
@@ -150,15 +150,15 @@ void StageWatch::tell(const StageChange& change, const WatchedPeriod& period) {
   changes_.push_back(std::move(event));
 }
 
-nlohmann::ordered_json StageWatch::state_of(const TrackedPeriod& tracked) const {
-  nlohmann::ordered_json json = {{"periods", periods_},
-                                 {"skipped", source_ ? source_->skipped() : 0},
-                                 {"learning", tracked.learning},
-                                 {"statistic", tracked.largest_statistic},
-                                 {"threshold", tracked.threshold},
-                                 {"changes", changes_.size()}};
-  json["tracked"] = tracker_ ? tracked_json(*tracker_, model_) : nlohmann::ordered_json::array();
-  json["noise"] = nlohmann::ordered_json::array();
+Json StageWatch::state_of(const TrackedPeriod& tracked) const {
+  Json json = {{"periods", periods_},
+               {"skipped", source_ ? source_->skipped() : 0},
+               {"learning", tracked.learning},
+               {"statistic", tracked.largest_statistic},
+               {"threshold", tracked.threshold},
+               {"changes", changes_.size()}};
+  json["tracked"] = tracker_ ? tracked_json(*tracker_, model_) : Json::array();
+  json["noise"] = Json::array();
   for (Eigen::Index i = 0; i < model_.n_outputs(); ++i)
     json["noise"].push_back({{"channel", model_.outputs.name(i)},
                              {"name", describe({ChangeKind::noise, i, {}}, {}, model_)}});
@@ -167,7 +167,7 @@ nlohmann::ordered_json StageWatch::state_of(const TrackedPeriod& tracked) const 
   for (std::size_t p = 0; p < properties; ++p)
     json["tracked"][p]["statistic"] = tracked.statistics[p];
   for (std::size_t i = 0; i < json["noise"].size(); ++i) {
-    nlohmann::ordered_json& sensor = json["noise"][i];
+    Json& sensor = json["noise"][i];
     sensor["statistic"] = tracked.statistics[properties + i];
     if (tracked.noise_power.size() > 0) sensor["power"] = tracked.noise_power[i];
   }
@@ -214,17 +214,16 @@ std::string StageWatch::summary() const {
                          : "");
 }
 
-nlohmann::ordered_json StageWatch::json() const {
-  return {
-      {"model", options_.model.string()},
-      {"periods", periods_},
-      {"learning_periods", learned_},
-      {"skipped_periods", source_ ? source_->skipped() : 0},
-      {"changes", changes_},
-      {"tracked", tracker_ ? tracked_json(*tracker_, model_) : nlohmann::ordered_json::array()}};
+Json StageWatch::json() const {
+  return {{"model", options_.model.string()},
+          {"periods", periods_},
+          {"learning_periods", learned_},
+          {"skipped_periods", source_ ? source_->skipped() : 0},
+          {"changes", changes_},
+          {"tracked", tracker_ ? tracked_json(*tracker_, model_) : Json::array()}};
 }
 
-nlohmann::ordered_json StageWatch::state() const {
+Json StageWatch::state() const {
   const std::lock_guard lock(mutex_);
   return state_;
 }
@@ -232,10 +231,10 @@ nlohmann::ordered_json StageWatch::state() const {
 std::string StageWatch::history_json() const {
   std::unique_lock lock(mutex_);
   const TrackHistory history = history_;
-  const nlohmann::ordered_json changes = changes_;
+  const Json changes = changes_;
   lock.unlock();
   return fmt::format(R"({{"history":{},"changes":{}}})", history.json(),
-                     changes.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
+                     changes.dump(-1, ' ', true, SortedJson::error_handler_t::replace));
 }
 
 }  // namespace stageid

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -15,6 +14,7 @@
 #include "estimation/model/additive_model.hpp"
 #include "estimation/tracking/model_tracker.hpp"
 #include "tools/terminal/console.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/watch/track_file.hpp"
 #include "tools/watch/track_history.hpp"
 #include "tools/watch/watch_source.hpp"
@@ -57,12 +57,12 @@ class StageWatch {
   /// Changes of all properties as a table; then one line with the counts.
   std::vector<std::string> lines() const;
   std::string summary() const;
-  nlohmann::ordered_json json() const;
+  Json json() const;
 
   /// Keeps state() and history_json() up to date. To be called before run().
   void show() noexcept { shown_ = true; }
   /// For a page that shows the watch, from any thread: the present values; and those since the start, with all changes.
-  nlohmann::ordered_json state() const;
+  Json state() const;
   std::string history_json() const;
 
  private:
@@ -71,7 +71,7 @@ class StageWatch {
   void open(const std::filesystem::path& log, bool follow);
   void add(const WatchedPeriod& period);
   void tell(const StageChange& change, const WatchedPeriod& period);
-  nlohmann::ordered_json state_of(const TrackedPeriod& tracked) const;
+  Json state_of(const TrackedPeriod& tracked) const;
 
   WatchOptions options_;
   const Console& console_;
@@ -89,9 +89,9 @@ class StageWatch {
   bool stage_changed_ = false;
   bool shown_ = false;
   mutable std::mutex mutex_;  // of all below; held for a moment only
-  nlohmann::ordered_json state_;
+  Json state_;
   TrackHistory history_;
-  nlohmann::ordered_json changes_ = nlohmann::ordered_json::array();
+  Json changes_ = Json::array();
 };
 
 }  // namespace stageid

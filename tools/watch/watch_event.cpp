@@ -88,12 +88,11 @@ std::string change_text(const StageChange& change, const ModelTracker& tracker,
 
 }  // namespace
 
-nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker& tracker,
-                                   const AdditiveModel& model, const WatchedPeriod& period,
-                                   double period_s) {
+Json change_json(const StageChange& change, const ModelTracker& tracker, const AdditiveModel& model,
+                 const WatchedPeriod& period, double period_s) {
   const TrackedParameter* parameter = parameter_of(change.what, tracker);
   const double since_s = period.time_s - (change.periods + 1) * period_s;
-  nlohmann::ordered_json json = {
+  Json json = {
       {"event", "change"},
       {"kind", parameter != nullptr ? to_string(parameter->kind) : to_string(change.what.kind)},
       {"name", describe(change.what, tracker.parameters(), model)},
@@ -122,9 +121,9 @@ nlohmann::ordered_json change_json(const StageChange& change, const ModelTracker
   return json;
 }
 
-nlohmann::ordered_json tracked_json(const ModelTracker& tracker, const AdditiveModel& model) {
+Json tracked_json(const ModelTracker& tracker, const AdditiveModel& model) {
   const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  Json json = Json::array();
   for (Eigen::Index p = 0; p < deviation.size(); ++p) {
     const TrackedParameter& parameter = tracker.parameters()[p];
     json.push_back({{"kind", to_string(parameter.kind)},

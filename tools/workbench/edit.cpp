@@ -13,21 +13,20 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::json;
 using Modes = ModesRequest::Kind;
 
 constexpr double kSameMode = 1e-3;  // relative distance of a removed mode from the nearest one
 constexpr std::size_t kMostModes = 1000;
 constexpr std::size_t kLongestWord = 64;
 
-double require_number(const Json& action, const char* key, double low, double high) {
+double require_number(const SortedJson& action, const char* key, double low, double high) {
   const std::optional<double> value = number_in(action, key);
   if (!value || !(*value > low && *value < high))
     fail_request("{}: expected a number above {} and below {}", key, low, high);
   return *value;
 }
 
-Edit add_mode(const Json& action, FitRequest request) {
+Edit add_mode(const SortedJson& action, FitRequest request) {
   const ModeCandidate mode = rounded_mode(require_number(action, "frequency_hz", 0.0, 1e9),
                                           action.contains("damping_ratio")
                                               ? require_number(action, "damping_ratio", 0.0, 1.0)
@@ -40,7 +39,7 @@ Edit add_mode(const Json& action, FitRequest request) {
   return {std::move(request), fmt::format("added {:.6g} Hz", mode.frequency_hz)};
 }
 
-Edit remove_mode(const Json& action, FitRequest request) {
+Edit remove_mode(const SortedJson& action, FitRequest request) {
   const double frequency_hz = require_number(action, "frequency_hz", 0.0, 1e9);
   std::vector<ModeCandidate>& modes = request.modes.given;
   const auto distance = [&](const ModeCandidate& mode) {
@@ -57,7 +56,7 @@ Edit remove_mode(const Json& action, FitRequest request) {
   return {std::move(request), what};
 }
 
-Edit set_band(const Json& action, FitRequest request) {
+Edit set_band(const SortedJson& action, FitRequest request) {
   if (!number_in(action, "low_hz") && !number_in(action, "high_hz")) {
     request.band_hz.reset();
     return {std::move(request), "all lines"};
@@ -83,14 +82,14 @@ constexpr std::pair<const char*, std::string FitWords::*> kControls[] = {
     {"rigid_body", &FitWords::rigid_body},     {"direct_term", &FitWords::direct_term}};
 
 /// A count or a search instead of the given modes; not a file.
-std::string modes_word(const Json& action) {
+std::string modes_word(const SortedJson& action) {
   std::string word = text_in(action, "modes");
   const bool number = word.find_first_not_of("0123456789") == std::string::npos && word.size() <= 4;
   if (word != "auto" && !number) fail_request("modes: expected auto or a number of modes");
   return word;
 }
 
-Edit refit(const Json& action, FitRequest request) {
+Edit refit(const SortedJson& action, FitRequest request) {
   FitWords words = words_of(request);
   std::string what;
   for (const auto& [key, member] : kControls) {
@@ -126,7 +125,7 @@ Edit refit(const Json& action, FitRequest request) {
 
 }  // namespace
 
-Edit edited(const Json& action, FitRequest request) {
+Edit edited(const SortedJson& action, FitRequest request) {
   const std::string kind = text_in(action, "kind");
   if (kind == "add") return add_mode(action, std::move(request));
   if (kind == "remove") return remove_mode(action, std::move(request));
@@ -135,9 +134,9 @@ Edit edited(const Json& action, FitRequest request) {
   fail_request("unknown action");
 }
 
-Json controls_json(const FitRequest& request) {
+SortedJson controls_json(const FitRequest& request) {
   const FitWords words = words_of(request);
-  Json json = {{"band_hz", nullptr}};
+  SortedJson json = {{"band_hz", nullptr}};
   if (request.band_hz) json["band_hz"] = *request.band_hz;
   for (const auto& [key, member] : kControls) json[key] = words.*member;
   return json;

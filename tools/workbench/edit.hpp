@@ -1,9 +1,9 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "estimation/request/fit_request.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -20,9 +20,9 @@ struct Edit {
 ///   of the flags; missing: unchanged, empty: the default. "modes": "auto" or a number.
 /// Nothing in an action names a file.
 /// @throws std::invalid_argument what is wrong with it, for the user
-Edit edited(const nlohmann::json& action, FitRequest request);
+Edit edited(const SortedJson& action, FitRequest request);
 
 /// The request in the words of the controls, for the page: the keys of "refit", and "band_hz".
-nlohmann::json controls_json(const FitRequest& request);
+SortedJson controls_json(const FitRequest& request);
 
 }  // namespace stageid

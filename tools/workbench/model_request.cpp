@@ -14,10 +14,8 @@
 namespace stageid {
 namespace {
 
-using OrderedJson = nlohmann::ordered_json;
-
 /// Two numbers separated by a space, as in the flag; empty if they are missing.
-std::optional<std::array<double, 2>> band_in(const OrderedJson& flags) {
+std::optional<std::array<double, 2>> band_in(const Json& flags) {
   std::istringstream text(text_in(flags, "--band"));
   std::array<double, 2> band{};
   if (text >> band[0] >> band[1]) return band;
@@ -30,7 +28,7 @@ bool is_constant(const Eigen::VectorXd& delays) {
 
 }  // namespace
 
-FitWords words_of_flags(const OrderedJson& flags) {
+FitWords words_of_flags(const Json& flags) {
   FitWords words;
   const auto take = [&](const char* flag, std::string& word) {
     if (std::string text = text_in(flags, flag); !text.empty()) word = std::move(text);
@@ -47,16 +45,15 @@ FitWords words_of_flags(const OrderedJson& flags) {
   take("--method", words.method);
   take("--direct-term", words.direct_term);
   if (const auto submodels = flags.find("--submodel"); submodels != flags.end())
-    for (const OrderedJson& text : *submodels)
+    for (const Json& text : *submodels)
       if (text.is_string()) words.submodels.push_back(text.get<std::string>());
   return words;
 }
 
 FitRequest request_of(const AdditiveModel& model) {
-  const auto provenance = parse_json_object<OrderedJson>(model.provenance_json);
-  const OrderedJson options = provenance.value("options", OrderedJson::object());
-  const OrderedJson flags =
-      options.is_object() ? options.value("flags", OrderedJson::object()) : OrderedJson::object();
+  const auto provenance = parse_json_object<Json>(model.provenance_json);
+  const Json options = provenance.value("options", Json::object());
+  const Json flags = options.is_object() ? options.value("flags", Json::object()) : Json::object();
   FitRequest request;
   if (!flags.is_object()) return request;
   parse_fit_words(words_of_flags(flags), request);

@@ -1,15 +1,14 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "estimation/request/fit_request.hpp"
 #include "tools/fit/fit_words.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
 /// The words of the flags of a request, as flags_of() writes them. They may come from elsewhere, so no word may name a
 /// file to read now.
-FitWords words_of_flags(const nlohmann::ordered_json& flags);
+FitWords words_of_flags(const Json& flags);
 
 /// The request of a model as its provenance tells; the default if it tells nothing.
 /// @throws std::invalid_argument, FileError for flags that are not those of a fit

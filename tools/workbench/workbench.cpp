@@ -19,7 +19,6 @@ namespace stageid {
 namespace {
 
 using namespace std::chrono_literals;
-using Json = nlohmann::json;
 
 constexpr auto kBetweenCosts = 100ms;
 constexpr auto kImprovement = 1s;  // of the second preview
@@ -122,7 +121,7 @@ void Workbench::end() {
 
 std::string Workbench::command() const {
   const FitState& state = history_.current();
-  nlohmann::ordered_json flags = flags_of(state.request);
+  Json flags = flags_of(state.request);
   if (state.request.weighting == Weighting::user)
     flags["--weighting"] = state.request.weight_file.string();
   return fit_command_line(input_.frf, state.saved.empty() ? "model.json" : state.saved, flags);
@@ -135,28 +134,29 @@ std::string Workbench::state_json() const {
 
 std::string Workbench::state_text() const {
   const FitState& current = history_.current();
-  Json json = {{"state", ending_               ? "ended"
-                         : current.needs_fit() ? "fitting"
-                                               : "ready"},
-               {"index", history_.index()},
-               {"states", Json::array()},
-               {"command", history_.index() == 0 && !current.model ? "" : command()},
-               {"cost", current.cost},
-               {"message", message_of(current)},
-               {"controls", controls_json(current.request)},
-               {"writable", options_.write},
-               {"directory", options_.directory.string()},
-               {"compared", Json::array()},
-               {"chosen", chosen_ ? Json(*chosen_) : Json()},
-               {"edition", edition_}};
+  SortedJson json = {{"state", ending_               ? "ended"
+                               : current.needs_fit() ? "fitting"
+                                                     : "ready"},
+                     {"index", history_.index()},
+                     {"states", SortedJson::array()},
+                     {"command", history_.index() == 0 && !current.model ? "" : command()},
+                     {"cost", current.cost},
+                     {"message", message_of(current)},
+                     {"controls", controls_json(current.request)},
+                     {"writable", options_.write},
+                     {"directory", options_.directory.string()},
+                     {"compared", SortedJson::array()},
+                     {"chosen", or_null(chosen_)},
+                     {"edition", edition_}};
   for (const FitState& state : history_.states())
-    json["states"].push_back({{"what", state.what},
-                              {"stage", to_string(state.stage)},
-                              {"modes", modes_in(state)},
-                              {"cost", state.model ? Json(state.model->fit.cost) : Json()},
-                              {"saved", state.saved.filename().string()}});
+    json["states"].push_back(
+        {{"what", state.what},
+         {"stage", to_string(state.stage)},
+         {"modes", modes_in(state)},
+         {"cost", state.model ? SortedJson(state.model->fit.cost) : SortedJson()},
+         {"saved", state.saved.filename().string()}});
   for (const auto& other : compared_) json["compared"].push_back(other->result.title);
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+  return json.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
 }
 
 /// Publishes the current state with its results, unless it has none yet.

@@ -8,7 +8,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +15,7 @@
 
 #include "tools/config/stage_config.hpp"
 #include "tools/dashboard/dashboard_server.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/workbench/edit.hpp"
 #include "tools/workbench/fit_history.hpp"
 #include "tools/workbench/workbench_page.hpp"
@@ -66,10 +66,10 @@ class Workbench {
     FitState state;
   };
 
-  ActionReply act_locked(const nlohmann::json& action);
+  ActionReply act_locked(const SortedJson& action);
   ActionReply save(const std::string& name);
   ActionReply keep();
-  ActionReply choose(const nlohmann::json& action);
+  ActionReply choose(const SortedJson& action);
   FitRequest editable() const;
   FitSetup setup_of(FitRequest request) const;
   FitState begun(Edit edit) const;

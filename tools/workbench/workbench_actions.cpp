@@ -11,6 +11,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/workbench/edit.hpp"
 #include "tools/workbench/model_request.hpp"
 #include "tools/workbench/warm_start.hpp"
@@ -29,7 +30,7 @@ bool is_plain_name(const std::string& name) {
 }  // namespace
 
 ActionReply Workbench::act(const std::string& body) {
-  const auto action = parse_json<nlohmann::json>(body);
+  const auto action = parse_json<Json>(body);
   if (!action.is_object()) return {400, "expected a JSON object"};
   const std::lock_guard lock(mutex_);
   try {
@@ -41,7 +42,7 @@ ActionReply Workbench::act(const std::string& body) {
   }
 }
 
-ActionReply Workbench::act_locked(const nlohmann::json& action) {
+ActionReply Workbench::act_locked(const SortedJson& action) {
   const std::string kind = text_in(action, "kind");
   if (kind == "save") return save(text_in(action, "name"));
   if (kind == "keep") return keep();
@@ -119,7 +120,7 @@ ActionReply Workbench::keep() {
   return {200, title};
 }
 
-ActionReply Workbench::choose(const nlohmann::json& action) {
+ActionReply Workbench::choose(const SortedJson& action) {
   const double index = number_in(action, "index").value_or(-1.0);
   if (index >= static_cast<double>(compared_.size()))
     return {409, "compare: there is no such result"};

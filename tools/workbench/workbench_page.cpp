@@ -9,12 +9,11 @@
 #include "tools/report/report_encoding.hpp"
 #include "tools/report/report_json.hpp"
 #include "tools/steps/fit_step.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/workbench/fit_details.hpp"
 
 namespace stageid {
 namespace {
-
-using Json = nlohmann::json;
 
 ReportData without_model(ReportData data) {
   data.model.reset();
@@ -41,13 +40,14 @@ std::string encoded(const Eigen::MatrixXcd& values, int order) {
   return values.size() == 0 ? "" : report::encode_complex_block16(values, {nullptr, order}).text;
 }
 
-void add_array(const char* name, const std::string& text, const Json& about, Json& json) {
+void add_array(const char* name, const std::string& text, const SortedJson& about,
+               SortedJson& json) {
   if (text.empty()) return;
   json["arrays"][name] = about;
   json["blocks"][name] = text;
 }
 
-void add_complex(const char* name, const std::string& text, int order, Json& json) {
+void add_complex(const char* name, const std::string& text, int order, SortedJson& json) {
   add_array(name, text, {{"type", "c40"}, {"order", order}}, json);
 }
 
@@ -75,10 +75,10 @@ std::string WorkbenchPage::results(const FitState& state,
                                    std::optional<std::size_t> chosen) const {
   ReportData data = light_;
   data.files.model = state.saved;
-  Json more = {{"stage", to_string(state.stage)},
-               {"arrays", Json::object()},
-               {"blocks", Json::object()},
-               {"trends", Json::array()}};
+  SortedJson more = {{"stage", to_string(state.stage)},
+                     {"arrays", SortedJson::object()},
+                     {"blocks", SortedJson::object()},
+                     {"trends", SortedJson::array()}};
   if (state.model) {
     data.model = *state.model;
     if (data_.validation_frf && state.stage == FitStage::refined)
@@ -102,7 +102,7 @@ std::string WorkbenchPage::results(const FitState& state,
     add_complex("other_response", all[*chosen]->response, 0, more);
     add_complex("other_model", all[*chosen]->model_response, kSmooth, more);
   }
-  std::string text = more.dump(-1, ' ', true, Json::error_handler_t::replace);
+  std::string text = more.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
   text.back() = ',';
   return text + "\"content\":" + report::page_content(data).json + "}";
 }

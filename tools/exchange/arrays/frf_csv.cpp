@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <type_traits>
 
@@ -12,6 +11,7 @@
 #include "acquisition/files/version.hpp"
 #include "tools/exchange/arrays/csv_table.hpp"
 #include "tools/exchange/arrays/frf_arrays.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/text_lines.hpp"
 
 namespace stageid {
@@ -64,7 +64,7 @@ void for_each_property(Frf& frf, Visit visit) {
 }
 
 std::string description_of(const FrfEstimate& frf) {
-  nlohmann::ordered_json json;
+  Json json;
   json["format"] = "stageid-frf";
   for_each_property(frf, [&json](const char* key, const auto& value) {
     if constexpr (std::is_enum_v<std::decay_t<decltype(value)>>)
@@ -99,8 +99,8 @@ bool channels_from_head(const ArrayList& arrays, FrfEstimate& frf) {
   return plain && frf.outputs.size() > 0;
 }
 
-/// @throws nlohmann::json::exception for other types
-void read_description(const nlohmann::json& json, FrfEstimate& frf) {
+/// @throws SortedJson::exception for other types
+void read_description(const SortedJson& json, FrfEstimate& frf) {
   for_each_property(frf, [&json](const char* key, auto& value) {
     using Value = std::decay_t<decltype(value)>;
     if constexpr (std::is_enum_v<Value>)
@@ -132,8 +132,8 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
     return;
   }
   try {
-    read_description(parse_json<nlohmann::json>(text), frf);
-  } catch (const nlohmann::json::exception&) {
+    read_description(parse_json<Json>(text), frf);
+  } catch (const SortedJson::exception&) {
     arrays.fail("",
                 "its line '# {{\"format\":...}}' is damaged. Remove that line, or export the "
                 "response again");

@@ -10,8 +10,6 @@
 namespace stageid {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// "400", "8 to 12".
 std::string range_text(const std::vector<std::uint64_t>& values) {
   const auto [low, high] = std::ranges::minmax_element(values);

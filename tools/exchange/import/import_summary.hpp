@@ -2,20 +2,20 @@
 
 #include <Eigen/Core>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "acquisition/record/log_info.hpp"
 #include "frf/response/frf_estimate.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
 /// Result of an import, for people (lines) and for --json (an object).
 struct ImportSummary {
   std::vector<std::string> lines;
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  Json json = Json::object();
 };
 
 /// Collects the figures of a log run by run.

@@ -169,8 +169,8 @@ std::vector<std::string> correlation_lines(const ModeCorrelation& correlation) {
   return lines;
 }
 
-nlohmann::ordered_json correlation_json(const ModeCorrelation& correlation) {
-  nlohmann::ordered_json pairs = nlohmann::ordered_json::array();
+Json correlation_json(const ModeCorrelation& correlation) {
+  Json pairs = Json::array();
   for (const ModePair& pair : correlation.pairs) {
     const ModeShape& own = correlation.own[pair.first];
     const ModeShape& other = correlation.other[pair.second];

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "estimation/modal/modal_assurance.hpp"
 #include "estimation/model/cmif.hpp"
 #include "tools/exchange/uff/uff_file.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -36,6 +36,6 @@ std::vector<std::string> correlation_lines(const ModeCorrelation& correlation);
 
 /// {"outputs", "pairs": [{"frequency_hz", "other_frequency_hz", "damping_ratio", "other_damping_ratio", "mac"}],
 ///  "own_alone_hz", "other_alone_hz"}
-nlohmann::ordered_json correlation_json(const ModeCorrelation& correlation);
+Json correlation_json(const ModeCorrelation& correlation);
 
 }  // namespace stageid

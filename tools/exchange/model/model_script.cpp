@@ -5,11 +5,11 @@
 
 #include <cctype>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "acquisition/files/version.hpp"
 #include "estimation/modal/sampled_state_space.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/terminal/text_template.hpp"
 
 namespace stageid {
@@ -33,8 +33,7 @@ class Syntax {
   }
 
   std::string text(const std::string& value) const {
-    if (python_)
-      return nlohmann::json(value).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+    if (python_) return SortedJson(value).dump(-1, ' ', true, SortedJson::error_handler_t::replace);
     std::string quoted = "'";
     bool joined = false;  // a line break would end the text, and begin a command
     for (const char c : value) {
