@@ -335,8 +335,8 @@ class Experiment {
                     progress_.experiment.load(std::memory_order_relaxed)};
     progress.runs_done = progress_.runs_done.load(std::memory_order_relaxed);
     progress.runs_total = static_cast<int>(runs_.size());
-    progress.health = progress_.health();
-    if (wall_) progress.timing = progress_.timing();
+    progress.health = progress_.health.load();
+    if (wall_) progress.timing = progress_.timing.load();
     const int before = std::max(0, progress_.runs_begun.load(std::memory_order_relaxed) - 1);
     const double rate_hz = plan_.grid().sample_rate_hz();
     const double run_s = static_cast<double>(plan_.samples_per_run()) / rate_hz;

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <atomic>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "acquisition/record/log_info.hpp"
@@ -9,35 +11,40 @@
 
 namespace stageid {
 
-/// Counts of the current run, shared by the loop with the reporting thread through relaxed atomics. Each number is
-/// exact, but they may be some cycles apart.
-class SharedProgress {
+/// A value that one thread replaces while others read it, without a lock. Each of its words is exact, but they may be
+/// of different replacements.
+template <typename Value>
+class SharedWords {
  public:
-  /// Publishes the timing too for a run on the wall clock.
-  void publish(const RunHealth& health, const RunTiming& timing, bool wall) noexcept {
-    for (std::size_t i = 0; i < kCounts.size(); ++i) store(i, health.*kCounts[i]);
-    store(4, static_cast<std::uint64_t>(health.largest_lateness_ns));
-    if (!wall) return;
-    store(5, timing.skipped);
-    for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin) {
-      store(kFirstBin + bin, timing.execution.count(bin));
-      store(kFirstBin + TimingHistogram::kBins + bin, timing.lateness.count(bin));
-    }
+  void store(const Value& value) noexcept {
+    const auto words = std::bit_cast<Words>(value);
+    for (std::size_t i = 0; i < words.size(); ++i)
+      words_[i].store(words[i], std::memory_order_relaxed);
   }
-  RunHealth health() const noexcept {
-    RunHealth health;
-    for (std::size_t i = 0; i < kCounts.size(); ++i) health.*kCounts[i] = load(i);
-    health.largest_lateness_ns = static_cast<std::int64_t>(load(4));
-    return health;
+  Value load() const noexcept {
+    Words words;
+    for (std::size_t i = 0; i < words.size(); ++i)
+      words[i] = words_[i].load(std::memory_order_relaxed);
+    return std::bit_cast<Value>(words);
   }
-  RunTiming timing() const {
-    RunTiming timing;
-    timing.skipped = load(5);
-    for (std::size_t bin = 0; bin < TimingHistogram::kBins; ++bin) {
-      timing.execution.add_bin(bin, load(kFirstBin + bin));
-      timing.lateness.add_bin(bin, load(kFirstBin + TimingHistogram::kBins + bin));
-    }
-    return timing;
+
+ private:
+  using Words = std::array<std::uint64_t, sizeof(Value) / sizeof(std::uint64_t)>;
+  std::array<std::atomic<std::uint64_t>, std::tuple_size_v<Words>> words_{};
+};
+
+/// The state of the current run, for the reporting thread.
+struct SharedProgress {
+  SharedWords<RunHealth> health;
+  SharedWords<RunTiming> timing;  ///< on the wall clock
+  std::atomic<int> realization = 0;
+  std::atomic<int> experiment = 0;
+  std::atomic<int> runs_begun = 0;
+  std::atomic<int> runs_done = 0;
+
+  void publish(const RunHealth& of_health, const RunTiming& of_timing, bool wall) noexcept {
+    health.store(of_health);
+    if (wall) timing.store(of_timing);
   }
   void begin(RunId run, bool wall) noexcept {
     publish({}, {}, wall);
@@ -45,22 +52,6 @@ class SharedProgress {
     realization.store(run.realization, std::memory_order_relaxed);
     experiment.store(run.experiment, std::memory_order_relaxed);
   }
-  std::atomic<int> realization = 0;
-  std::atomic<int> experiment = 0;
-  std::atomic<int> runs_begun = 0;
-  std::atomic<int> runs_done = 0;
-
- private:
-  static constexpr std::array kCounts = {&RunHealth::cycles, &RunHealth::late, &RunHealth::missing,
-                                         &RunHealth::marked};
-  static constexpr std::size_t kFirstBin = 6;
-  void store(std::size_t i, std::uint64_t value) noexcept {
-    counts_[i].store(value, std::memory_order_relaxed);
-  }
-  std::uint64_t load(std::size_t i) const noexcept {
-    return counts_[i].load(std::memory_order_relaxed);
-  }
-  std::array<std::atomic<std::uint64_t>, kFirstBin + 2 * TimingHistogram::kBins> counts_{};
 };
 
 }  // namespace stageid
