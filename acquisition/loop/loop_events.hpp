@@ -24,26 +24,22 @@ struct LoopEvent {
 class LoopEvents {
  public:
   void push(const LoopEvent& event) noexcept {
-    double* const row = ring_.reserve();
-    if (row == nullptr) return;
-    row[0] = event.run;
-    row[1] = static_cast<double>(event.cycle);
-    row[2] = static_cast<double>(event.kind);
-    row[3] = event.code;
+    LoopEvent* const slot = ring_.reserve();
+    if (slot == nullptr) return;
+    *slot = event;
     ring_.commit();
   }
 
   std::optional<LoopEvent> pop() noexcept {
-    const std::span<const double> row = ring_.front(1);
-    if (row.empty()) return std::nullopt;
-    const LoopEvent event{static_cast<int>(row[0]), static_cast<std::uint64_t>(row[1]),
-                          static_cast<LoopEvent::Kind>(row[2]), static_cast<std::uint8_t>(row[3])};
+    const std::span<const LoopEvent> oldest = ring_.front(1);
+    if (oldest.empty()) return std::nullopt;
+    const LoopEvent event = oldest.front();
     ring_.pop(1);
     return event;
   }
 
  private:
-  SampleRing ring_{4, 256};
+  RowRing<LoopEvent> ring_{1, 256};
 };
 
 }  // namespace stageid

@@ -12,20 +12,21 @@
 
 namespace stageid {
 
-/// A lock-free ring of rows of fixed size between one producer (the loop) and one consumer (the log thread).
+/// A lock-free ring of rows of fixed size between one producer (the loop) and one consumer (another thread).
 /// The constructor allocates and touches all memory.
 ///
 /// Each side keeps a copy of the other's counter and reads the shared one only if the copy indicates full or
 /// empty. The cache line therefore moves between cores once per batch instead of once per row.
-class SampleRing {
+template <typename Word>
+class RowRing {
  public:
   /// `capacity_rows` is rounded up to a power of two.
   /// @throws std::invalid_argument if either is zero.
-  SampleRing(std::size_t row_words, std::size_t capacity_rows)
+  RowRing(std::size_t row_words, std::size_t capacity_rows)
       : row_words_(row_words), capacity_(std::bit_ceil(capacity_rows)) {
     require(row_words > 0 && capacity_rows > 0,
             "sample ring: rows and capacity must be at least 1");
-    words_.assign(row_words_ * capacity_, 0.0);
+    words_.assign(row_words_ * capacity_, {});
   }
 
   std::size_t row_words() const noexcept { return row_words_; }
@@ -34,7 +35,7 @@ class SampleRing {
   // Producer -------------------------------------------------------------------------------
 
   /// The next row to fill, or nullptr if the ring is full. The same row until commit().
-  double* reserve() noexcept {
+  Word* reserve() noexcept {
     const std::uint64_t pushed = pushed_.load(std::memory_order_relaxed);
     if (pushed - popped_seen_ >= capacity_) {
       popped_seen_ = popped_.load(std::memory_order_acquire);
@@ -55,7 +56,7 @@ class SampleRing {
 
   /// Up to `rows` of the oldest rows, contiguous in memory, valid until pop(). Fewer are returned where the ring
   /// wraps around.
-  std::span<const double> front(std::size_t rows) noexcept {
+  std::span<const Word> front(std::size_t rows) noexcept {
     const std::uint64_t popped = popped_.load(std::memory_order_relaxed);
     if (pushed_seen_ - popped < rows) pushed_seen_ = pushed_.load(std::memory_order_acquire);
     const std::size_t first = popped & (capacity_ - 1);
@@ -77,11 +78,14 @@ class SampleRing {
 
   std::size_t row_words_;
   std::size_t capacity_;
-  std::vector<double> words_;
+  std::vector<Word> words_;
   alignas(kCacheLine) std::atomic<std::uint64_t> pushed_ = 0;
   std::uint64_t popped_seen_ = 0;  // the producer's copy
   alignas(kCacheLine) std::atomic<std::uint64_t> popped_ = 0;
   std::uint64_t pushed_seen_ = 0;  // the consumer's copy
 };
+
+/// Rows of a log, from the loop to the log thread.
+using SampleRing = RowRing<double>;
 
 }  // namespace stageid
