@@ -72,15 +72,6 @@ void set_limits(std::size_t file_bytes) {
   ::_exit(sent ? 0 : 1);
 }
 
-/// The same error again: FormatError puts the file in front.
-FormatError repeated(const std::filesystem::path& file, const std::string& what) {
-  const std::string name = file.string();
-  if (what.starts_with(name + ": ")) return {file, "", what.substr(name.size() + 2)};
-  const std::size_t end = what.find(": ", name.size());
-  if (!what.starts_with(name + ":") || end == std::string::npos) return {file, "", what};
-  return {file, what.substr(name.size() + 1, end - name.size() - 1), what.substr(end + 2)};
-}
-
 }  // namespace
 
 std::string in_child(const std::filesystem::path& file, const std::function<std::string()>& work) {
@@ -116,7 +107,7 @@ std::string in_child(const std::filesystem::path& file, const std::function<std:
   answer.erase(0, 1);
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
     if (kind == kDone) return answer;
-    if (kind == kWrongFormat) throw repeated(file, answer);
+    if (kind == kWrongFormat) throw FormatError(answer);
     if (kind == kNoFile) throw FileError(answer);
   }
   if (kind == kNoMemory)

@@ -22,6 +22,8 @@ class FormatError : public std::runtime_error {
               const std::string& wrong_and_remedy)
       : std::runtime_error(file.string() + (place.empty() ? "" : ":" + place) + ": " +
                            wrong_and_remedy) {}
+  /// With the what() of another one.
+  explicit FormatError(const std::string& what) : std::runtime_error(what) {}
 };
 
 }  // namespace stageid
