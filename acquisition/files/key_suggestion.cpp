@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string_view>
 
 namespace stageid {
@@ -39,13 +39,6 @@ std::string_view stem(std::string_view key) {
   return key;
 }
 
-/// Whether two words differ only in case.
-bool equal_but_for_case(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
-}
-
 /// The only word that starts with `beginning`, of three letters or more: "conv" for "convert".
 std::string whole_word(const std::string& beginning, const std::vector<std::string>& allowed) {
   const auto begins = [&](const std::string& candidate) {
@@ -62,7 +55,7 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
   std::size_t least = std::max<std::size_t>(1, std::min<std::size_t>(3, word.size() / 3)) + 1;
   if (word.size() > 64) return best;
   const auto same = std::find_if(allowed.begin(), allowed.end(), [&](const std::string& candidate) {
-    return equal_but_for_case(word, candidate);
+    return ::strcasecmp(word.c_str(), candidate.c_str()) == 0;
   });
   if (same != allowed.end()) return *same;
   if (std::string whole = whole_word(word, allowed); !whole.empty()) return whole;
