@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unsupported/Eigen/KroneckerProduct>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/require.hpp"
@@ -33,11 +34,7 @@ Eigen::MatrixXd of_parity(const Eigen::MatrixXd& full, int parity) {
 }
 
 Eigen::MatrixXd kronecker(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd product(a.rows() * b.rows(), a.cols() * b.cols());
-  for (Eigen::Index i = 0; i < a.rows(); ++i)
-    for (Eigen::Index j = 0; j < a.cols(); ++j)
-      product.block(i * b.rows(), j * b.cols(), b.rows(), b.cols()) = a(i, j) * b;
-  return product;
+  return Eigen::kroneckerProduct(a, b);
 }
 
 Eigen::VectorXd polynomials(double t, int parity) {
