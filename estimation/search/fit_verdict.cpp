@@ -46,7 +46,7 @@ double parameters_of(const Submodel& s) {
 
 bool is_worth_nothing(const FrfEstimate& frf, const FitResult& fit, std::size_t i) {
   return i < fit.removal_cost.size() &&
-         fit.removal_cost[i] < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i]));
+         fit.removal_cost[i] < ModeWorth(frf).price(fit, parameters_of(fit.model.submodels[i]));
 }
 
 bool is_unsupported(ModeVerdict verdict) {
@@ -199,7 +199,7 @@ std::vector<AlikeModes> alike_modes(const FrfEstimate& frf, const FitOptions& op
     const double rise =
         2.0 * static_cast<double>(frf.lines()) * (single.model.fit.cost - fit.model.fit.cost);
     if (single.status() != FitStatus::singular &&
-        rise < price_of_mode(frf, fit, parameters_of(fit.model.submodels[i])))
+        rise < ModeWorth(frf).price(fit, parameters_of(fit.model.submodels[i])))
       out.push_back({i, j, single.model.fit.cost});
   }
   return out;

@@ -54,19 +54,6 @@ double in_squares(double squares, double cost, double data) {
 
 }  // namespace
 
-double information_criterion(const FrfEstimate& frf, const FitResult& fit) {
-  const double data = frf.independent_numbers();
-  return data * std::log(std::max(fit.model.fit.cost, 1e-300)) +
-         cost_of_parameters(fit.model, static_cast<double>(frf.response.rows()),
-                            static_cast<double>(fit.parameters), data);
-}
-
-double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters) {
-  const auto lines = static_cast<double>(frf.lines());
-  const double data = frf.independent_numbers();
-  return in_squares(2.0 * lines * fit.model.fit.cost, cost_of_mode(parameters, data, lines), data);
-}
-
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
                                  const Eigen::MatrixXd& weights, const Team& team) {
   return sum_over_tiles(team, weights.rows(), weights.cols(), [&](IndexRange tile) {
@@ -78,13 +65,18 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
   });
 }
 
-ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
-                     const Eigen::MatrixXd& weights)
+ModeWorth::ModeWorth(const FrfEstimate& frf)
     : lines_(static_cast<double>(frf.lines())),
       channels_(static_cast<double>(frf.response.rows())),
       data_(frf.independent_numbers()),
-      parameters_of_mode_(2.0 + (structure.general_damping ? 2.0 : 1.0) * channels_),
-      rounding_(kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum()) {}
+      parameters_of_mode_(2.0 + channels_) {}
+
+ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
+                     const Eigen::MatrixXd& weights)
+    : ModeWorth(frf) {
+  if (structure.general_damping) parameters_of_mode_ += channels_;
+  rounding_ = kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum();
+}
 
 double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
@@ -115,8 +107,8 @@ double ModeWorth::cost_at(double criterion, const AdditiveModel& model,
   return std::exp((criterion - penalty(model, parameters)) / data_) / (2.0 * lines_);
 }
 
-double ModeWorth::price(const FitResult& fit) const {
-  return in_squares(squares(fit), cost_of_one(), data_);
+double ModeWorth::price(const FitResult& fit, double parameters) const {
+  return in_squares(squares(fit), cost_of_mode(parameters, data_, lines_), data_);
 }
 
 double ModeWorth::most_by_chance(const FitResult& fit) const {

@@ -10,13 +10,6 @@ namespace stageid {
 /// Of the weighted power of the data (-160 dB): below, it is rounding, since no measurement is more precise.
 inline constexpr double kRoundingPower = 1e-16;
 
-/// BIC of a fit with unknown scale of the variances, in units of 2 ln(likelihood); smaller is better. For models with
-/// different parameters. ModeWorth also includes the cost of searching modes on the lines.
-double information_criterion(const FrfEstimate& frf, const FitResult& fit);
-
-/// Rise of sum W |E|^2 of `fit` without a mode above which the mode is worth that many parameters, see ModeWorth.
-double price_of_mode(const FrfEstimate& frf, const FitResult& fit, double parameters);
-
 /// sum W |E|^2 of a model on every line. @param weights n_c x N
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
                                  const Eigen::MatrixXd& weights, const Team& team);
@@ -27,7 +20,9 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 /// does not fit its errors.
 class ModeWorth {
  public:
-  /// @param weights n_c x N, of the fits that are compared
+  /// For fits whose residual is far above rounding.
+  explicit ModeWorth(const FrfEstimate& frf);
+  /// For a search. @param weights n_c x N, of the fits that are compared
   ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
             const Eigen::MatrixXd& weights);
 
@@ -45,7 +40,8 @@ class ModeWorth {
   double cost_of_one() const;
 
   /// Decrease of sum W |E|^2 of `fit` above which one more mode is worth its parameters.
-  double price(const FitResult& fit) const;
+  double price(const FitResult& fit) const { return price(fit, parameters_of_mode_); }
+  double price(const FitResult& fit, double parameters) const;
   /// What a mode that is not there gains by fitting noise, kClearly standard deviations above the mean.
   double most_by_chance(const FitResult& fit) const;
 
@@ -64,7 +60,7 @@ class ModeWorth {
   double channels_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers
   double parameters_of_mode_ = 0.0;
-  double rounding_ = 0.0;  ///< of sum W |E|^2
+  double rounding_ = 1e-300;  ///< of sum W |E|^2
 };
 
 /// Candidates for removal: modes with a removal cost below `price`, the least worthy first, no two that could replace

@@ -75,7 +75,7 @@ class RankedFit {
                [](const Submodel& s) { return is_searched_mode(s) && s.numerator.size() > 1; });
   }
 
-  double criterion(const FitResult& fit) const { return information_criterion(frf_, fit); }
+  double criterion(const FitResult& fit) const { return ModeWorth(frf_).criterion(fit); }
 
   /// Adopts a fit that is better.
   bool adopt(const TiedModel& tied, FitResult&& trial) {

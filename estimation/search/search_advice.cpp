@@ -73,15 +73,15 @@ FitResult with_missing_modes(const FrfEstimate& frf, const FitOptions& trial, co
   FitResult out = same;
   for (int round = 0; round < rounds; ++round) {
     const ModelStructure structure = structure_of(out.model);
-    const double price = ModeWorth(frf, structure, trial.user_weights).price(out);
+    const ModeWorth worth(frf, structure, trial.user_weights);
+    const double price = worth.price(out);
     AdditiveModel model = out.model;
     for (const ProposedMode& missed :
          proposed_modes(frf, out.model, trial.user_weights, together, trial.workers()))
       if (missed.gain > price) model.submodels.push_back(mode_submodel(frf, {}, missed.mode));
     if (model.submodels.size() == out.model.submodels.size()) break;
     FitResult fit = fit_additive_model(frf, model, trial);
-    if (fit.status() == FitStatus::singular ||
-        !(information_criterion(frf, fit) < information_criterion(frf, out)))
+    if (fit.status() == FitStatus::singular || !(worth.criterion(fit) < worth.criterion(out)))
       break;
     out = std::move(fit);
   }
@@ -118,9 +118,10 @@ std::string missing_frequencies(const FrfEstimate& frf, const FitOptions& trial,
 
 void advise_structure(const FrfEstimate& frf, const FitOptions& options, const FitOptions& trial,
                       const FitResult& same, ModeNumber number, bool cut_short, FitReason& reason) {
-  double least = information_criterion(frf, same);
+  const ModeWorth worth(frf);
+  double least = worth.criterion(same);
   const auto advise = [&](const FitResult& fit, const std::string& flags) {
-    const double criterion = information_criterion(frf, fit);
+    const double criterion = worth.criterion(fit);
     if (fit.status() == FitStatus::singular || !(criterion < least)) return false;
     least = criterion;
     reason.flags = flags;

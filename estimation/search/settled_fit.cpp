@@ -83,15 +83,14 @@ bool may_converge(const FitResult& fit) {
 /// Removes modes that the data do not determine, one by one, if they are not worth their parameters.
 void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, FitResult& fit,
                             std::vector<std::string>& said) {
+  const ModeWorth worth(frf);
   const auto is_better_without = [&](std::size_t i) {
     const ModeVerdict verdict = mode_verdict(frf, ModeNumber::chosen, fit, i);
     if (verdict != ModeVerdict::weak && verdict != ModeVerdict::at_bound) return false;
     AdditiveModel fewer = fit.model;
     fewer.submodels.erase(fewer.submodels.begin() + static_cast<std::ptrdiff_t>(i));
     FitResult trial = fit_additive_model(frf, fewer, options);
-    const bool better =
-        trial.trustworthy() && information_criterion(frf, trial) < information_criterion(frf, fit);
-    if (!better) return false;
+    if (!trial.trustworthy() || worth.criterion(trial) >= worth.criterion(fit)) return false;
     said.push_back(fmt::format(
         "removed {:.6g} Hz (damping {:.3g}), which the data do not support and which does not "
         "justify its parameters (BIC): cost {:.6g} -> {:.6g}",
@@ -111,6 +110,7 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
                         const FitOptions& options, std::vector<std::string>& said) {
   FitResult first = fit_additive_model(frf, start, options);
   if (!may_converge(first)) return first;
+  const ModeWorth worth(frf);
   FitResult fit = first;
   std::vector<std::string> steps;
   while (may_converge(fit) && count_modes(fit.model) > 1) {
@@ -119,9 +119,9 @@ FitResult converged_fit(const FrfEstimate& frf, const AdditiveModel& start,
     FitResult next = fit_additive_model(frf, models[0].model, options);
     std::size_t chosen = 0;
     // A mode beside the lines may be needed although its pole is undetermined.
-    if (models.size() > 1 && information_criterion(frf, next) > information_criterion(frf, fit)) {
+    if (models.size() > 1 && worth.criterion(next) > worth.criterion(fit)) {
       FitResult held = fit_additive_model(frf, models[1].model, options);
-      if (information_criterion(frf, held) < information_criterion(frf, next)) {
+      if (worth.criterion(held) < worth.criterion(next)) {
         next = std::move(held);
         chosen = 1;
       }

@@ -176,12 +176,12 @@ TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
   for (const ModeNumber number : {ModeNumber::chosen, ModeNumber::asked}) {
     const bool number_asked = number == ModeNumber::asked;
     FitResult weak = two;
-    weak.removal_cost[1] = 0.9 * price_of_mode(frf_, two, 3.0);  // a pole and one residue
+    weak.removal_cost[1] = 0.9 * ModeWorth(frf_).price(two, 3.0);  // a pole and one residue
     judge(frf_, {.number = number}, weak);
     EXPECT_EQ(weak.status() == FitStatus::undetermined, number_asked);
     EXPECT_EQ(weak.message().find("390.0") != std::string::npos, number_asked) << weak.message();
     FitResult strong = two;
-    strong.removal_cost[1] = 1.1 * price_of_mode(frf_, two, 3.0);
+    strong.removal_cost[1] = 1.1 * ModeWorth(frf_).price(two, 3.0);
     judge(frf_, {.number = number}, strong);
     EXPECT_TRUE(strong.trustworthy()) << strong.message();
   }
