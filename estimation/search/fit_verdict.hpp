@@ -49,8 +49,8 @@ std::optional<std::pair<std::size_t, std::size_t>> coincident_pair(const Additiv
 
 /// The verdict on a searched mode; `determined` for other submodels.
 /// @param number if asked or given, the modes were not selected by their worth: one that is not worth its parameters
-/// (ModeWorth::price()) is weak. If asked, one that is held because noise hides it (hold_hidden_modes()) is weak, too, and
-/// one outside the lines by less than half its half-power width is judged like others
+/// (ModeWorth::price()) is weak. If asked, one that is held because noise hides it (hold_hidden_modes()) is weak, too,
+/// and one outside the lines by less than half its half-power width is judged like others
 ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitResult& fit,
                          std::size_t submodel);
 

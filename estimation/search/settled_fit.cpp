@@ -90,7 +90,7 @@ void leave_out_undetermined(const FrfEstimate& frf, const FitOptions& options, F
     AdditiveModel fewer = fit.model;
     fewer.submodels.erase(fewer.submodels.begin() + static_cast<std::ptrdiff_t>(i));
     FitResult trial = fit_additive_model(frf, fewer, options);
-    if (!trial.trustworthy() || worth.criterion(trial) >= worth.criterion(fit)) return false;
+    if (!trial.trustworthy() || !(worth.criterion(trial) < worth.criterion(fit))) return false;
     said.push_back(fmt::format(
         "removed {:.6g} Hz (damping {:.3g}), which the data do not support and which does not "
         "justify its parameters (BIC): cost {:.6g} -> {:.6g}",

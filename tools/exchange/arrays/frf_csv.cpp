@@ -132,7 +132,7 @@ void describe(const ArrayList& arrays, FrfEstimate& frf) {
     return;
   }
   try {
-    read_description(parse_json<Json>(text), frf);
+    read_description(parse_json<SortedJson>(text), frf);
   } catch (const SortedJson::exception&) {
     arrays.fail("",
                 "its line '# {{\"format\":...}}' is damaged. Remove that line, or export the "
