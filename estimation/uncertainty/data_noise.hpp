@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <complex>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -18,8 +19,12 @@ enum class VarianceKnowledge : std::uint8_t {
   none      ///< proportional to 1/W, scaled by the residual
 };
 
-/// Columns of all outputs of one input on some lines: lines x n each.
-using OutputColumns = std::vector<SplitMatrix>;
+/// Columns of all outputs of one input on some lines, 2 n_y rows per line: the real parts of all outputs, then the
+/// imaginary parts. All numbers that are correlated are neighbours then.
+using OutputColumns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The columns of one output, lines x n. @param y 0-based, of n_y
+SplitMatrix columns_of_output(const OutputColumns& columns, Eigen::Index y, Eigen::Index n_y);
 
 /// Correlation of the noise of a response, S_k kron R_k on line k: that of the outputs from the residual covariance of
 /// the FRF, that of the inputs from its input factor, both over the deviations. A disturbance force moves several
@@ -30,26 +35,27 @@ class NoiseCorrelation {
  public:
   NoiseCorrelation() = default;  ///< unknown
   /// Correlations that the FRF does not contain are taken as zero. `frf` must outlive it.
-  explicit NoiseCorrelation(const FrfEstimate& frf) : frf_(&frf) {}
+  explicit NoiseCorrelation(const FrfEstimate& frf);
 
   bool known() const noexcept { return frf_ != nullptr && frf_->residual_covariance.size() > 0; }
   bool between_inputs() const noexcept {
     return known() && frf_->input_factor.size() > 0 && frf_->n_inputs() > 1;
   }
 
-  /// Y_y = sum_z R(y, z) X_z of one input. @pre known()
-  OutputColumns of_outputs(const OutputColumns& X, IndexRange lines) const;
-  /// Z += S(u, v) Y, adding the n columns of Y to the columns `at` of Z. @pre between_inputs()
-  void add_input(Eigen::Index u, Eigen::Index v, const OutputColumns& Y,
-                 const std::vector<Eigen::Index>& at, IndexRange lines, OutputColumns& Z) const;
+  /// R of one line for columns of split numbers, [re -im; im re], 2 n_y x 2 n_y. @pre known()
+  Eigen::MatrixXd of_outputs(Eigen::Index line) const;
+  /// S of one line, n_u x n_u. @pre between_inputs()
+  Eigen::MatrixXcd of_inputs(Eigen::Index line) const;
   /// (S kron R)(c, d) of two channels on some lines, lines x 1; empty: zero. @pre known()
   SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const;
 
  private:
-  SplitMatrix R(Eigen::Index y, Eigen::Index z, IndexRange lines) const;
-  SplitMatrix S(Eigen::Index u, Eigen::Index v, IndexRange lines) const;
+  std::complex<double> R(Eigen::Index y, Eigen::Index z, Eigen::Index line) const;
+  std::complex<double> S(Eigen::Index u, Eigen::Index v, Eigen::Index line) const;
 
   const FrfEstimate* frf_ = nullptr;
+  Eigen::MatrixXd of_deviation_y_;  ///< 1 / sqrt(C(y, y)), 0 if it is unknown, outputs x lines
+  Eigen::MatrixXd of_deviation_u_;  ///< the same of the inputs
 };
 
 /// The noise of the data, as far as known.

@@ -50,48 +50,67 @@ struct ChannelPairs {
   std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, IndexRange lines)> between;
 };
 
-/// Adds the products of channel c and the following ones on a tile of lines.
-void add_channel(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, Eigen::Index c,
-                 IndexRange lines, const std::vector<IndexRange>& ranges,
-                 std::vector<Eigen::MatrixXd>& out) {
-  const SplitMatrix& left = X[c];
+// The columns of a block of channels and of one further channel remain in the cache.
+constexpr Eigen::Index kBlockLines = 64;
+constexpr Eigen::Index kBlockChannels = 8;
+
+/// The place of the pair c <= d.
+Eigen::Index pair_place(Eigen::Index c, Eigen::Index d) { return d * (d + 1) / 2 + c; }
+
+/// Adds the products of a block of channels and the following ones on a tile of lines.
+/// @param sums per pair of channels, the products of every range, by columns
+void add_channels(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, IndexRange block,
+                  IndexRange lines, const std::vector<IndexRange>& ranges, Eigen::MatrixXd& sums) {
   SplitMatrix right;
-  Eigen::MatrixXd gram;
-  for (Eigen::Index d = c; d < std::ssize(X); ++d) {
-    const SplitMatrix weight = pairs.between(c, d, lines);
-    if (weight.cols() == 0) continue;
-    const auto w_re = weight.re.col(0).array();
-    const auto w_im = weight.im.col(0).array();
-    const SplitMatrix& other = X[d];
-    right.re = other.re.array().colwise() * w_re - other.im.array().colwise() * w_im;
-    right.im = other.im.array().colwise() * w_re + other.re.array().colwise() * w_im;
-    for (std::size_t r = 0; r < ranges.size(); ++r) {
-      const auto [first, n] = ranges[r];
-      gram.noalias() = left.re.middleCols(first, n).transpose() * right.re.middleCols(first, n);
-      gram.noalias() += left.im.middleCols(first, n).transpose() * right.im.middleCols(first, n);
-      const auto rows = Eigen::seqN(c, n, std::ssize(X));
-      const auto cols = Eigen::seqN(d, n, std::ssize(X));
-      out[r](rows, cols) += gram;
-      if (d != c) out[r](cols, rows) += gram.transpose();
+  for (Eigen::Index d = block.first; d < std::ssize(X); ++d)
+    for (Eigen::Index c = block.first; c <= std::min(d, block.first + block.count - 1); ++c) {
+      const SplitMatrix weight = pairs.between(c, d, lines);
+      if (weight.cols() == 0) continue;
+      const auto w_re = weight.re.col(0).array();
+      const auto w_im = weight.im.col(0).array();
+      double* sum = sums.col(pair_place(c, d)).data();
+      for (const auto& [first, n] : ranges) {
+        const auto re = X[d].re.middleCols(first, n).array();
+        const auto im = X[d].im.middleCols(first, n).array();
+        right.re = re.colwise() * w_re - im.colwise() * w_im;
+        right.im = im.colwise() * w_re + re.colwise() * w_im;
+        Eigen::Map<Eigen::MatrixXd> gram(sum, n, n);
+        gram += X[c].re.middleCols(first, n).transpose().lazyProduct(right.re);
+        gram += X[c].im.middleCols(first, n).transpose().lazyProduct(right.im);
+        sum += n * n;
+      }
     }
-  }
 }
 
 /// sum_k Re{X_c^H W(c, d) X_d} of the columns in a range, for every range: element (c + n_c p, d + n_c q) belongs to
 /// its columns p and q, in the order of vec of channels x columns. W must be Hermitian.
 std::vector<Eigen::MatrixXd> pair_grams(const FitProblem& problem, const ChannelPairs& pairs,
                                         const std::vector<IndexRange>& ranges) {
-  std::vector<Eigen::MatrixXd> out;
-  for (const IndexRange& range : ranges) {
-    const Eigen::Index n = problem.channels() * range.count;
-    out.emplace_back(Eigen::MatrixXd::Zero(n, n));
+  const Eigen::Index channels = problem.channels();
+  Eigen::Index products = 0;
+  for (const IndexRange& range : ranges) products += range.count * range.count;
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(products, pair_place(0, channels));
+  std::vector<SplitMatrix> X(channels);
+  const std::vector<IndexRange> blocks = ranges_of(channels, kBlockChannels);
+  for (const IndexRange lines : ranges_of(pairs.lines, kBlockLines)) {
+    for_each_task(problem.threads, static_cast<int>(channels),
+                  [&](int c) { X[c] = pairs.columns(c, lines); });
+    for_each_task(problem.threads, static_cast<int>(blocks.size()),
+                  [&](int b) { add_channels(pairs, X, blocks[b], lines, ranges, sums); });
   }
-  std::vector<SplitMatrix> X(problem.channels());
-  const auto channels = static_cast<int>(problem.channels());
-  for (const IndexRange lines : ranges_of(pairs.lines, kTileLines)) {
-    for_each_task(problem.threads, channels, [&](int c) { X[c] = pairs.columns(c, lines); });
-    for_each_task(problem.threads, channels,
-                  [&](int c) { add_channel(pairs, X, c, lines, ranges, out); });
+
+  std::vector<Eigen::MatrixXd> out;
+  Eigen::Index row = 0;
+  for (const IndexRange& range : ranges) {
+    const Eigen::Index n = range.count;
+    Eigen::MatrixXd& all = out.emplace_back(channels * n, channels * n);
+    for (Eigen::Index d = 0; d < channels; ++d)
+      for (Eigen::Index c = 0; c <= d; ++c) {
+        const auto gram = sums.col(pair_place(c, d)).segment(row, n * n).reshaped(n, n);
+        all(Eigen::seqN(c, n, channels), Eigen::seqN(d, n, channels)) = gram;
+        all(Eigen::seqN(d, n, channels), Eigen::seqN(c, n, channels)) = gram.transpose();
+      }
+    row += n * n;
   }
   return out;
 }

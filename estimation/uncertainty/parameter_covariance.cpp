@@ -80,7 +80,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   inputs.use = [&](Eigen::Index u, IndexRange lines, const OutputColumns& Z) {
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const Eigen::Index c = range.first + n_y * u + y;
-      const SplitMatrix& of_output = Z[y];
+      const SplitMatrix of_output = columns_of_output(Z, y, n_y);
       const SplitMatrix F = noise_scaled(problem, noise, c, lines,
                                          group_of[c]->F.middle_rows(lines.first, lines.count));
       cross[c] += of_output.re.transpose() * F.re + of_output.im.transpose() * F.im;
