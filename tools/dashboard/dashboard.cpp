@@ -9,6 +9,7 @@
 #include "tools/report/html_page.hpp"
 #include "tools/report/timing_json.hpp"
 #include "tools/terminal/interrupt.hpp"
+#include "tools/terminal/json.hpp"
 
 namespace stageid {
 
@@ -17,10 +18,6 @@ namespace {
 constexpr std::size_t kEventsShown = 60;
 // A page that is loaded again has no stream for a moment.
 constexpr std::chrono::seconds kReload{2};
-
-std::string text_of(const SortedJson& json) {
-  return json.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
-}
 
 /// Limits of a group; null if there are none.
 SortedJson limits(const Eigen::VectorXd& values, std::size_t channels) {
@@ -96,7 +93,7 @@ std::string dashboard_content_json(const ExperimentConfig& config, const Experim
        {{"actuator_n", limits(bounds.actuator_n, stage.actuators.size())},
         {"thermal_rms_n", limits(bounds.thermal_rms_n, stage.actuators.size())},
         {"position_window_m", limits(bounds.position_window_m, stage.sensors.size())}}}};
-  return script_safe(text_of(json));
+  return script_safe(in_ascii(json));
 }
 
 }  // namespace
@@ -174,7 +171,7 @@ std::string Dashboard::state_json() const {
   if (const EventLog* const log = events_)
     for (const std::string& event : log->latest(kEventsShown))
       json["events"].push_back(parse_json<SortedJson>(event));
-  return text_of(json);
+  return in_ascii(json);
 }
 
 void Dashboard::publish() { content_.state.publish(state_json()); }

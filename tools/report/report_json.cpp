@@ -241,9 +241,7 @@ SortedJson candidates_json(const std::vector<ModeCandidate>& candidates) {
 }
 
 /// Always valid UTF-8, and safe inside <script>.
-std::string text_of(const SortedJson& json) {
-  return script_safe(json.dump(-1, ' ', true, SortedJson::error_handler_t::replace));
-}
+std::string text_of(const SortedJson& json) { return script_safe(in_ascii(json)); }
 
 }  // namespace
 

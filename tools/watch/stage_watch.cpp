@@ -11,6 +11,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
 #include "acquisition/files/json_text.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/watch/watch_event.hpp"
 
 namespace stageid {
@@ -233,8 +234,7 @@ std::string StageWatch::history_json() const {
   const TrackHistory history = history_;
   const Json changes = changes_;
   lock.unlock();
-  return fmt::format(R"({{"history":{},"changes":{}}})", history.json(),
-                     changes.dump(-1, ' ', true, SortedJson::error_handler_t::replace));
+  return fmt::format(R"({{"history":{},"changes":{}}})", history.json(), in_ascii(changes));
 }
 
 }  // namespace stageid

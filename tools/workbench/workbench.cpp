@@ -11,6 +11,7 @@
 #include "estimation/request/request_flags.hpp"
 #include "tools/steps/fit_step.hpp"
 #include "tools/steps/problem_commands.hpp"
+#include "tools/terminal/json.hpp"
 #include "tools/workbench/fit_details.hpp"
 #include "tools/workbench/model_request.hpp"
 #include "tools/workbench/warm_start.hpp"
@@ -156,7 +157,7 @@ std::string Workbench::state_text() const {
          {"cost", state.model ? SortedJson(state.model->fit.cost) : SortedJson()},
          {"saved", state.saved.filename().string()}});
   for (const auto& other : compared_) json["compared"].push_back(other->result.title);
-  return json.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
+  return in_ascii(json);
 }
 
 /// Publishes the current state with its results, unless it has none yet.

@@ -102,7 +102,7 @@ std::string WorkbenchPage::results(const FitState& state,
     add_complex("other_response", all[*chosen]->response, 0, more);
     add_complex("other_model", all[*chosen]->model_response, kSmooth, more);
   }
-  std::string text = more.dump(-1, ' ', true, SortedJson::error_handler_t::replace);
+  std::string text = in_ascii(more);
   text.back() = ',';
   return text + "\"content\":" + report::page_content(data).json + "}";
 }

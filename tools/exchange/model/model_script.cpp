@@ -33,7 +33,7 @@ class Syntax {
   }
 
   std::string text(const std::string& value) const {
-    if (python_) return SortedJson(value).dump(-1, ' ', true, SortedJson::error_handler_t::replace);
+    if (python_) return in_ascii(SortedJson(value));
     std::string quoted = "'";
     bool joined = false;  // a line break would end the text, and begin a command
     for (const char c : value) {
