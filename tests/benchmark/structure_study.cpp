@@ -6,7 +6,8 @@
 //                   [--dense: plants of many modes (dense_plant.hpp)] [--number: their number is given]
 //
 // Prints one line per plant and a summary: found (cost within 1 % of the reference, exit code 0), told (exit code 3),
-// wrong (the rest), and the processor time of a fit over that of a product of two 850 x 850 matrices.
+// wrong (the rest), by how many of its standard deviations the delay is off, if it was estimated, and the processor
+// time of a fit over that of a product of two 850 x 850 matrices.
 // Dense plants without a given number are compared with the cost of the noise itself, because their weakest modes may
 // be below it; those without noise are found with a relative error below 1e-11.
 
@@ -29,6 +30,7 @@ namespace {
 using namespace stageid;
 
 constexpr double kExact = 1e-11;  // relative error of a plant without noise
+constexpr double kFar = 5.0;      // standard deviations that noise does not reach
 
 double processor_s() {
   timespec now{};
@@ -66,6 +68,20 @@ double cost_of_noise(const test::VariedPlant& plant) {
          static_cast<double>(plant.frf.lines());
 }
 
+/// Largest error of the delay of a channel, in its standard deviations. Those of an input and of an output are taken as
+/// uncorrelated.
+double delay_error_deviations(const AdditiveModel& truth, const AdditiveModel& model) {
+  const auto sums = [](const Eigen::VectorXd& inputs, const Eigen::VectorXd& outputs) {
+    return Eigen::ArrayXXd((outputs.replicate(1, inputs.size()).rowwise() + inputs.transpose()));
+  };
+  const Eigen::ArrayXXd variance = sums(model.input_delay_std_s.array().square().matrix(),
+                                        model.output_delay_std_s.array().square().matrix());
+  if (variance.size() == 0) return 0.0;
+  const Eigen::ArrayXXd error = sums(model.input_delay_s, model.output_delay_s) -
+                                sums(truth.input_delay_s, truth.output_delay_s);
+  return (error.abs() / variance.sqrt().max(1e-300)).maxCoeff();
+}
+
 struct Arguments {
   std::vector<double> numbers;
   bool verbose = false;
@@ -100,6 +116,7 @@ int main(int argc, char** argv) {
   std::vector<double> products;
   int found = 0;
   int told = 0;
+  int misdelayed = 0;
   for (std::uint64_t seed = first; seed < first + static_cast<std::uint64_t>(plants); ++seed) {
     const test::VariedPlant plant =
         arguments.dense ? test::draw_dense_plant(seed) : test::draw_varied_plant(seed);
@@ -118,12 +135,17 @@ int main(int argc, char** argv) {
         fit.trustworthy() && (exact ? fit.model.fit.relative_rms_error < kExact : excess < 0.01);
     found += right ? 1 : 0;
     told += fit.trustworthy() ? 0 : 1;
-    fmt::print("seed {}: {}, cost {:+.2g} %, {} of {} submodels, {:.0f} products; {}\n", seed,
-               right               ? "found"
-               : fit.trustworthy() ? "WRONG"
-                                   : "told",
-               100.0 * excess, fit.model.submodels.size(), plant.truth.submodels.size(),
-               products.back(), plant.description());
+    const double late = fit.trustworthy() ? delay_error_deviations(plant.truth, fit.model) : 0.0;
+    misdelayed += late > kFar ? 1 : 0;
+    fmt::print(
+        "seed {}: {}, cost {:+.2g} %, {} of {} submodels, {:.0f} products, delay {:.2g} deviations "
+        "off; {}\n",
+        seed,
+        right               ? "found"
+        : fit.trustworthy() ? "WRONG"
+                            : "told",
+        100.0 * excess, fit.model.submodels.size(), plant.truth.submodels.size(), products.back(),
+        late, plant.description());
     if (!right) fmt::print("  {}: {}\n", to_string(fit.status()), fit.message());
     if (arguments.verbose || !right)
       for (const std::string& decision : fit.decisions) fmt::print("  | {}\n", decision);
@@ -131,8 +153,10 @@ int main(int argc, char** argv) {
   }
   if (products.empty()) return 2;
   std::sort(products.begin(), products.end());
-  fmt::print("{} plants: {} found, {} told, {} wrong; products: median {:.0f}, most {:.0f}\n",
-             plants, found, told, plants - found - told, products[products.size() / 2],
-             products.back());
+  fmt::print(
+      "{} plants: {} found, {} told, {} wrong, {} trusted with a delay more than {:.2g} deviations "
+      "off; products: median {:.0f}, most {:.0f}\n",
+      plants, found, told, plants - found - told, misdelayed, kFar, products[products.size() / 2],
+      products.back());
   return 0;
 }
