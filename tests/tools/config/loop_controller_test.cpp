@@ -154,10 +154,6 @@ TEST_F(LoopController, RefusesWhatCannotBeComputedSampleBySample) {
          "state_space: {d: [1]}\n";
   EXPECT_THAT(error_of("controller: foreign.yaml"), HasSubstr("no channel 's9'"));
   EXPECT_THAT(error_of("controller: missing.mat"), HasSubstr("missing.mat"));
-  EXPECT_THAT(error_of("controller: c.txt"), HasSubstr("unsupported controller file"));
-  EXPECT_THAT(error_of("controller:\n  z: {crossover_hz: 20}\n  state_space: {d: [1, 0, 0, 1, 0, "
-                       "1]}"),
-              HasSubstr("not several of them"));
   EXPECT_THAT(error_of("controller:\n  transfer: [{actuator: a1, sensor: s1, numerator: [1, 0, 0], "
                        "denominator: [1, 1]}]"),
               HasSubstr("causal"));

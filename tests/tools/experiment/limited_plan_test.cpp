@@ -173,14 +173,10 @@ TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
 }
 
 TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
-  fail({"design", limits_, "-o", "e.h5"}, 1, "small_stage_pilot_frf.h5: no such file");
-  fail({"design", config_, "-o", "e.h5", "--accuracy", "1e-6"}, 2,
-       "--accuracy: needs the noise of a prior");
   fail({"run", config_, "-o", "x.slog", "--until", "-1"}, 2, "--until");
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
     fail({"design", variant(from, to), "-o", "e.h5"}, 2, text);
   };
-  wrong("  level:\n", "  level:\n    rms_n: 1\n", "level: write exactly one of");
   wrong("crest_iterations: 20", "crest_iterations: 0", "'limits' also optimizes the phases");
   wrong("  lines: all", "  shape: [[1, 1], [10, 2]]\n  lines: all", "remove 'shape'");
   wrong("velocity_m_s: 0.05", "velocity_m_s: 0.05, safety: 1.5", "safety: 1.5 is out of range");
@@ -189,8 +185,6 @@ TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
   wrong("velocity_m_s: 0.05", "velocity_m_s: 1e-9", "uses up the limit");
   succeed({"design", limits_, "-o", "e.h5"});
   fail({"run", config_, "--excitation", "e.h5", "-o", "x.slog"}, 2, "differs in the scheme from");
-  fail({"run", variant("seed: 7", "seed: 8"), "--excitation", "e.h5", "-o", "x.slog"}, 2,
-       "differs in the seed from");
   fail({"run", limits_, "--excitation", prior(), "-o", "x.slog"}, 2,
        "is a frequency response, not a designed excitation;");
 }

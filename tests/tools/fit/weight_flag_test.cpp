@@ -11,10 +11,8 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/hdf5_file.hpp"
 #include "estimation/problem/weight_matrices.hpp"
-#include "frf/file/frf_file.hpp"
 #include "tests/support/models/numbered_frf.hpp"
 #include "tests/support/process/temporary_directory.hpp"
-#include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test_weight_flag {
 
@@ -95,13 +93,6 @@ TEST_F(WeightFile, RefusesAnotherShapeAndBothKindsAtOnce) {
   expect_refused("one of the two");
 }
 
-TEST_F(WeightFile, RefusesNegativeWeights) {
-  std::vector<double> values(4 * 6, 1.0);
-  values[13] = -1.0;
-  write_weights(path_, values);
-  expect_refused<IndefiniteWeights>("line 2: -1; weights must be 0 or more");
-}
-
 TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
   for (const auto& [weight, part] : {std::pair{0.0, "all weights are 0"},
                                      {1e-200, "only the ratios of weights matter"},
@@ -109,19 +100,6 @@ TEST_F(WeightFile, RefusesWeightsThatAreAllZeroOrBeyondTheRangeOfSquares) {
     write_weights(path_, std::vector<double>(4 * 6, weight));
     expect_refused(part);
   }
-}
-
-class WeightsOfTheProgram : public test::ProgramTest {};
-
-TEST_F(WeightsOfTheProgram, WithoutAMinimumAreNotToBeTrusted) {
-  const FrfEstimate frf = test::numbered_frf();
-  write_frf(at("frf.h5"), frf);
-  std::vector<double> weights(frf.response.size(), 1.0);
-  weights[5] = -1.0;
-  write_weights(at("w.h5"), weights);
-  fail({"fit", "frf.h5", "-o", "model.json", "--weighting", "w.h5"}, 3,
-       "-1; weights must be 0 or more");
-  EXPECT_FALSE(std::filesystem::exists(at("model.json")));
 }
 
 }  // namespace stageid::test_weight_flag

@@ -264,20 +264,11 @@ TEST_F(Plot, RequestsThatAreWrong) {
   };
   const std::string frf = name("frf.h5");
   const std::string out = name("p.pdf");
-  wrong({"cmfi", frf, "-o", out},
-        "figure: got 'cmfi'; expected one of cmif, bode, entry (did you mean");
-  wrong({"cmif", frf, "-o", name("p")}, "p: unsupported picture format ''");
   wrong({"cmif", "-o", out}, "inputs");
-  wrong({"cmif", name("model.json"), "-o", out}, "model.json: contains no frequency response");
   wrong({"cmif", frf, "--input-channel", "a1", "-o", out}, "are for bode and entry");
-  wrong({"bode", frf, "--input-chanel", "a1", "-o", out}, "did you mean '--input-channel'?");
-  wrong({"entry", frf, "--output-channel", "s1", "--input-channel", "a1,a2", "-o", out},
-        "--input-channel: the figure 'entry' needs exactly one channel");
   wrong({"entry", frf, frf, "-o", out}, "duplicate file");
   for (const char* copy : {"b.h5", "c.h5"}) std::filesystem::copy_file(frf, at(copy));
   wrong({"entry", frf, name("b.h5"), name("c.h5"), "-o", out}, "is of the same kind");
-  wrong({"cmif", config_, "-o", out}, "contains no frequency response");
-  fail({"plot", "cmif", name("none.h5"), "-o", out}, 1, "none.h5: does not exist");
   fail({"plot", "cmif", frf, "-o", name("no/p.pdf")}, 1, "no/p.pdf");
   std::filesystem::create_directory(at("folder.pdf"));
   fail({"plot", "cmif", frf, "-o", name("folder.pdf")}, 1, "is a directory");
