@@ -58,12 +58,6 @@ constexpr std::array kOutputs = {"excitation.h5", "run.slog",   "frf.h5",   "frf
                                  "modes.json",    "model.json", "model.h5", "model.csv",
                                  "summary.json",  "report.html"};
 
-TEST_F(Workflow, HelpAndVersionAreTold) {
-  EXPECT_THAT(succeed({"--help"}).out, HasSubstr("import"));
-  EXPECT_THAT(succeed({"--version"}).out, testing::MatchesRegex("stageid [0-9.]+\n"));
-  EXPECT_THAT(succeed({"fit", "--help"}).out, HasSubstr("--weighting"));
-}
-
 TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
   const ProgramResult result = succeed({"identify", config_, "-o", "all"});
   for (const char* output : kOutputs)
@@ -77,26 +71,6 @@ TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
     EXPECT_GT(mode["natural_frequency_std_hz"].get<double>(), 0.0);
   EXPECT_LT(summary["truth"]["relative_rms_error"].get<double>(), 0.05);
   EXPECT_NEAR(summary["validation"]["chi_square_per_dof"].get<double>(), 1.0, 0.3);
-}
-
-TEST_F(Workflow, AModelThatLeavesMoreThanNoiseIsNotTrustedAnywhere) {
-  succeed({"identify", config_, "-o", "all"});
-  const std::vector<std::string> fit = {
-      "fit", "all/frf.h5", "-o", "few.json", "--modes", "1", "--rigid-body", "suspension:0.4:0.5"};
-  const ProgramResult fitted = ends(fit, 3, "not to be trusted: the residual is ");
-  EXPECT_THAT(fitted.err, HasSubstr("times what noise explains"));
-  const json told = tell(fit, 3);
-  EXPECT_EQ(told["trustworthy"], false);
-  EXPECT_EQ(told["status"], "unexplained");
-
-  const ProgramResult validated = ends({"validate", "few.json", "all/frf_validation.h5"}, 3);
-  EXPECT_THAT(validated.out, HasSubstr("verdict: not to be trusted: the residual is "));
-  ends({"report", "few.json", "all/frf.h5", "all/frf_validation.h5", "-o", "few.html"}, 3,
-       "not to be trusted: the residual is ");
-  EXPECT_TRUE(std::filesystem::exists(at("few.html")));
-  succeed({"report", "all", "-o", "all.html"});
-  const ProgramResult sound = succeed({"validate", "all/model.json", "all/frf_validation.h5"});
-  EXPECT_THAT(sound.out, HasSubstr("verdict: trustworthy; noise and known distortion explain"));
 }
 
 // Realizations show a cubic stiffness, periods do not: the fit weighs by the realizations.
@@ -148,53 +122,6 @@ TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
   EXPECT_THAT(refit.err, testing::ContainsRegex("run .*up to date"));
   EXPECT_THAT(refit.err, testing::Not(testing::ContainsRegex("fit .*up to date")));
   EXPECT_FALSE(same_bytes(before.at(name("all/model.json")), read_bytes(at("all/model.json"))));
-}
-
-TEST_F(Workflow, AnInterruptedRunIsKeptAndResumedToTheSameResponse) {
-  // One run lasts 25 s on the wall clock, so the signal, half a second after the log is there, comes in
-  // the middle of the first. However late a busy machine makes its cycles, they do not end it: lateness
-  // is marked, and this run is measured anew.
-  const std::string config =
-      stage("long.yaml", "noise:", "realtime: {misses_allowed: 1000000}\nnoise:");
-  write_bytes(config, replaced(read_bytes(config), "periods: 3", "periods: 8"));
-  ProgramOptions interrupt;
-  interrupt.interrupt_after_file = at("cut.slog");
-  interrupt.interrupt_after_s = 0.5;
-  ends({"run", config, "-o", "cut.slog", "--pace", "0.1"}, 130, "continue with --resume",
-       interrupt);
-  ASSERT_TRUE(std::filesystem::exists(at("cut.slog")));
-  succeed({"log", "verify", "cut.slog"});
-  const json info = tell({"log", "info", "cut.slog"});
-  for (const json& cut : info["runs"]) EXPECT_FALSE(cut["complete"]);
-  succeed({"run", config, "-o", "cut.slog", "--resume"});
-  succeed({"run", config, "-o", "whole.slog"});
-  succeed({"frf", "cut.slog", "-o", "cut.h5"});
-  succeed({"frf", "whole.slog", "-o", "whole.h5"});
-  const FrfEstimate cut = read_frf(at("cut.h5"));
-  const FrfEstimate whole = read_frf(at("whole.h5"));
-  EXPECT_EQ(cut.response, whole.response);
-  EXPECT_EQ(cut.noise_variance, whole.noise_variance);
-}
-
-TEST_F(Workflow, ALimitStopsTheRunWithCodeFourAndKeepsTheLog) {
-  const std::string loud = experiment("loud.yaml", "rms_n: 1.0", "rms_n: 15");
-  ends({"run", loud, "--force", "-o", "loud.slog"}, 4, "|u|");
-  const json info = tell({"log", "info", "loud.slog"});
-  ASSERT_EQ(info["runs"].size(), 1U);
-  EXPECT_FALSE(info["runs"][0]["complete"]);
-  EXPECT_GT(info["runs"][0]["samples"], 0);
-}
-
-TEST_F(Workflow, AnInterlockEndsTheRunWithCodeOne) {
-  const json info = run_with_fault("lock", "kind: interlock, from_cycle: 700, run: 1", 1, "");
-  ASSERT_EQ(info["runs"].size(), 2U);
-  EXPECT_TRUE(info["runs"][0]["complete"]);
-  EXPECT_FALSE(info["runs"][1]["complete"]);
-}
-
-TEST_F(Workflow, AStuckSensorStopsTheRunWithCodeFour) {
-  run_with_fault("stuck", "kind: stuck_sensor, channel: s1, from_cycle: 1700", 4,
-                 "sensor s1: has repeated");
 }
 
 TEST_F(Workflow, AFaultThatOpensTheLoopEndsWithCodeFourAndItsCause) {
@@ -291,8 +218,6 @@ TEST_F(Workflow, AReportComparesWithAnotherDay) {
   succeed({"report", "frf.h5", "model.json", "--compare", "frf.h5", "model.json", "-o", "r.html"});
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("identical response"));
-  fail({"report", "frf.h5", "--compare", "run.slog", "-o", "no.html"}, 2,
-       "run.slog: contains neither an FRF nor a model");
 }
 
 TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
