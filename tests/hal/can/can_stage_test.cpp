@@ -92,28 +92,7 @@ TEST(CanStage, ALimitInTheNodeEndsTheRunForSafety) {
   host.stage().stop();
 }
 
-TEST(CanStage, FaultsOfTheStageEndTheRun) {
-  using Kind = SimulationSpec::Fault::Kind;
-  struct Row {
-    Kind kind;
-    Outcome outcome;
-    const char* trouble;
-  };
-  for (const Row& row : {Row{Kind::nan_sensor, Outcome::limit, "s1: the measurement is not finite"},
-                         Row{Kind::interlock, Outcome::fault, "the stage reported a fault"}}) {
-    test::SimulatedSpec spec = CanRig::quiet_stage();
-    spec.simulation.faults = {{row.kind, 0, 2, 1, -1}};
-    CanRig rig({}, spec);
-    Running host(rig);
-    EXPECT_THAT(host.exchange(3), testing::ElementsAre(Outcome::ok, Outcome::ok, row.outcome));
-    if (row.outcome == Outcome::limit) {
-      EXPECT_EQ(host.inputs().valid, 0U);
-    }
-    EXPECT_THAT(host.stage().trouble(), testing::HasSubstr(row.trouble));
-  }
-}
-
-TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
+TEST(CanStage, AHostThatFallsSilentIsStoppedUntilAnExplicitReset) {
   CanRig rig;
   Running host(rig);
   host.exchange(5);
@@ -124,7 +103,14 @@ TEST(CanStage, AHostThatFallsSilentIsStoppedWithinTheWatchdog) {
   EXPECT_EQ(host.exchange(), Outcome::fault);
   EXPECT_THAT(host.stage().trouble(), testing::HasSubstr("the host stopped sending"));
   rig.serve_ms(110);
-  EXPECT_EQ(rig.node().state(), NodeState::fault);
+  ASSERT_EQ(rig.node().state(), NodeState::fault);
+  EXPECT_THAT([&] { Host(rig).start(); },
+              testing::ThrowsMessage<StageError>(
+                  "can: pair0: the node is in fault (the host stopped sending); remove the cause "
+                  "and add --reset-fault"));
+  Host resetting(rig, {0.0, true});
+  resetting.start();
+  EXPECT_EQ(resetting.exchange(), Outcome::ok);
 }
 
 // A busy machine may stop the node between two looks at the bus.
@@ -144,20 +130,6 @@ TEST(CanStage, ADelayOfTheNodeIsNotTheSilenceOfItsHost) {
   EXPECT_EQ(rig.node().state(), NodeState::measuring) << "the host may have sent meanwhile";
   front.serve(0);
   EXPECT_EQ(rig.node().state(), NodeState::fault_reaction) << "it has not";
-}
-
-TEST(CanStage, AFaultIsLeftByAnExplicitResetOnly) {
-  CanRig rig;
-  Running host(rig);
-  rig.serve_ms(200);
-  ASSERT_EQ(rig.node().state(), NodeState::fault);
-  EXPECT_THAT([&] { Host(rig).start(); },
-              testing::ThrowsMessage<StageError>(
-                  "can: pair0: the node is in fault (the host stopped sending); remove the cause "
-                  "and add --reset-fault"));
-  Host resetting(rig, {0.0, true});
-  resetting.start();
-  EXPECT_EQ(resetting.exchange(), Outcome::ok);
 }
 
 TEST(CanStage, ANodeThatFreezesIsStaleAndOneThatRestartsAFault) {

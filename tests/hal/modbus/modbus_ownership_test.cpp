@@ -1,10 +1,9 @@
-// Ownership of the stage behind Modbus: second hosts, forged and random requests.
+// Ownership of the stage behind Modbus. integration.modbus_peer_test has second hosts and forged requests.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
-#include <random>
 #include <vector>
 
 #include "hal/modbus/modbus_encoding.hpp"
@@ -18,7 +17,6 @@ namespace stageid::test_modbus_ownership {
 namespace map = modbus_map;
 using test::ModbusBench;
 using testing::HasSubstr;
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr ModbusConnection kOwner = 1;
 constexpr ModbusConnection kOther = 2;
@@ -137,59 +135,6 @@ TEST_F(Registers, TheRunOfAnotherDoorIsLeftAlone) {
   EXPECT_EQ(moved(), 0U);
 }
 
-// Each request as a server would receive it from other clients; in between, the owner continues.
-TEST_F(Registers, ForgedAndRandomRequestsOfOthersChangeNoSample) {
-  begin();
-  std::mt19937 engine(5);
-  std::uint32_t sequence = 0;
-  std::array<std::uint8_t, kLargestPdu> reply{};
-  const auto word = [](Bytes& bytes, std::uint32_t value) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> 8));
-    bytes.push_back(static_cast<std::uint8_t>(value));
-  };
-  const auto forged = [&] {  // a function 23 to some registers of the run, often with its key
-    constexpr int kFirst[] = {map::kRunCommand, map::kRunKey, map::kSetpointSequence};
-    const auto first = static_cast<std::uint32_t>(kFirst[engine() % 3]);
-    Bytes pdu = {23};
-    for (const std::uint32_t value : {300U, 10U, first, 10U}) word(pdu, value);
-    pdu.push_back(20);
-    for (int i = 0; i < 5; ++i) {
-      const std::uint32_t values[] = {1, 2, session_, sequence + 1,
-                                      static_cast<std::uint32_t>(engine())};
-      const std::uint32_t value = values[engine() % 5];
-      word(pdu, value >> 16);
-      word(pdu, value);
-    }
-    return pdu;
-  };
-  const auto random = [&] {
-    Bytes pdu(1 + engine() % 60);
-    for (std::uint8_t& byte : pdu) byte = static_cast<std::uint8_t>(engine());
-    constexpr std::uint8_t kFunctions[] = {3, 4, 6, 16, 23};
-    pdu[0] = kFunctions[engine() % 5];
-    if (pdu.size() > 9 && engine() % 2 == 0) {  // consistent lengths, low addresses
-      pdu[1] = pdu[3] = pdu[5] = pdu[7] = 0;
-      if (pdu[0] == 16) pdu[1] = 0, pdu[4] = static_cast<std::uint8_t>((pdu.size() - 6) / 2);
-    }
-    // Supervisor commands do not belong to the run: any client may send a quick stop.
-    const bool writes = pdu[0] == 6 || pdu[0] == 16 || pdu[0] == 23;
-    if (writes && pdu.size() > 6) pdu[pdu[0] == 23 ? 6 : 2] |= 16U;
-    return pdu;
-  };
-  for (int round = 0; round < 1000; ++round) {
-    for (int i = 0; i < 10; ++i)
-      static_cast<void>(answer_request(forged(), kOther, bench_->registers(), reply));
-    for (int i = 0; i < 100; ++i)
-      static_cast<void>(answer_request(random(), kOther, bench_->registers(), reply));
-    ASSERT_EQ(move(kOwner, session_, ++sequence), ModbusException::none);
-    ASSERT_EQ(read(kOwner, map::kMeasurementStatus), 5U << 8) << round;
-    ASSERT_EQ(moved(), sequence);
-    ASSERT_EQ(bench_->fake->commands.back()[0], 1000 * 0x1p-26);
-  }
-  EXPECT_EQ(command(kOwner, map::kRunEnd, 77, session_), ModbusException::none);
-  EXPECT_EQ(bench_->node().state(), NodeState::operation_enabled);
-}
-
 TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
   ModbusBench before;
   before.stop();
@@ -203,24 +148,6 @@ TEST(ModbusOwnership, ANodeThatWasRestartedIsNamedThoughItRefuses) {
   line.inner = &restarted;
   EXPECT_EQ(host.exchange(1.0, 1.0), Outcome::fault);
   EXPECT_THAT(host.stage.trouble(), HasSubstr("the node was restarted"));
-}
-
-TEST(ModbusOwnership, ASecondHostIsRefusedAndTheFirstNoticesNothing) {
-  ModbusBench bench;
-  test::ModbusHost first(bench.address());
-  test::ModbusHost second(bench.address());
-  first.start();
-  for (int n = 0; n < 100; ++n) {
-    if (n == 50) {
-      EXPECT_THAT([&] { second.start(); }, test::refuses("another host measures with this stage"));
-      second.stage.stop();
-    }
-    ASSERT_EQ(first.exchange(1.0, 1.0), Outcome::ok) << n << first.stage.trouble();
-  }
-  first.stage.stop();
-  EXPECT_EQ(bench.node().state(), NodeState::switch_on_disabled);
-  bench.stop();
-  EXPECT_EQ(bench.fake->commands.size(), 100U);
 }
 
 }  // namespace stageid::test_modbus_ownership
