@@ -124,13 +124,13 @@ TEST_P(OrthogonalPlan, ExperimentsAreOrthogonalOnEveryLine) {
     std::vector<Eigen::MatrixXcd> spectra;
     for (int e = 0; e < n; ++e) spectra.push_back(plan.spectrum({m, e}));
     for (Eigen::Index k = 0; k < plan.grid().size(); ++k) {
-      Eigen::MatrixXcd R(n, n);
-      for (int e = 0; e < n; ++e) R.col(e) = spectra[e].col(k);
       // R R^H = n D^2, D the size A / 2 of each axis: sums of n products of size D^2.
-      const Eigen::VectorXd D = plan.amplitude().col(k) / 2.0;
-      const Eigen::MatrixXcd normalized =
-          D.cwiseInverse().asDiagonal() * (R * R.adjoint()) * D.cwiseInverse().asDiagonal();
-      EXPECT_LT((normalized - n * Eigen::MatrixXcd::Identity(n, n)).cwiseAbs().maxCoeff(),
+      Eigen::MatrixXcd R(n, n);
+      for (int e = 0; e < n; ++e)
+        for (int p = 0; p < n; ++p) R(p, e) = spectra[e](p, k) / (plan.amplitude()(p, k) / 2.0);
+      const Eigen::MatrixXcd adjoint = R.adjoint();
+      const Eigen::MatrixXcd gram = R * adjoint;
+      EXPECT_LT((gram - n * Eigen::MatrixXcd::Identity(n, n)).cwiseAbs().maxCoeff(),
                 16.0 * n * kEps)
           << "line " << k;
     }
