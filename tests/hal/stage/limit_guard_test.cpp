@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "hal/stage/motion_controller.hpp"
+#include "tests/hal/stage_bench.hpp"
 #include "tests/support/stages/stop_case.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -23,15 +24,13 @@ class GuardedLoop {
     auto watched = std::make_unique<test::WatchedStage>(spec);
     watch = watched.get();
     stage = std::make_unique<LimitedStage>(std::move(watched), spec.limits);
-    y_.resize(spec.info.sensors.size());
-    u_.resize(spec.info.actuators.size());
-    inputs_.y = y_;
-    stage->start(1, inputs_);
+    driver = std::make_unique<test::Driver>(*stage);
+    driver->start();
   }
   Outcome step(double push_n = 0.0) {
-    controller_.update(y_.data(), u_.data());
-    for (double& u : u_) u += push_n;
-    return stage->exchange({inputs_.cycle, u_}, inputs_, {});
+    controller_.update(driver->y.data(), driver->u.data());
+    for (double& u : driver->u) u += push_n;
+    return driver->step();
   }
   /// Runs until the outcome is not ok, for at most this number of samples.
   Outcome steps(int samples, double push_n = 0.0) {
@@ -46,16 +45,13 @@ class GuardedLoop {
     stage->stop();
     return samples;
   }
-  const Inputs& inputs() const { return inputs_; }
 
   std::unique_ptr<LimitedStage> stage;
   const test::WatchedStage* watch = nullptr;
+  std::unique_ptr<test::Driver> driver;
 
  private:
   MotionController controller_;
-  std::vector<double> y_;
-  std::vector<double> u_;
-  Inputs inputs_;
 };
 
 test::SimulatedSpec with_fault(Kind kind, double value, int channel = -1) {
@@ -71,7 +67,7 @@ TEST(LimitGuard, BrakesByThePredictionWhereTheSensorFailed) {
   EXPECT_EQ(loop.step(), Outcome::braking);
   const double fast_m_s = loop.watch->speed_m_s();
   EXPECT_GT(fast_m_s, 5e-4);
-  EXPECT_GT(loop.inputs().y[0], 290e-6) << "the log shows what the sensor shows";
+  EXPECT_GT(loop.driver->y[0], 290e-6) << "the log shows what the sensor shows";
   // Five time constants of a loop of 60 Hz at 10 kHz.
   EXPECT_NEAR(loop.brake(), 5.0 / (2.0 * std::numbers::pi * 60.0) * 1e4, 2.0);
   EXPECT_LT(loop.watch->speed_m_s(), 0.01 * fast_m_s);
@@ -87,7 +83,7 @@ TEST(LimitGuard, CutsTheForcesOfAnAxisThatIsNotToBeBraked) {
   ASSERT_EQ(loop.steps(100, 20.0), Outcome::ok);
   EXPECT_EQ(loop.step(), Outcome::braking);
   EXPECT_EQ(loop.step(100.0), Outcome::braking);
-  EXPECT_EQ(loop.inputs().applied[0], 0.0);
+  EXPECT_EQ(loop.driver->inputs.applied[0], 0.0);
 }
 
 TEST(LimitGuard, LearnsThatTheStageAnswersTheOtherWayRound) {

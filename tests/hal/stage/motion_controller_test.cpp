@@ -155,18 +155,15 @@ TEST(MotionController, RefusesWhatMakesNoSense) {
   refuse([](AxisController& a) { a.notches[0].frequency_hz = 0.0; });
   refuse([](AxisController& a) { a.notches[0].zero_damping = -0.1; });
   refuse([](AxisController& a) { a.notches[1].pole_damping = 0.0; });
-  MotionControllerSpec spec = single(full_axis());
-  spec.sample_rate_hz = 0.0;
-  EXPECT_THROW(MotionController{spec}, std::invalid_argument);
-  spec = single(full_axis());
-  spec.sensor_decoupling.resize(2, 1);
-  EXPECT_THROW(MotionController{spec}, std::invalid_argument);
-  spec = single(full_axis());
-  spec.actuator_decoupling(0, 0) = nan;
-  EXPECT_THROW(MotionController{spec}, std::invalid_argument);
-  spec = single(full_axis());
-  spec.axes.clear();
-  EXPECT_THROW(MotionController{spec}, std::invalid_argument);
+  const auto refuse_spec = [](auto change) {
+    MotionControllerSpec spec = single(full_axis());
+    change(spec);
+    EXPECT_THROW(MotionController{spec}, std::invalid_argument);
+  };
+  refuse_spec([](MotionControllerSpec& s) { s.sample_rate_hz = 0.0; });
+  refuse_spec([](MotionControllerSpec& s) { s.sensor_decoupling.resize(2, 1); });
+  refuse_spec([&](MotionControllerSpec& s) { s.actuator_decoupling(0, 0) = nan; });
+  refuse_spec([](MotionControllerSpec& s) { s.axes.clear(); });
 }
 
 }  // namespace stageid::test_motion_controller
