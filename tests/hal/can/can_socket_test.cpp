@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <linux/can/error.h>
 #include <netinet/in.h>
 #include <unistd.h>
 
@@ -11,7 +12,9 @@
 #include <ctime>
 #include <thread>
 
+#include "hal/can/can_transport.hpp"
 #include "hal/stage/pacer.hpp"
+#include "tests/support/stages/can_pair.hpp"
 
 namespace stageid::test_can_socket {
 
@@ -117,6 +120,37 @@ TEST(CanArrival, TheControllersClockTakesTheJitterOfTheKernelAway) {
     }
     last = arrival;
   }
+}
+
+TEST(SocketCan, ReadsErrorFramesAsTheKernelMeansThem) {
+  using State = CanBusState;
+  const auto after = [](State before, unsigned class_bits, unsigned controller) {
+    return can_state_after_error(before, class_bits, static_cast<std::uint8_t>(controller));
+  };
+  EXPECT_EQ(after(State::active, CAN_ERR_BUSOFF, 0), State::off);
+  EXPECT_EQ(after(State::off, CAN_ERR_RESTARTED, 0), State::active);
+  EXPECT_EQ(after(State::active, CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE), State::passive);
+  EXPECT_EQ(after(State::active, CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE), State::passive);
+  EXPECT_EQ(after(State::active, CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING), State::warning);
+  EXPECT_EQ(after(State::passive, CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE), State::active);
+  EXPECT_EQ(after(State::passive, CAN_ERR_ACK, 0), State::passive);
+  EXPECT_EQ(after(State::warning, CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW), State::warning);
+}
+
+TEST(SocketCan, RefusesInterfacesThatAreNotThere) {
+  EXPECT_THROW(SocketCan({}, {}), StageError);
+  // Without CAN in the kernel the socket fails, with it the name.
+  EXPECT_THROW(SocketCan({"no-such-can"}, {}), StageError);
+}
+
+TEST(CanTransport, TheWorstBusCounts) {
+  test::CanPair pair({"one", "two", "three"});
+  EXPECT_EQ(worst_bus(pair.host()).state, CanBusState::active);
+  pair.set_state(1, CanBusState::passive);
+  pair.set_state(2, CanBusState::warning);
+  EXPECT_EQ(worst_bus(pair.host()).state, CanBusState::passive);
+  EXPECT_EQ(worst_bus(pair.host()).bus, 1U);
+  EXPECT_STREQ(to_string(CanBusState::down), "interface down");
 }
 
 }  // namespace stageid::test_can_socket

@@ -2,9 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
@@ -45,25 +42,6 @@ TEST_P(ModbusWire, WritesBeforeItReads) {
   EXPECT_EQ(values, (Pair{40, 7}));
 }
 
-TEST_P(ModbusWire, AfterADrainALateReplyIsNotTakenForTheNextAnswer) {
-  serve({"late_reply:0.6"});
-  Pair values{};
-  EXPECT_EQ(read(0, values), LinkStatus::timeout);
-  EXPECT_THAT(link_->describe(link_->last()), HasSubstr("no reply within 0.4 s"));
-  link_->drain();
-  EXPECT_EQ(read(10, values), LinkStatus::ok);
-  EXPECT_EQ(values, (Pair{10, 11}));
-}
-
-TEST_P(ModbusWire, HalfAReplyIsNone) {
-  serve({"half_frame"});
-  Pair values{};
-  EXPECT_EQ(read(0, values), LinkStatus::timeout);
-  link_->drain();
-  EXPECT_EQ(read(10, values), LinkStatus::ok);
-  EXPECT_EQ(values, (Pair{10, 11}));
-}
-
 TEST_P(ModbusWire, ARefusalIsNamed) {
   serve({"exception:6"});
   Pair values{};
@@ -73,6 +51,7 @@ TEST_P(ModbusWire, ARefusalIsNamed) {
   EXPECT_THAT(link_->describe(link_->last()), HasSubstr("Illegal data address"));
 }
 
+// modbus_stage_test.cpp has the faults of both wires, integration.modbus_fault_matrix a flood.
 INSTANTIATE_TEST_SUITE_P(Wires, ModbusWire, testing::Bool(),
                          [](const auto& wire) { return wire.param ? "Rtu" : "Tcp"; });
 
@@ -87,57 +66,6 @@ TEST_P(ModbusRtuWire, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
   std::this_thread::sleep_for(std::chrono::seconds(2));  // a pty is slow on a busy machine
   EXPECT_EQ(read(10, values), LinkStatus::ok);
   EXPECT_EQ(values, (Pair{0, 1}));
-}
-
-TEST_P(ModbusRtuWire, AnotherUnitsReplyIsCorrupt) {
-  serve({"wrong_unit"});
-  Pair values{};
-  EXPECT_EQ(read(0, values), LinkStatus::corrupt);
-}
-
-TEST(ModbusClient, ADeadServerIsDisconnected) {
-  test::NumberedRegisters registers;
-  ModbusFaultScript script(test::modbus_faults({"dead_server@2"}));
-  const test::ServerThread server(registers, &script);
-  ModbusClient link(server.address(), test::kQuickTiming);
-  Pair values{};
-  EXPECT_EQ(link.read(0, values), LinkStatus::disconnected) << "not connected yet";
-  link.connect();
-  EXPECT_EQ(link.read(0, values), LinkStatus::ok);
-  EXPECT_EQ(link.read(0, values), LinkStatus::disconnected);
-  EXPECT_FALSE(link.connected());
-  EXPECT_THROW(link.connect(), StageError);
-}
-
-// A device that never stops sending keeps every buffer full.
-TEST(ModbusClient, AFloodEndsTheConnection) {
-  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
-  ASSERT_EQ(::listen(listener, 1), 0);  // on any free port
-  sockaddr_in name{};
-  socklen_t size = sizeof name;
-  ::getsockname(listener, reinterpret_cast<sockaddr*>(&name), &size);
-  std::thread flood([listener] {
-    const int peer = ::accept(listener, nullptr, nullptr);
-    char request = 0;  // earlier garbage would end the connection before it is used
-    ::recv(peer, &request, 1, 0);
-    const std::vector<char> garbage(1 << 20);
-    while (::send(peer, garbage.data(), garbage.size(), MSG_NOSIGNAL) > 0) {
-    }
-    ::close(peer);
-  });
-  ModbusAddress address;
-  address.port = ntohs(name.sin_port);
-  ModbusClient link(address, test::kQuickTiming);
-  link.connect();
-  Pair values{};
-  EXPECT_EQ(link.read(0, values), LinkStatus::corrupt);
-  link.drain();
-  EXPECT_FALSE(link.connected());
-  EXPECT_EQ(link.read(0, values), LinkStatus::flooded);
-  EXPECT_THAT(link.describe(link.last()), HasSubstr("sends more than it is asked for"));
-  link.close();
-  flood.join();
-  ::close(listener);
 }
 
 TEST(ModbusClient, AddressesAndTimesThatMakeNoSenseAreRefused) {
