@@ -30,6 +30,12 @@ testing::AssertionResult same_bytes(const std::string& a, const std::string& b) 
          << parted.first - a.begin() << " on";
 }
 
+std::vector<std::string> joined(std::vector<std::string> words,
+                                const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos)

@@ -15,6 +15,9 @@ namespace stageid::test {
 
 std::string read_bytes(const std::filesystem::path& file);
 void write_bytes(const std::filesystem::path& file, const std::string& bytes);
+/// The words of a command, and more of them.
+std::vector<std::string> joined(std::vector<std::string> words,
+                                const std::vector<std::string>& more);
 std::string replaced(std::string text, const std::string& from, const std::string& to);
 
 /// Says where two contents part, without printing them: most are binary or long.

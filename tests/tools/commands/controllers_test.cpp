@@ -8,22 +8,15 @@
 
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
+#include "tests/tools/config/controller_arrays.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/exchange/arrays/npz_file.hpp"
 
 namespace stageid::test {
 namespace test_controllers {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
-  const Eigen::MatrixXd rows = m.transpose();
-  return {name,
-          {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())},
-          std::vector<double>(rows.data(), rows.data() + rows.size())};
-}
 
 struct Controllers : ProgramTest {
   /// The small experiment with another text from `controller:` on in its stage file.
@@ -35,10 +28,10 @@ struct Controllers : ProgramTest {
   /// Its controller as matrices, times a factor.
   std::string in_matrices(const std::string& file, double factor) const {
     const MotionController controller(load_stage_config(at("small_stage.yaml")).spec.controller);
-    const ControllerStateSpace s = controller.realization();
-    write_npz(at("c.npz"), {at("c.npz"),
-                            {array_of("A", s.a), array_of("B", s.b), array_of("C", factor * s.c),
-                             array_of("D", factor * s.d)}});
+    ControllerStateSpace s = controller.realization();
+    s.c *= factor;
+    s.d *= factor;
+    write_npz(at("c.npz"), arrays_of(at("c.npz"), s));
     return with_controller(file, "controller: c.npz\n");
   }
   json findings(const std::string& log) const {

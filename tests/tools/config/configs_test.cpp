@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <functional>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
@@ -17,35 +18,25 @@ namespace stageid::test_configs {
 
 const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR) / "configs";
 
-TEST(Configs, EveryStageLoads) {
+/// Loads every file in this folder.
+void expect_loads(const char* folder, int least,
+                  const std::function<void(const std::filesystem::path&)>& load) {
   int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "stage")) {
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / folder)) {
     SCOPED_TRACE(entry.path());
-    EXPECT_NO_THROW(load_stage_config(entry.path()));
+    EXPECT_NO_THROW(load(entry.path()));
     ++count;
   }
-  EXPECT_GE(count, 2);
+  EXPECT_GE(count, least);
 }
 
-TEST(Configs, EveryExperimentLoads) {
-  int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "experiment")) {
-    SCOPED_TRACE(entry.path());
-    const ExperimentConfig config = load_experiment_config(entry.path());
-    EXPECT_GT(outline_plan(config).runs().size(), 0U);
-    ++count;
-  }
-  EXPECT_GE(count, 3);
-}
-
-TEST(Configs, EveryFleetLoads) {
-  int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "fleet")) {
-    SCOPED_TRACE(entry.path());
-    EXPECT_FALSE(load_fleet_config(entry.path()).logs.empty());
-    ++count;
-  }
-  EXPECT_GE(count, 1);
+TEST(Configs, EveryFileLoads) {
+  expect_loads("stage", 2, [](const auto& file) { load_stage_config(file); });
+  expect_loads("experiment", 3, [](const auto& file) {
+    EXPECT_GT(outline_plan(load_experiment_config(file)).runs().size(), 0U);
+  });
+  expect_loads("fleet", 1,
+               [](const auto& file) { EXPECT_FALSE(load_fleet_config(file).logs.empty()); });
 }
 
 TEST(Configs, WhatTheWiresHaveToCarryIsForetold) {

@@ -12,9 +12,9 @@
 #include "hal/simulator/loop_stability.hpp"
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
+#include "tests/tools/config/controller_arrays.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/config/stage_expectation.hpp"
-#include "tools/exchange/arrays/npz_file.hpp"
 #include "tools/exchange/matlab/mat_file.hpp"
 
 namespace stageid::test_loop_controller {
@@ -27,13 +27,6 @@ const std::filesystem::path kSmall =
 std::string row_by_row(const Eigen::MatrixXd& m) {
   const auto values = m.reshaped<Eigen::RowMajor>();
   return fmt::format("[{:.17g}]", fmt::join(values.begin(), values.end(), ", "));
-}
-
-NamedArray array_of(const char* name, const Eigen::MatrixXd& m) {
-  const auto values = m.reshaped<Eigen::RowMajor>();
-  return {name,
-          {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())},
-          std::vector<double>(values.begin(), values.end())};
 }
 
 struct LoopController : testing::Test {
@@ -63,9 +56,7 @@ struct LoopController : testing::Test {
         rate_hz, matrices());
   }
   ArrayList arrays(const std::string& file) const {
-    return {directory_ / file,
-            {array_of("A", system_.a), array_of("B", system_.b), array_of("C", system_.c),
-             array_of("D", system_.d)}};
+    return test::arrays_of(directory_ / file, system_);
   }
   void expect_same(const StageConfig& config, const std::string& form) const {
     const MotionController controller(config.spec.controller);
@@ -158,7 +149,7 @@ TEST_F(LoopController, RefusesWhatCannotBeComputedSampleBySample) {
                        "denominator: [1, 1]}]"),
               HasSubstr("causal"));
   ArrayList transposed = arrays("t.npz");
-  transposed.arrays[1] = array_of("B", system_.b.transpose());
+  transposed.arrays[1] = test::array_of("B", system_.b.transpose());
   write_npz(directory_ / "t.npz", transposed);
   EXPECT_THAT(error_of("controller: t.npz"), HasSubstr("expected 8 x 2"));
 }

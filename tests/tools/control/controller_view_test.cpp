@@ -9,9 +9,9 @@
 #include "hal/simulator/loop_stability.hpp"
 #include "hal/simulator/plant_spec.hpp"
 #include "hal/stage/motion_controller.hpp"
+#include "tests/tools/config/controller_arrays.hpp"
 #include "tests/tools/program_fixture.hpp"
 #include "tools/config/stage_config.hpp"
-#include "tools/exchange/arrays/npz_file.hpp"
 
 namespace stageid::test {
 namespace test_controller_view {
@@ -33,10 +33,8 @@ struct ControllerViewTest : ProgramTest {
   }
   json view(const std::vector<std::string>& more = {},
             const std::string& stage_file = "small_stage.yaml") const {
-    std::vector<std::string> words = {"export",    "model.json",        "-o",
-                                      "view.json", "--controller-view", stage_file};
-    words.insert(words.end(), more.begin(), more.end());
-    succeed(words);
+    succeed(
+        joined({"export", "model.json", "-o", "view.json", "--controller-view", stage_file}, more));
     return json::parse(read_bytes(at("view.json")));
   }
 };
@@ -125,15 +123,7 @@ TEST_F(ControllerViewTest, MatricesAreOneLoopPerActuatorOfTheSameDeterminant) {
   make_model_with_covariance();
   const json axes = view({"--frf", "frf.h5"});
   const MotionController controller(load_stage_config(at("small_stage.yaml")).spec.controller);
-  const ControllerStateSpace s = controller.realization();
-  const auto array = [](const char* name, const Eigen::MatrixXd& m) {
-    const Eigen::MatrixXd rows = m.transpose();
-    return NamedArray{name,
-                      {static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())},
-                      std::vector<double>(rows.data(), rows.data() + rows.size())};
-  };
-  write_npz(at("c.npz"),
-            {at("c.npz"), {array("A", s.a), array("B", s.b), array("C", s.c), array("D", s.d)}});
+  write_npz(at("c.npz"), arrays_of(at("c.npz"), controller.realization()));
   const std::string text = read_bytes(at("small_stage.yaml"));
   write_bytes(at("matrices.yaml"),
               text.substr(0, text.find("controller:")) + "controller: c.npz\n");
@@ -169,9 +159,7 @@ TEST_F(ControllerViewTest, TheReportShowsTheViewOfItsModelOnly) {
 TEST_F(ControllerViewTest, WhatDoesNotBelongTogetherIsRefused) {
   make_model_with_covariance();
   const auto refuse = [&](const std::vector<std::string>& more, const std::string& text) {
-    std::vector<std::string> words = {"export", "model.json", "-o", "view.json"};
-    words.insert(words.end(), more.begin(), more.end());
-    fail(words, 2, text);
+    fail(joined({"export", "model.json", "-o", "view.json"}, more), 2, text);
   };
   refuse({"--controller-view", "small_stage.yaml", "--driving-point", "s1", "a1"},
          "--driving-point");

@@ -202,9 +202,8 @@ TEST_F(BadRequest, AResultThatWouldReplaceWhatItIsMadeOf) {
 
 TEST_F(BadRequest, Fits) {
   make_frf();
-  const auto wrong = [&](std::vector<std::string> flags, const std::string& text) {
-    flags.insert(flags.begin(), {"fit", "frf.h5", "-o", "m.json"});
-    fail(flags, 2, text);
+  const auto wrong = [&](const std::vector<std::string>& flags, const std::string& text) {
+    fail(joined({"fit", "frf.h5", "-o", "m.json"}, flags), 2, text);
   };
   wrong({"--residue-rank", "0"}, "--residue-rank: got '0'; expected full or a rank");
   wrong({"--residue-rank", "2", "--damping", "general"}, "full or 1 with general damping");

@@ -29,9 +29,7 @@ TEST_F(GeneralStructure, OneDenominatorForTwoModesBesideTheOthers) {
   EXPECT_NEAR(fourth.poles[0].natural_frequency_hz, 181.147, 0.01);
   EXPECT_NEAR(fourth.poles[1].natural_frequency_hz, 422.22, 0.05);
   EXPECT_GT(fourth.poles[0].natural_frequency_std_hz.value(), 0.0);
-  std::vector<std::string> threads = fit;
-  threads.insert(threads.end(), {"--threads", "2"});
-  succeed(threads);
+  succeed(joined(fit, {"--threads", "2"}));
   EXPECT_TRUE(same_bytes(read_bytes(at("m.json")), bytes));
 }
 

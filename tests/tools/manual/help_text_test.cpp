@@ -1,5 +1,6 @@
 #include "tools/manual/help_text.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <iterator>
@@ -10,6 +11,8 @@
 
 namespace stageid {
 namespace {
+
+using testing::HasSubstr;
 
 std::string help_at(std::size_t width) {
   CLI::App app{"Does things", "things"};
@@ -30,23 +33,17 @@ std::string help_at(std::size_t width) {
 }
 
 TEST(HelpText, WrapsAtItsWidthAndNamesTheValues) {
-  EXPECT_NE(
-      help_at(200).find("  --seconds SECONDS           how long the words of this description "
-                        "are to be read [3]\n"),
-      std::string::npos)
-      << help_at(200);
+  EXPECT_THAT(help_at(200), HasSubstr("  --seconds SECONDS           how long the words of this "
+                                      "description are to be read [3]\n"));
   const std::string narrow = help_at(64);
   std::istringstream lines(narrow);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 64U) << line;
-  EXPECT_NE(narrow.find("  input                       a file of things\n"), std::string::npos);
-  EXPECT_NE(narrow.find("\n                              description are to be read [3]\n"),
-            std::string::npos)
-      << narrow;
-  EXPECT_NE(
-      narrow.find("  --a-band-with-a-long-name NUMBER NUMBER\n                              low "),
-      std::string::npos)
-      << narrow;
-  EXPECT_NE(narrow.find("no words (only with\n"), std::string::npos) << narrow;
+  EXPECT_THAT(narrow, HasSubstr("  input                       a file of things\n"));
+  EXPECT_THAT(narrow,
+              HasSubstr("\n                              description are to be read [3]\n"));
+  EXPECT_THAT(narrow, HasSubstr("  --a-band-with-a-long-name NUMBER NUMBER\n"
+                                "                              low "));
+  EXPECT_THAT(narrow, HasSubstr("no words (only with\n"));
 }
 
 TEST(HelpText, LosesNoWord) {

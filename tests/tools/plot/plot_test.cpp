@@ -70,10 +70,8 @@ struct Plot : ProgramTest {
 
 TEST_F(Plot, StyleAndBandAreThoseThatAreAskedFor) {
   make_model();
-  const auto width = [&](std::vector<std::string> more) {
-    std::vector<std::string> command = {"plot", "cmif", "frf.h5", "-o", "styled.png"};
-    command.insert(command.end(), more.begin(), more.end());
-    succeed(command);
+  const auto width = [&](const std::vector<std::string>& more) {
+    succeed(joined({"plot", "cmif", "frf.h5", "-o", "styled.png"}, more));
     return png_width(read_bytes(at("styled.png")));
   };
   EXPECT_NEAR(width({"--preset", "single"}), 3.5 * 300, 2);
@@ -258,9 +256,8 @@ TEST_F(Plot, NothingIsLeftInTheTemporaryDirectory) {
 
 TEST_F(Plot, RequestsThatAreWrong) {
   make_model();
-  const auto wrong = [&](std::vector<std::string> words, const std::string& text) {
-    words.insert(words.begin(), "plot");
-    fail(words, 2, text);
+  const auto wrong = [&](const std::vector<std::string>& words, const std::string& text) {
+    fail(joined({"plot"}, words), 2, text);
   };
   const std::string frf = name("frf.h5");
   const std::string out = name("p.pdf");
