@@ -93,11 +93,10 @@ TEST(SampledResponse, DelayedByWholeSamplesTurnsThePhaseOnly) {
 // Between suspension and first flexible mode the stage is a rigid body: G = J_y M^-1 J_u^T / s^2.
 TEST(ContinuousResponse, OfTheStageIsARigidBodyBelowTheFlexibleModes) {
   test::SimulatedSpec spec = test::silent_wafer_stage_spec();
-  Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(6, 6);
-  inertia.diagonal() << 20.0, 20.0, 20.0, spec.plant.inertia_kg_m2[0], spec.plant.inertia_kg_m2[1],
-      spec.plant.inertia_kg_m2[2];
-  const Eigen::MatrixXd mass_line = rigid_body_jacobian(spec.info.sensors) * inertia.inverse() *
-                                    rigid_body_jacobian(spec.info.actuators).transpose();
+  const auto inertia = spec.plant.axis_inertia();
+  Eigen::MatrixXd accelerations = rigid_body_jacobian(spec.info.actuators).transpose();
+  for (int i = 0; i < 6; ++i) accelerations.row(i) /= inertia[i];
+  const Eigen::MatrixXd mass_line = rigid_body_jacobian(spec.info.sensors) * accelerations;
   const double f = 10.0;
   const double omega = kTwoPi * f;
   const Eigen::MatrixXcd G = continuous_response(plant_modes(spec.info, spec.plant), f);

@@ -94,7 +94,7 @@ ControllerStateSpace random_system(Eigen::Index n, Eigen::Index actuators, Eigen
   std::srand(3);
   ControllerStateSpace s;
   s.a = Eigen::MatrixXd::Random(n, n);
-  s.a *= 0.8 / s.a.operatorNorm();
+  s.a *= 0.8 / svd(s.a, 0).singularValues()[0];
   s.b = Eigen::MatrixXd::Random(n, sensors);
   s.c = Eigen::MatrixXd::Random(actuators, n);
   s.d = Eigen::MatrixXd::Random(actuators, sensors);

@@ -5,10 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <httplib.h>
-#include <netinet/in.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,49 +14,12 @@
 
 #include "hal/stage/stage.hpp"
 #include "tests/support/process/resident_bytes.hpp"
+#include "tests/tools/dashboard/raw_client.hpp"
 
 namespace stageid::test_dashboard_server {
 
 using namespace std::chrono_literals;
-
-/// A connection to this machine that may or may not read what it is sent.
-class RawClient {
- public:
-  /// Sends `begin` of a request. @param more flags of the socket
-  RawClient(int port, const std::string& begin, int more = 0)
-      : socket_(::socket(AF_INET, SOCK_STREAM | more, 0)) {
-    const int small = 1024;
-    ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(port));
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    good_ = ::connect(socket_, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0 && send(begin);
-  }
-  ~RawClient() { ::close(socket_); }
-  RawClient(RawClient&&) = delete;
-  bool good() const { return good_; }
-  /// False if the other end has hung up.
-  bool send(const std::string& bytes) const {
-    return ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
-           static_cast<ssize_t>(bytes.size());
-  }
-  /// What comes until `end` is in it.
-  std::string read_until(const std::string& end) const {
-    std::string text;
-    char piece[512];
-    while (text.find(end) == std::string::npos) {
-      const ssize_t n = ::recv(socket_, piece, sizeof piece, 0);
-      if (n <= 0) break;
-      text.append(piece, static_cast<std::size_t>(n));
-    }
-    return text;
-  }
-
- private:
-  int socket_;
-  bool good_ = false;
-};
+using test::RawClient;
 
 /// A request that never ends.
 const std::string kEndless = "GET / HTTP/1.1\r\nX: ";

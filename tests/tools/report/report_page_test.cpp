@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/files/input_files.hpp"
@@ -173,13 +172,13 @@ TEST(Report, NeedsNothingOutsideTheFile) {
   const std::string page = report_page(small());
   EXPECT_THAT(page, HasSubstr("default-src 'none'"));
   EXPECT_EQ(count(page, "sourceMappingURL"), 0u);
-  const std::regex place(R"(\{\{[a-z_]+\}\})");  // every place of the template is filled
-  EXPECT_EQ(std::distance(std::sregex_iterator(page.begin(), page.end(), place), {}), 0);
+  // Every place of the template is filled.
+  EXPECT_THAT(page, testing::Not(testing::ContainsRegex("\\{\\{[a-z_]+\\}\\}")));
   // Nothing is loaded: no address in src or href but the empty icon's.
-  const std::regex reference(R"re(<[^<>]*\s(src|href)\s*=\s*"([^"#][^"]*)")re");
   const std::string head = page.substr(0, page.find("<style>"));
-  for (std::sregex_iterator it(head.begin(), head.end(), reference), end; it != end; ++it)
-    EXPECT_EQ((*it)[2].str(), "data:,");
+  EXPECT_THAT(head, testing::Not(testing::ContainsRegex(
+                        R"re([[:space:]](src|href)[[:space:]]*=[[:space:]]*"([^"#d]|d[^a]))re")));
+  EXPECT_EQ(count(head, "=\"da"), count(head, "=\"data:,\""));
   EXPECT_EQ(count(page, "<link"), 1u);
   EXPECT_EQ(count(page, "@import"), 0u);
   EXPECT_THAT(page, HasSubstr("Permission is hereby granted"));  // the library's licence

@@ -4,12 +4,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <httplib.h>
 
 #include <chrono>
 #include <sstream>
 #include <thread>
 
+#include "tests/tools/dashboard/raw_client.hpp"
 #include "tests/tools/program_fixture.hpp"
 
 namespace stageid::test_workbench {
@@ -47,12 +47,17 @@ struct WorkbenchTest : test::ProgramTest {
     EXPECT_THAT(reply.text, HasSubstr(why));
     EXPECT_EQ(state()["states"].size(), states);
   }
-  httplib::Client client() const {
-    const std::string& url = bench_->url();
-    return httplib::Client("127.0.0.1", std::stoi(url.substr(url.find(':', 7) + 1)));
+  /// What the page fetches.
+  Json results() const {
+    const std::string& url = bench_->url();  // http://127.0.0.1:PORT/?token=...
+    const std::string host = url.substr(7, url.find('/', 7) - 7);
+    const test::RawClient client(std::stoi(host.substr(host.find(':') + 1)),
+                                 "GET /response.json" + url.substr(url.find('?')) +
+                                     " HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n\r\n",
+                                 0, 1 << 20);
+    const std::string answer = client.read_until("the end of the connection");
+    return Json::parse(answer.substr(answer.find("\r\n\r\n")));
   }
-  std::string token() const { return bench_->url().substr(bench_->url().find('?')); }
-  Json results() const { return Json::parse(client().Get("/response.json" + token())->body); }
   static Json current(const Json& state) {
     return state["states"][state["index"].get<std::size_t>()];
   }

@@ -19,28 +19,36 @@ namespace stageid::test_model_code {
 
 constexpr int kSamples = 400;
 
+using Numbers = std::vector<long double>;
+
+/// A x + B v.
+Numbers sum_of(const Eigen::MatrixXd& A, const Numbers& x, const Eigen::MatrixXd& B,
+               const Numbers& v) {
+  Numbers out(A.rows());
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    for (Eigen::Index j = 0; j < A.cols(); ++j) out[i] += A(i, j) * x[j];
+    for (Eigen::Index j = 0; j < B.cols(); ++j) out[i] += B(i, j) * v[j];
+  }
+  return out;
+}
+
 /// y of u, samples x channels, by the sums in sampled_state_space.hpp with whole matrices in long double.
 Eigen::MatrixXd reference(const SampledStateSpace& model, const Eigen::MatrixXd& u) {
-  using Matrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const StateSpace& s = model.system;
-  const Matrix A = s.A.cast<long double>();
-  const Matrix B = s.B.cast<long double>();
-  const Matrix C = s.C.cast<long double>();
-  const Matrix D = s.D.cast<long double>();
-  Matrix x = Matrix::Zero(s.order(), 1);
+  Numbers x(s.order());
   Eigen::MatrixXd y = Eigen::MatrixXd::Zero(u.rows(), s.C.rows());
   for (Eigen::Index n = 0; n < u.rows(); ++n) {
-    Matrix v = Matrix::Zero(s.B.cols(), 1);
-    for (Eigen::Index j = 0; j < v.rows(); ++j) {
+    Numbers v(s.B.cols());
+    for (Eigen::Index j = 0; j < s.B.cols(); ++j) {
       const Eigen::Index from = n - model.input_delay_samples[j];
-      if (from >= 0) v(j, 0) = u(from, j);
+      if (from >= 0) v[j] = u(from, j);
     }
-    const Matrix out = C * x + D * v;
+    const Numbers out = sum_of(s.C, x, s.D, v);
     for (Eigen::Index i = 0; i < y.cols(); ++i) {
       const Eigen::Index to = n + model.output_delay_samples[i];
-      if (to < y.rows()) y(to, i) = static_cast<double>(out(i, 0));
+      if (to < y.rows()) y(to, i) = static_cast<double>(out[i]);
     }
-    x = (A * x + B * v).eval();
+    x = sum_of(s.A, x, s.B, v);
   }
   return y;
 }
