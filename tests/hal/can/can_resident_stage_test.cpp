@@ -186,17 +186,6 @@ TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
   EXPECT_EQ(rig.node().state(), NodeState::fault);
 }
 
-TEST(CanResidentStage, StopBringsAPlayingNodeToRestUnderControl) {
-  CanRig rig;
-  const auto stage = rig.resident();
-  stage->upload(waveforms(5000));
-  stage->arm({});
-  stage->stop();
-  EXPECT_EQ(rig.node().state(), NodeState::quick_stop);
-  rig.serve_ms(120);
-  EXPECT_EQ(rig.node().state(), NodeState::switch_on_disabled);
-}
-
 TEST(CanResidentStage, RefusesWhatDoesNotFit) {
   CanRig rig;
   const auto stage = rig.resident();

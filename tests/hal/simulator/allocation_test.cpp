@@ -8,6 +8,7 @@
 #include "hal/stage/limited_stage.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/replay_stage.hpp"
+#include "tests/hal/stage/fake_stage.hpp"
 #include "tests/hal/stage_bench.hpp"
 #include "tests/support/process/allocation_counter.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -108,11 +109,7 @@ struct OneRun final : ReplaySource {
 };
 
 TEST_F(Allocation, AReplayedCycleHasNone) {
-  StageInfo info;
-  info.sample_rate_hz = 1e3;
-  info.actuators.resize(2);
-  info.sensors.resize(1);
-  ReplayStage replay(info, std::make_unique<OneRun>(), 0.0);
+  ReplayStage replay(test::FakeStage(2, 1, 1e3).info(), std::make_unique<OneRun>(), 0.0);
   test::Driver host(replay);
   host.start();
   const test::AllocationCounter counter;

@@ -88,7 +88,8 @@ TEST(MotionController, RunsAsItsResponseSays) {
   for (const int line : {1, 3, 50, 170}) {
     const Eigen::VectorXcd measured =
         test::measured_response(controller, direction, {line, kPeriod, 4});
-    const Eigen::VectorXcd exact = controller.response(line * 1e4 / kPeriod) * direction;
+    const Eigen::VectorXcd exact =
+        controller.response(line * 1e4 / kPeriod) * direction.cast<std::complex<double>>();
     EXPECT_LT((measured - exact).norm(), 1e-9 * exact.norm()) << line;
   }
 }

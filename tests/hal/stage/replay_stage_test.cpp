@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/hal/stage/fake_stage.hpp"
 #include "tests/hal/stage_bench.hpp"
 
 namespace stageid::test_replay_stage {
@@ -43,13 +44,7 @@ Recorded recorded(double offset) {
   return run;
 }
 
-StageInfo info() {
-  StageInfo info;
-  info.sample_rate_hz = 1e3;
-  info.actuators.resize(2);
-  info.sensors.resize(1);
-  return info;
-}
+StageInfo info() { return test::FakeStage(2, 1, 1e3).info(); }
 
 ReplayStage stage(std::vector<Recorded> runs, double tolerance_n = 1e-9) {
   return {info(), std::make_unique<MemorySource>(std::move(runs)), tolerance_n};

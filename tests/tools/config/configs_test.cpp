@@ -76,22 +76,21 @@ TEST(Configs, AFaultIsReadWithItsChannelOrMode) {
               "  - {kind: actuator_gain, channel: a2, value: 0.9, ramp_s: 0.5}\n",
           "")
           .simulation.faults;
-  ASSERT_EQ(faults.size(), 5U);
-  EXPECT_EQ(faults[0].kind, Kind::mode_frequency);
-  EXPECT_EQ(faults[0].channel, 6);
-  EXPECT_EQ(faults[0].from_cycle, 2000U);
-  EXPECT_EQ(faults[0].value, -0.02);
-  EXPECT_EQ(faults[0].ramp_s, 5.0);
-  EXPECT_EQ(faults[1].kind, Kind::mode_damping);
-  EXPECT_EQ(faults[1].channel, -1);
-  EXPECT_EQ(faults[1].ramp_s, 0.0);
-  EXPECT_EQ(faults[2].kind, Kind::sensor_gain);
-  EXPECT_EQ(faults[2].channel, 1);
-  EXPECT_EQ(faults[2].run, 1);
-  EXPECT_EQ(faults[3].kind, Kind::sensor_noise);
-  EXPECT_EQ(faults[3].channel, -1);
-  EXPECT_EQ(faults[4].channel, 1);
-  EXPECT_EQ(faults[4].ramp_s, 0.5);
+  const SimulationSpec::Fault expected[] = {{Kind::mode_frequency, 6, 2000, 1, -1, -0.02, 5.0},
+                                            {Kind::mode_damping, -1, 0, 1, -1, 0.5},
+                                            {Kind::sensor_gain, 1, 0, 1, 1, 1.1},
+                                            {Kind::sensor_noise, -1, 0, 1, -1, 3.0},
+                                            {Kind::actuator_gain, 1, 0, 1, -1, 0.9, 0.5}};
+  ASSERT_EQ(faults.size(), std::size(expected));
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    SCOPED_TRACE(i);
+    EXPECT_EQ(faults[i].kind, expected[i].kind);
+    EXPECT_EQ(faults[i].channel, expected[i].channel);
+    EXPECT_EQ(faults[i].from_cycle, expected[i].from_cycle);
+    EXPECT_EQ(faults[i].run, expected[i].run);
+    EXPECT_EQ(faults[i].value, expected[i].value);
+    EXPECT_EQ(faults[i].ramp_s, expected[i].ramp_s);
+  }
 }
 
 // Otherwise the node stops the stage before the host has sent a lost frame again.

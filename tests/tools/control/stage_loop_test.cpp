@@ -46,8 +46,8 @@ void expect_response(const StageSpec& stage, const AdditiveModel& model,
     return std::ranges::find(channels, name, &Channel::name) - channels.begin();
   };
   for (const double hz : {3.0, 40.0, 900.0}) {
-    const Eigen::MatrixXcd told =
-        loop.actuators * controller_response(loop, hz, model.sample_rate_hz);
+    const Eigen::MatrixXcd told = loop.actuators.cast<std::complex<double>>() *
+                                  controller_response(loop, hz, model.sample_rate_hz);
     const Eigen::MatrixXcd exact = -controller.response(hz);
     ASSERT_EQ(told.rows(), model.n_inputs());
     for (Eigen::Index j = 0; j < told.rows(); ++j)

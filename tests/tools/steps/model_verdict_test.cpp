@@ -109,25 +109,17 @@ TEST(ModelVerdict, QuotesWhatAModelOfOthersPutsIntoACommand) {
       R"(stageid fit 'it'\''s.h5' -o m.json --modes '1;reboot' --band 1 '2|sh' --delay '$(reboot)')");
 }
 
-TEST(ModelVerdict, AFaultOfTheDataFillsTheHead) {
-  AdditiveModel model = fitted_to_drifting_data();
+TEST(ModelVerdict, AFaultOfTheDataComesFirstAndFillsTheHead) {
   Finding dead;
   dead.severity = Severity::fault;
   dead.channel = "z1";
   dead.what = "dead";
-  const ModelVerdict verdict = judge_model(model, {dead}, {});
+  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {dead}, {});
   EXPECT_THAT(reasons_of(verdict), ElementsAre(HasSubstr("z1: dead"), "a mode drifts"));
   EXPECT_THAT(verdict_lines(verdict), ElementsAre("verdict: not to be trusted: z1: dead"));
-}
-
-TEST(ModelVerdict, PutsFaultsOfOtherDataFirst) {
-  Finding dead;
-  dead.severity = Severity::fault;
-  dead.channel = "z1";
-  dead.what = "dead";
-  const ModelVerdict verdict = judge_model(fitted_to_drifting_data(), {dead}, unexplained());
-  ASSERT_EQ(verdict.problems.size(), 3U);
-  EXPECT_THAT(verdict.problems.front().what, HasSubstr("z1: dead"));
+  const ModelVerdict other = judge_model(fitted_to_drifting_data(), {dead}, unexplained());
+  ASSERT_EQ(other.problems.size(), 3U);
+  EXPECT_THAT(other.problems.front().what, HasSubstr("z1: dead"));
 }
 
 TEST(ModelVerdict, DistrustsARecordingThatLostSamples) {
