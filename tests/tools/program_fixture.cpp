@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 #include "acquisition/files/input_files.hpp"
@@ -30,12 +32,6 @@ testing::AssertionResult same_bytes(const std::string& a, const std::string& b) 
          << parted.first - a.begin() << " on";
 }
 
-std::vector<std::string> joined(std::vector<std::string> words,
-                                const std::vector<std::string>& more) {
-  words.insert(words.end(), more.begin(), more.end());
-  return words;
-}
-
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos)
@@ -57,36 +53,32 @@ ProgramTest::ProgramTest() {
                                 "../stage/small_stage.yaml", "small_stage.yaml"));
 }
 
-ProgramResult ProgramTest::run(const std::vector<std::string>& arguments,
-                               ProgramOptions options) const {
+ProgramResult ProgramTest::run(const std::string& line, ProgramOptions options) const {
   if (options.working_directory.empty()) options.working_directory = directory_.path();
-  return run_program(STAGEID_PROGRAM, arguments, options);
+  std::istringstream words(line);
+  return run_program(STAGEID_PROGRAM, {std::istream_iterator<std::string>(words), {}}, options);
 }
 
-ProgramResult ProgramTest::succeed(const std::vector<std::string>& arguments) const {
-  return ends(arguments, 0);
-}
+ProgramResult ProgramTest::succeed(const std::string& line) const { return ends(line, 0); }
 
-ProgramResult ProgramTest::ends(const std::vector<std::string>& arguments, int exit_code,
-                                const std::string& text, ProgramOptions options) const {
-  const ProgramResult result = run(arguments, options);
+ProgramResult ProgramTest::ends(const std::string& line, int exit_code, const std::string& text,
+                                ProgramOptions options) const {
+  SCOPED_TRACE(line);
+  const ProgramResult result = run(line, options);
   EXPECT_EQ(result.exit_code, exit_code) << result.err << result.out;
   EXPECT_THAT(result.err, testing::HasSubstr(text));
   return result;
 }
 
-nlohmann::json ProgramTest::tell(std::vector<std::string> arguments, int exit_code) const {
-  arguments.emplace_back("--json");
-  return nlohmann::json::parse(ends(arguments, exit_code).out);
+nlohmann::json ProgramTest::tell(const std::string& line, int exit_code) const {
+  return nlohmann::json::parse(ends(line + " --json", exit_code).out);
 }
 
-void ProgramTest::fail(const std::vector<std::string>& arguments, int exit_code,
-                       const std::string& text, ProgramOptions options) const {
-  std::string line;
-  for (const std::string& argument : arguments) line += argument + " ";
+void ProgramTest::fail(const std::string& line, int exit_code, const std::string& text,
+                       ProgramOptions options) const {
   SCOPED_TRACE(line);
   const auto before = snapshot(directory_.path());
-  const ProgramResult result = run(arguments, options);
+  const ProgramResult result = run(line, options);
   EXPECT_EQ(result.exit_code, exit_code);
   EXPECT_THAT(result.err, testing::MatchesRegex("stageid: [^\n]+\n")) << "one line, no more";
   EXPECT_THAT(result.err, testing::HasSubstr(text));
@@ -111,19 +103,18 @@ std::string ProgramTest::stage(const std::string& file, const std::string& from,
 }
 
 void ProgramTest::make_log() const {
-  if (!std::filesystem::exists(at("run.slog"))) succeed({"run", config_, "-o", "run.slog"});
+  if (!std::filesystem::exists(at("run.slog"))) succeed("run " + config_ + " -o run.slog");
 }
 
 void ProgramTest::make_frf() const {
   make_log();
-  if (!std::filesystem::exists(at("frf.h5")))
-    succeed({"frf", "run.slog", "-o", "frf.h5", "--realizations", "1,2"});
+  if (!std::filesystem::exists(at("frf.h5"))) succeed("frf run.slog -o frf.h5 --realizations 1,2");
 }
 
 void ProgramTest::make_model() const {
   make_frf();
   if (!std::filesystem::exists(at("model.json")))
-    succeed({"fit", "frf.h5", "-o", "model.json", "--band", "120", "800", "--direct-term", "full"});
+    succeed("fit frf.h5 -o model.json --band 120 800 --direct-term full");
 }
 
 }  // namespace stageid::test

@@ -6,7 +6,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "tests/support/process/run_program.hpp"
 #include "tests/support/process/temporary_directory.hpp"
@@ -15,9 +14,6 @@ namespace stageid::test {
 
 std::string read_bytes(const std::filesystem::path& file);
 void write_bytes(const std::filesystem::path& file, const std::string& bytes);
-/// The words of a command, and more of them.
-std::vector<std::string> joined(std::vector<std::string> words,
-                                const std::vector<std::string>& more);
 std::string replaced(std::string text, const std::string& from, const std::string& to);
 
 /// Says where two contents part, without printing them: most are binary or long.
@@ -32,18 +28,18 @@ struct ProgramTest : testing::Test {
 
   std::filesystem::path at(const std::string& name) const { return directory_ / name; }
   std::string name(const std::string& file) const { return at(file).string(); }
-  /// In the directory, so that names of files in it need no path.
-  ProgramResult run(const std::vector<std::string>& arguments, ProgramOptions options = {}) const;
+  /// In the directory, so that names of files in it need no path. The line is divided at spaces.
+  ProgramResult run(const std::string& line, ProgramOptions options = {}) const;
   /// Runs and expects exit code 0.
-  ProgramResult succeed(const std::vector<std::string>& arguments) const;
+  ProgramResult succeed(const std::string& line) const;
   /// Runs and expects `exit_code`, and `text` on stderr.
-  ProgramResult ends(const std::vector<std::string>& arguments, int exit_code,
-                     const std::string& text = "", ProgramOptions options = {}) const;
+  ProgramResult ends(const std::string& line, int exit_code, const std::string& text = "",
+                     ProgramOptions options = {}) const;
   /// The object that a command prints with --json.
-  nlohmann::json tell(std::vector<std::string> arguments, int exit_code = 0) const;
+  nlohmann::json tell(const std::string& line, int exit_code = 0) const;
   /// Expects `exit_code`, one line on stderr "stageid: ..." that contains `text`, nothing on stdout,
   /// and that no file appeared or changed.
-  void fail(const std::vector<std::string>& arguments, int exit_code, const std::string& text,
+  void fail(const std::string& line, int exit_code, const std::string& text,
             ProgramOptions options = {}) const;
 
   /// Writes a variant of the small experiment (or stage) and returns its name.

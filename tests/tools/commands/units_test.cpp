@@ -40,13 +40,13 @@ struct Units : ProgramTest {
 };
 
 TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
-  const ProgramResult checked = succeed({"config", "check", "units.yaml"});
+  const ProgramResult checked = succeed("config check units.yaml");
   EXPECT_EQ(checked.err, "");
-  const ProgramResult designed = succeed({"design", "units.yaml", "-o", "excitation.h5"});
+  const ProgramResult designed = succeed("design units.yaml -o excitation.h5");
   EXPECT_THAT(designed.out, testing::ContainsRegex("a1 +A "));
   EXPECT_THAT(designed.out, testing::ContainsRegex("b1 +m/s\\^2 "));
 
-  succeed({"identify", "units.yaml", "-o", "all"});
+  succeed("identify units.yaml -o all");
   const FrfEstimate frf = read_frf(at("all/frf.h5"));
   EXPECT_EQ(frf.inputs.units, (std::vector<std::string>{"A", "A", "A"}));
   EXPECT_EQ(frf.outputs.units, (std::vector<std::string>{"m/s^2", "m/s^2"}));
@@ -74,9 +74,9 @@ TEST_F(Units, AreThoseOfTheChannelsFromTheFilesToTheReport) {
 TEST_F(Units, StandInTheMessagesOfALimit) {
   const std::string plan = replaced(read_bytes(at("units.yaml")), "rms: 0.08", "rms: 3");
   write_bytes(at("strong.yaml"), plan);
-  const ProgramResult refused = ends({"design", "strong.yaml", "-o", "e.h5"}, 2);
+  const ProgramResult refused = ends("design strong.yaml -o e.h5", 2);
   EXPECT_THAT(refused.err, testing::ContainsRegex("would be [0-9.]+ A, limit 3.5 A"));
-  const std::string err = ends({"run", "strong.yaml", "--force", "-o", "strong.slog"}, 4).err;
+  const std::string err = ends("run strong.yaml --force -o strong.slog", 4).err;
   const std::size_t stop = err.find("stageid: strong.slog: ");
   ASSERT_NE(stop, std::string::npos) << err;
   EXPECT_THAT(err.substr(stop), testing::ContainsRegex("[0-9.]+ (A|m/s\\^2|A/s), limit "));
@@ -86,7 +86,7 @@ TEST_F(Units, AKeyWithAUnitIsForThatUnitOnly) {
   const std::string stage = read_bytes(at("currents.yaml"));
   const auto error_of = [&](const std::string& from, const std::string& to) {
     write_bytes(at("wrong.yaml"), replaced(stage, from, to));
-    return run({"config", "check", "wrong.yaml"}).err;
+    return run("config check wrong.yaml").err;
   };
   EXPECT_THAT(error_of("window: 50", "window_m: 50"), HasSubstr("write 'window: NUMBER'"));
   EXPECT_THAT(error_of("unit: A", "unit: kN"), HasSubstr("expected one of N, Nm, A, V"));

@@ -30,8 +30,9 @@ struct Workflow : ProgramTest {
                       const std::string& keys = "") const {
     const std::string config =
         stage(file + ".yaml", "noise:", keys + "faults: [{" + fault + "}]\nnoise:");
-    EXPECT_THAT(ends({"run", config, "-o", file + ".slog"}, exit_code, cause).err, HasSubstr(more));
-    return tell({"log", "info", file + ".slog"});
+    EXPECT_THAT(ends("run " + config + " -o " + file + ".slog", exit_code, cause).err,
+                HasSubstr(more));
+    return tell("log info " + file + ".slog");
   }
 };
 
@@ -59,7 +60,7 @@ constexpr std::array kOutputs = {"excitation.h5", "run.slog",   "frf.h5",   "frf
                                  "summary.json",  "report.html"};
 
 TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
-  const ProgramResult result = succeed({"identify", config_, "-o", "all"});
+  const ProgramResult result = succeed("identify " + config_ + " -o all");
   for (const char* output : kOutputs)
     EXPECT_TRUE(std::filesystem::exists(at("all") / output)) << output;
   EXPECT_THAT(result.out, HasSubstr("report: all/report.html"));
@@ -77,7 +78,7 @@ TEST_F(Workflow, IdentifyFindsEveryModeOfTheStage) {
 TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
   const std::string config =
       stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1e15\n  plate:");
-  ends({"identify", config, "-o", "cubic"}, 0, "weighting: total_variance; the plant is nonlinear");
+  ends("identify " + config + " -o cubic", 0, "weighting: total_variance; the plant is nonlinear");
   const json summary = summary_of(at("cubic"));
   EXPECT_EQ(summary["fit"]["weighting"], "total_variance");
   expect_true_modes(summary);
@@ -87,7 +88,7 @@ TEST_F(Workflow, ANonlinearPlantIsNamedAndItsModesAreFound) {
 TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) {
   const std::string config =
       stage("coarse.yaml", "force_n: 1e-4,", "force_n: 1e-4, actuator_quantum_n: 0.1,");
-  succeed({"identify", config, "-o", "result"});
+  succeed("identify " + config + " -o result");
   const json summary = summary_of(at("result"));
   std::string steps;
   for (const json& finding : summary["health"])
@@ -99,18 +100,18 @@ TEST_F(Workflow, TheStepsOfACoarseConverterAreFoundAndTheModelIsThatOfThePlant) 
 }
 
 TEST_F(Workflow, TheSameFilesAgainAndWithOtherThreads) {
-  succeed({"identify", config_, "-o", "one", "--threads", "1"});
-  succeed({"identify", config_, "-o", "two", "--threads", "2"});
+  succeed("identify " + config_ + " -o one --threads 1");
+  succeed("identify " + config_ + " -o two --threads 2");
   for (const char* file : {"excitation.h5", "frf.h5", "frf_validation.h5", "modes.json",
                            "model.json", "model.h5", "model.csv"})
     EXPECT_TRUE(same_bytes(read_bytes(at("one") / file), read_bytes(at("two") / file))) << file;
 }
 
 TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
-  succeed({"identify", config_, "-o", "all"});
+  succeed("identify " + config_ + " -o all");
   const auto before = snapshot(at("all"));
-  ends({"identify", config_, "-o", "all"}, 2);
-  const ProgramResult again = succeed({"identify", config_, "-o", "all", "--resume"});
+  ends("identify " + config_ + " -o all", 2);
+  const ProgramResult again = succeed("identify " + config_ + " -o all --resume");
   for (const char* step : {"design", "run", "frf", "fit"})
     EXPECT_THAT(again.err, testing::ContainsRegex(std::string(step) + " .*up to date"));
   const auto after = snapshot(at("all"));
@@ -118,7 +119,7 @@ TEST_F(Workflow, ResumePassesOverWhatIsUpToDate) {
     EXPECT_TRUE(same_bytes(before.at(name("all/") + file), after.at(name("all/") + file))) << file;
   // Another fit: the measurement stays, the model does not.
   write_bytes(config_, replaced(read_bytes(config_), "direct_term: full", "direct_term: none"));
-  const ProgramResult refit = run({"identify", config_, "-o", "all", "--resume"});
+  const ProgramResult refit = run("identify " + config_ + " -o all --resume");
   EXPECT_THAT(refit.err, testing::ContainsRegex("run .*up to date"));
   EXPECT_THAT(refit.err, testing::Not(testing::ContainsRegex("fit .*up to date")));
   EXPECT_FALSE(same_bytes(before.at(name("all/model.json")), read_bytes(at("all/model.json"))));
@@ -168,17 +169,17 @@ TEST_F(Workflow, TheRampOfAStopIsAsLongAsTheStageFileSays) {
 TEST_F(Workflow, AMissedCycleIsMarkedAndSaid) {
   run_with_fault("miss", "kind: missed_cycle, from_cycle: 1700, run: 2", 3,
                  "1 cycle is missing, 2 samples are marked as invalid: 'stageid log info'");
-  succeed({"frf", "miss.slog", "-o", "f.h5"});
+  succeed("frf miss.slog -o f.h5");
 }
 
 TEST_F(Workflow, ReplayGivesTheSameLogAndNoticesADifference) {
   make_log();
-  succeed({"run", config_, "-o", "again.slog", "--backend", "replay", "--replay", "run.slog"});
-  succeed({"frf", "run.slog", "-o", "a.h5"});
-  succeed({"frf", "again.slog", "-o", "b.h5"});
+  succeed("run " + config_ + " -o again.slog --backend replay --replay run.slog");
+  succeed("frf run.slog -o a.h5");
+  succeed("frf again.slog -o b.h5");
   EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
   const std::string other = experiment("other.yaml", "rms_n: 1.0", "rms_n: 1.001");
-  ends({"run", other, "-o", "c.slog", "--backend", "replay", "--replay", "run.slog"}, 3,
+  ends("run " + other + " -o c.slog --backend replay --replay run.slog", 3,
        "differ from the recorded ones");
 }
 
@@ -214,41 +215,39 @@ TEST_F(Workflow, TheDesignForetellsWhatTheRunDoes) {
 
 TEST_F(Workflow, AReportComparesWithAnotherDay) {
   make_frf();
-  succeed({"fit", "frf.h5", "-o", "model.json", "--band", "120", "800"});
-  succeed({"report", "frf.h5", "model.json", "--compare", "frf.h5", "model.json", "-o", "r.html"});
+  succeed("fit frf.h5 -o model.json --band 120 800");
+  succeed("report frf.h5 model.json --compare frf.h5 model.json -o r.html");
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr(R"("comparison":{)"));
   EXPECT_THAT(read_bytes(at("r.html")), HasSubstr("identical response"));
 }
 
 TEST_F(Workflow, EveryCommandSpeaksOneJsonObject) {
   make_frf();
-  const std::vector<std::vector<std::string>> commands = {
-      {"design", config_, "-o", "e.h5"},
-      {"run", config_, "-o", "r.slog"},
-      {"log", "info", "run.slog"},
-      {"log", "verify", "run.slog"},
-      {"log", "convert", "run.slog", "-o", "r.csv"},
-      {"frf", "run.slog", "-o", "f.h5"},
-      {"modes", "frf.h5", "-o", "modes.json"},
-      {"fit", "frf.h5", "-o", "model.json", "--band", "120", "800"},
-      {"validate", "model.json", "frf.h5"},
-      {"validate", "model.json", "run.slog"},
-      {"export", "model.json", "-o", "m.csv"},
-      {"report", "frf.h5", "model.json", "run.slog", "-o", "r.html"},
-      {"config", "schema"},
-      {"config", "check", config_, "small_stage.yaml"},
-      {"identify", config_, "-o", "all"}};
-  for (std::vector<std::string> command : commands) {
-    SCOPED_TRACE(command[0]);
-    command.insert(command.begin(), "--json");
-    const ProgramResult result = succeed(command);
+  const std::string commands[] = {"design " + config_ + " -o e.h5",
+                                  "run " + config_ + " -o r.slog",
+                                  "log info run.slog",
+                                  "log verify run.slog",
+                                  "log convert run.slog -o r.csv",
+                                  "frf run.slog -o f.h5",
+                                  "modes frf.h5 -o modes.json",
+                                  "fit frf.h5 -o model.json --band 120 800",
+                                  "validate model.json frf.h5",
+                                  "validate model.json run.slog",
+                                  "export model.json -o m.csv",
+                                  "report frf.h5 model.json run.slog -o r.html",
+                                  "config schema",
+                                  "config check " + config_ + " small_stage.yaml",
+                                  "identify " + config_ + " -o all"};
+  for (const std::string& command : commands) {
+    SCOPED_TRACE(command);
+    const ProgramResult result = succeed("--json " + command);
     EXPECT_TRUE(json::parse(result.out, nullptr, false).is_object()) << result.out;
   }
 }
 
 TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   make_model();
-  const json figures = tell({"validate", "model.json", "run.slog"});
+  const json figures = tell("validate model.json run.slog");
   // Small relative to the motion itself; the remainder is transient and noise.
   EXPECT_LT(figures["time_domain"]["normalized"].get<double>(), 0.05);
   EXPECT_EQ(figures["time_domain"]["runs"], 9);
@@ -257,7 +256,7 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
   for (Submodel& s : model.submodels)
     for (Eigen::MatrixXd& B : s.numerator) B *= 1.5;
   write_model(at("wrong.json"), model);
-  const json wrong = tell({"validate", "wrong.json", "run.slog"}, 3);
+  const json wrong = tell("validate wrong.json run.slog", 3);
   EXPECT_EQ(wrong["trustworthy"], false);
   EXPECT_NEAR(wrong["time_domain"]["normalized"].get<double>(), 0.5, 0.05);
 }
@@ -265,9 +264,9 @@ TEST_F(Workflow, ValidationPredictsTheSamplesOfALog) {
 TEST_F(Workflow, ACompensatedResponseGivesTheSameModes) {
   make_log();
   const auto first_flexible_mode = [&](const std::string& compensate) {
-    succeed({"frf", "run.slog", "-o", compensate + ".h5", "--compensate", compensate});
-    const ProgramResult fit = run({"fit", compensate + ".h5", "-o", compensate + ".json",
-                                   "--direct-term", "full", "--modes", "3", "--json"});
+    succeed("frf run.slog -o " + compensate + ".h5 --compensate " + compensate);
+    const ProgramResult fit = run("fit " + compensate + ".h5 -o " + compensate +
+                                  ".json --direct-term full --modes 3 --json");
     const json modes = json::parse(fit.out)["modes"];
     const auto flexible = std::ranges::find_if(
         modes, [](const json& mode) { return mode["natural_frequency_hz"].get<double>() > 16.0; });

@@ -33,12 +33,12 @@ TEST_F(RealTimeKeysTest, AreOffUnlessAskedFor) {
 }
 
 TEST_F(RealTimeKeysTest, WhatIsWrongIsNamed) {
-  fail({"run", with("realtime: {policy: hard}"), "-o", "x.slog"}, 2, "policy");
-  fail({"run", with("realtime: {priority: 100}"), "-o", "x.slog"}, 2, "priority");
+  fail("run " + with("realtime: {policy: hard}") + " -o x.slog", 2, "policy");
+  fail("run " + with("realtime: {priority: 100}") + " -o x.slog", 2, "priority");
 }
 
 TEST_F(RealTimeKeysTest, HaveNoMeaningInVirtualTime) {
-  succeed({"run", with("realtime: {policy: require}"), "-o", "x.slog"});
+  succeed("run " + with("realtime: {policy: require}") + " -o x.slog");
 }
 
 TEST_F(RealTimeKeysTest, RequireIsRefusedBeforeAnythingIsWrittenUnlessAllIsThere) {
@@ -46,16 +46,15 @@ TEST_F(RealTimeKeysTest, RequireIsRefusedBeforeAnythingIsWrittenUnlessAllIsThere
   try {
     missing_for_real_time({RealTimePolicy::require, 80, -1, false});
   } catch (const std::exception&) {
-    fail({"run", config, "-o", "x.slog", "--pace", "4"}, 1, "policy: try");
+    fail("run " + config + " -o x.slog --pace 4", 1, "policy: try");
     return;
   }
   GTEST_SKIP() << "this machine has all that is required";
 }
 
 TEST_F(RealTimeKeysTest, AWallClockRunTellsItsTimingEverywhere) {
-  run({"run", with("realtime: {policy: try, misses_allowed: 1000000}"), "-o", "run.slog", "--pace",
-       "4"});
-  const auto info = tell({"log", "info", "run.slog"});
+  run("run " + with("realtime: {policy: try, misses_allowed: 1000000}") + " -o run.slog --pace 4");
+  const auto info = tell("log info run.slog");
   ASSERT_EQ(info["runs"].size(), 9U);
   for (const auto& run : info["runs"]) {
     std::uint64_t counted = 0;
@@ -64,8 +63,8 @@ TEST_F(RealTimeKeysTest, AWallClockRunTellsItsTimingEverywhere) {
     EXPECT_EQ(counted, run["samples"].get<std::uint64_t>());
     EXPECT_GT(run["timing"]["execution"]["median_s"].get<double>(), 0.0);
   }
-  EXPECT_THAT(succeed({"log", "info", "run.slog"}).out, testing::HasSubstr("execution"));
-  succeed({"report", "run.slog", "-o", "report.html"});
+  EXPECT_THAT(succeed("log info run.slog").out, testing::HasSubstr("execution"));
+  succeed("report run.slog -o report.html");
   EXPECT_THAT(read_bytes(at("report.html")), testing::HasSubstr(R"("period_s":0.000125)"));
 }
 
@@ -74,7 +73,7 @@ TEST_F(RealTimeKeysTest, EventsStandBesideTheLogAlsoOfAResumedOne) {
   EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"start")"));
   EXPECT_THAT(read_bytes(at("run.events.jsonl")),
               testing::HasSubstr(R"("event":"end","exit_code":0)"));
-  succeed({"run", config_, "-o", "run.slog", "--resume"});
+  succeed("run " + config_ + " -o run.slog --resume");
   EXPECT_THAT(read_bytes(at("run.events.jsonl")), testing::HasSubstr(R"("event":"resume")"));
 }
 

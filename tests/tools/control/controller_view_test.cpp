@@ -22,8 +22,9 @@ using testing::HasSubstr;
 struct ControllerViewTest : ProgramTest {
   void make_model_with_covariance() const {
     make_frf();
-    succeed({"fit", "frf.h5", "-o", "model.json", "--covariance", "covariance.h5", "--rigid-body",
-             "suspension:0.4:0.5", "--direct-term", "full"});
+    succeed(
+        "fit frf.h5 -o model.json --covariance covariance.h5 --rigid-body suspension:0.4:0.5 "
+        "--direct-term full");
   }
   /// A variant of the stage file.
   std::string variant(const std::string& file, const std::string& from,
@@ -31,17 +32,16 @@ struct ControllerViewTest : ProgramTest {
     write_bytes(at(file), replaced(read_bytes(at("small_stage.yaml")), from, to));
     return file;
   }
-  json view(const std::vector<std::string>& more = {},
+  json view(const std::string& more = "",
             const std::string& stage_file = "small_stage.yaml") const {
-    succeed(
-        joined({"export", "model.json", "-o", "view.json", "--controller-view", stage_file}, more));
+    succeed("export model.json -o view.json --controller-view " + stage_file + " " + more);
     return json::parse(read_bytes(at("view.json")));
   }
 };
 
 TEST_F(ControllerViewTest, CurvesAndSensitivityAreThoseOfTheSimulatedLoop) {
   make_model_with_covariance();
-  const json told = view({"--covariance", "covariance.h5", "--frf", "frf.h5"});
+  const json told = view("--covariance covariance.h5 --frf frf.h5");
   EXPECT_EQ(told["format"], "stageid-controller-view");
   EXPECT_TRUE(told["stable"]);
   EXPECT_EQ(told["encirclements"], 0);
@@ -84,7 +84,7 @@ TEST_F(ControllerViewTest, CurvesAndSensitivityAreThoseOfTheSimulatedLoop) {
 
 TEST_F(ControllerViewTest, TheSimulatedStageBecomesUnstableAtTheGainMargin) {
   make_model_with_covariance();
-  const json told = view({"--covariance", "covariance.h5"});
+  const json told = view("--covariance covariance.h5");
   const StageConfig stage = load_stage_config(at("small_stage.yaml"));
   const std::size_t axes[] = {2, 4};  // z and Ry of x, y, z, Rx, Ry, Rz
   for (std::size_t k = 0; k < 2; ++k) {
@@ -103,9 +103,8 @@ TEST_F(ControllerViewTest, TheSimulatedStageBecomesUnstableAtTheGainMargin) {
 
 TEST_F(ControllerViewTest, ATableHasOneRowPerLine) {
   make_model_with_covariance();
-  const std::string told = succeed({"export", "model.json", "-o", "view.csv", "--controller-view",
-                                    "small_stage.yaml", "--frf", "frf.h5"})
-                               .out;
+  const std::string told =
+      succeed("export model.json -o view.csv --controller-view small_stage.yaml --frf frf.h5").out;
   EXPECT_THAT(told, HasSubstr("loop z: gain margin"));
   EXPECT_THAT(told, HasSubstr("closed loop: stable"));
   std::istringstream table(read_bytes(at("view.csv")));
@@ -121,13 +120,13 @@ TEST_F(ControllerViewTest, ATableHasOneRowPerLine) {
 
 TEST_F(ControllerViewTest, MatricesAreOneLoopPerActuatorOfTheSameDeterminant) {
   make_model_with_covariance();
-  const json axes = view({"--frf", "frf.h5"});
+  const json axes = view("--frf frf.h5");
   const MotionController controller(load_stage_config(at("small_stage.yaml")).spec.controller);
   write_npz(at("c.npz"), arrays_of(at("c.npz"), controller.realization()));
   const std::string text = read_bytes(at("small_stage.yaml"));
   write_bytes(at("matrices.yaml"),
               text.substr(0, text.find("controller:")) + "controller: c.npz\n");
-  const json matrices = view({"--frf", "frf.h5"}, "matrices.yaml");
+  const json matrices = view("--frf frf.h5", "matrices.yaml");
   ASSERT_EQ(matrices["loops"].size(), 3U);
   EXPECT_EQ(matrices["loops"][2]["name"], "a3");
   EXPECT_NEAR(matrices["largest_pole"], axes["largest_pole"], 1e-9);
@@ -138,7 +137,7 @@ TEST_F(ControllerViewTest, MatricesAreOneLoopPerActuatorOfTheSameDeterminant) {
 TEST_F(ControllerViewTest, AnUnstableLoopIsToldAndHasNoMargins) {
   make_model_with_covariance();
   const std::string fast = variant("fast.yaml", "crossover_hz: 20", "crossover_hz: 150");
-  const json told = tell({"export", "model.json", "-o", "view.json", "--controller-view", fast}, 3);
+  const json told = tell("export model.json -o view.json --controller-view " + fast, 3);
   EXPECT_FALSE(told["stable"]);
   EXPECT_GT(told["encirclements"], 0);
   EXPECT_FALSE(told["loops"][0].contains("gain_margin_db"));
@@ -148,31 +147,30 @@ TEST_F(ControllerViewTest, AnUnstableLoopIsToldAndHasNoMargins) {
 TEST_F(ControllerViewTest, TheReportShowsTheViewOfItsModelOnly) {
   make_model_with_covariance();
   view();
-  succeed({"report", "frf.h5", "model.json", "view.json", "-o", "report.html"});
+  succeed("report frf.h5 model.json view.json -o report.html");
   EXPECT_THAT(read_bytes(at("report.html")), HasSubstr("\"encirclements\":0"));
-  succeed(
-      {"fit", "frf.h5", "-o", "model.json", "--rigid-body", "suspension", "--direct-term", "full"});
-  fail({"report", "frf.h5", "model.json", "view.json", "-o", "new.html"}, 2,
+  succeed("fit frf.h5 -o model.json --rigid-body suspension --direct-term full");
+  fail("report frf.h5 model.json view.json -o new.html", 2,
        "view.json:/model_fingerprint: is that of another model than model.json");
 }
 
 TEST_F(ControllerViewTest, WhatDoesNotBelongTogetherIsRefused) {
   make_model_with_covariance();
-  const auto refuse = [&](const std::vector<std::string>& more, const std::string& text) {
-    fail(joined({"export", "model.json", "-o", "view.json"}, more), 2, text);
+  const auto refuse = [&](const std::string& more, const std::string& text) {
+    fail("export model.json -o view.json " + more, 2, text);
   };
-  refuse({"--controller-view", "small_stage.yaml", "--driving-point", "s1", "a1"},
-         "--driving-point");
-  const std::string name = variant("name.yaml", "name: s2", "name: s9");
-  refuse({"--controller-view", name}, "the loop of z uses sensor 's9'");
+  refuse("--controller-view small_stage.yaml --driving-point s1 a1", "--driving-point");
+  refuse("--controller-view " + variant("name.yaml", "name: s2", "name: s9"),
+         "the loop of z uses sensor 's9'");
   const std::string text = read_bytes(at("small_stage.yaml"));
   write_bytes(at("open.yaml"), text.substr(0, text.find("controller:")) +
                                    "controller: {state_space: {d: [0, 0, 0, 0, 0, 0]}}\n");
-  refuse({"--controller-view", "open.yaml"}, "closes no loop");
-  run({"fit", "frf.h5", "-o", "other.json", "--modes", "3"});
-  fail({"export", "other.json", "-o", "view.json", "--controller-view", "small_stage.yaml",
-        "--covariance", "covariance.h5"},
-       2, "covariance.h5:/parameters/value: differs from the model");
+  refuse("--controller-view open.yaml", "closes no loop");
+  run("fit frf.h5 -o other.json --modes 3");
+  fail(
+      "export other.json -o view.json --controller-view small_stage.yaml --covariance "
+      "covariance.h5",
+      2, "covariance.h5:/parameters/value: differs from the model");
 }
 
 }  // namespace test_controller_view

@@ -32,8 +32,8 @@ struct LimitedPlanTest : ProgramTest {
     limits_ = name("small_stage_limits.yaml");
   }
   void make_pilot() const {
-    succeed({"run", "small_stage_pilot.yaml", "-o", "pilot.slog"});
-    succeed({"frf", "pilot.slog", "--method", "lpm", "-o", prior()});
+    succeed("run small_stage_pilot.yaml -o pilot.slog");
+    succeed("frf pilot.slog --method lpm -o " + prior());
   }
   std::string prior() const { return name("small_stage_pilot_frf.h5"); }
   std::string variant(const std::string& from, const std::string& to) const {
@@ -45,7 +45,7 @@ struct LimitedPlanTest : ProgramTest {
 
 TEST_F(LimitedPlanTest, WhatIsForetoldFromThePilotHolds) {
   make_pilot();
-  const Json design = tell({"design", limits_, "-o", "e.h5", "--accuracy", "1e-7"});
+  const Json design = tell("design " + limits_ + " -o e.h5 --accuracy 1e-7");
   double most = 0.0;
   for (const Json& signal : design["signals"]) most = std::max(most, signal["used"].get<double>());
   EXPECT_NEAR(most, 0.9, 1e-6);
@@ -54,8 +54,8 @@ TEST_F(LimitedPlanTest, WhatIsForetoldFromThePilotHolds) {
   // Whole realizations of 3 runs of 1.25 s, each as good as the other.
   EXPECT_NEAR(design["seconds_to_accuracy"], 3.75 * std::ceil(3.0 * variance / 1e-7), 1e-9);
 
-  succeed({"run", limits_, "--excitation", "e.h5", "-o", "r.slog"});
-  succeed({"frf", "r.slog", "-o", "r.h5"});
+  succeed("run " + limits_ + " --excitation e.h5 -o r.slog");
+  succeed("frf r.slog -o r.h5");
   const double reached = mean_relative_variance(read_frf(at("r.h5")), VarianceKind::noise);
   // The pilot of 1.5 s estimates the noise of a line from about 20 lines, and its own noise is in |G|.
   EXPECT_GT(reached, variance / 1.6);
@@ -86,8 +86,8 @@ TEST_F(LimitedPlanTest, PositionsFromRestAreForetoldBelowTheBandToo) {
     write_bytes(at("small_stage_pilot.yaml"), pilot);
     write_bytes(at("small_stage.yaml"), replaced(stage, "window_m: 1e-3", "window_m: 3e-6"));
     const std::string narrow = variant("[16, 800]", "[52, 800]");
-    const Json design = tell({"design", narrow, "-o", "e.h5"});
-    succeed({"run", narrow, "--excitation", "e.h5", "-o", "r.slog"});  // nothing was hit
+    const Json design = tell("design " + narrow + " -o e.h5");
+    succeed("run " + narrow + " --excitation e.h5 -o r.slog");  // nothing was hit
     const Eigen::VectorXd reached = largest_position(at("r.slog"));
     double most = 0.0;
     for (const Json& signal : design["signals"]) {
@@ -137,21 +137,21 @@ TEST_F(LimitedPlanTest, RunEndsWhenTheVarianceIsReachedAndGoesOnWithResume) {
   make_pilot();
   const std::string log = "r.slog";
   // 9 runs of 3 realizations leave 1.0e-6: two of them are enough for 2e-6.
-  const Json first = tell({"run", limits_, "-o", log, "--until", "2e-6"});
+  const Json first = tell("run " + limits_ + " -o " + log + " --until 2e-6");
   EXPECT_EQ(first["runs_complete"], 6);
   EXPECT_LE(first["relative_variance"].get<double>(), 2e-6);
   EXPECT_THAT(first["message"].get<std::string>(), HasSubstr("target 2e-06"));
   EXPECT_EQ(first["exit_code"], 0);
-  succeed({"log", "verify", log});
-  const Json same = tell({"run", limits_, "-o", log, "--until", "2e-6", "--resume"});
+  succeed("log verify " + log);
+  const Json same = tell("run " + limits_ + " -o " + log + " --until 2e-6 --resume");
   EXPECT_EQ(same["runs_complete"], 6);
-  const Json rest = tell({"run", limits_, "-o", log, "--until", "1e-12", "--resume"});
+  const Json rest = tell("run " + limits_ + " -o " + log + " --until 1e-12 --resume");
   EXPECT_EQ(rest["runs_complete"], 9);
   EXPECT_THAT(rest["message"].get<std::string>(), HasSubstr("the plan ended"));
   // A measurement that was stopped and resumed equals an uninterrupted one.
-  succeed({"run", limits_, "-o", "whole.slog"});
-  succeed({"frf", log, "-o", "a.h5"});
-  succeed({"frf", "whole.slog", "-o", "b.h5"});
+  succeed("run " + limits_ + " -o whole.slog");
+  succeed("frf " + log + " -o a.h5");
+  succeed("frf whole.slog -o b.h5");
   EXPECT_EQ(read_frf(at("a.h5")).response, read_frf(at("b.h5")).response);
 }
 
@@ -160,7 +160,7 @@ TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
     const std::string short_plan =
         replaced(read_bytes(config_), "validation:\n  realization: 3", "");
     write_bytes(at("short.yaml"), replaced(short_plan, from, to));
-    return run({"run", "short.yaml", "-o", "short.slog", "--until", "1e-12", "--pace", "0"}).err;
+    return run("run short.yaml -o short.slog --until 1e-12 --pace 0").err;
   };
   const std::string plan = "  periods: 3\n  realizations: 3";
   EXPECT_THAT(warning(plan, "  periods: 1\n  realizations: 1"),
@@ -173,9 +173,9 @@ TEST_F(LimitedPlanTest, UntilWarnsOfAPlanThatCannotEndEarly) {
 }
 
 TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
-  fail({"run", config_, "-o", "x.slog", "--until", "-1"}, 2, "--until");
+  fail("run " + config_ + " -o x.slog --until -1", 2, "--until");
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& text) {
-    fail({"design", variant(from, to), "-o", "e.h5"}, 2, text);
+    fail("design " + variant(from, to) + " -o e.h5", 2, text);
   };
   wrong("crest_iterations: 20", "crest_iterations: 0", "'limits' also optimizes the phases");
   wrong("  lines: all", "  shape: [[1, 1], [10, 2]]\n  lines: all", "remove 'shape'");
@@ -183,9 +183,9 @@ TEST_F(LimitedPlanTest, RequestsThatAreWrong) {
   make_pilot();
   wrong("[16, 800]", "[16, 900]", "do not cover the band");
   wrong("velocity_m_s: 0.05", "velocity_m_s: 1e-9", "uses up the limit");
-  succeed({"design", limits_, "-o", "e.h5"});
-  fail({"run", config_, "--excitation", "e.h5", "-o", "x.slog"}, 2, "differs in the scheme from");
-  fail({"run", limits_, "--excitation", prior(), "-o", "x.slog"}, 2,
+  succeed("design " + limits_ + " -o e.h5");
+  fail("run " + config_ + " --excitation e.h5 -o x.slog", 2, "differs in the scheme from");
+  fail("run " + limits_ + " --excitation " + prior() + " -o x.slog", 2,
        "is a frequency response, not a designed excitation;");
 }
 

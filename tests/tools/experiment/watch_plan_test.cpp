@@ -15,16 +15,12 @@ using Json = nlohmann::json;
 
 struct WatchPlanTest : ProgramTest {
   WatchPlanTest() { make_model(); }
-  Json design(const std::vector<std::string>& more = {}) const {
-    return tell(joined(
-        {"design", config_, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml"}, more));
+  Json design(const std::string& more = "") const {
+    return tell("design " + config_ + " --watch model.json --frf frf.h5 -o w.yaml " + more);
   }
   /// The same, refused.
-  void refuse(const std::vector<std::string>& more, const std::string& text,
-              const std::string& config) const {
-    fail(joined({"design", config, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.yaml"},
-                more),
-         2, text);
+  void refuse(const std::string& more, const std::string& text, const std::string& config) const {
+    fail("design " + config + " --watch model.json --frf frf.h5 -o w.yaml " + more, 2, text);
   }
 };
 
@@ -41,11 +37,11 @@ TEST_F(WatchPlanTest, TheFileIsAnExperimentThatPlaysTheDesign) {
     EXPECT_NEAR(forecast.deviation[p], told["tracked"][p]["deviation"],
                 1e-3 * told["tracked"][p]["deviation"].get<double>());
 
-  succeed({"design", "w.yaml", "-o", "w.h5"});
+  succeed("design w.yaml -o w.h5");
   const ExperimentPlan read = read_plan_of(config, at("w.h5"));
   EXPECT_EQ(read.excitation({0, 0}), plan.excitation({0, 0}));
-  succeed({"run", "w.yaml", "--excitation", "w.h5", "-o", "w.slog"});
-  fail({"frf", "w.slog", "-o", "no.h5"}, 2, "only 1 experiment");
+  succeed("run w.yaml --excitation w.h5 -o w.slog");
+  fail("frf w.slog -o no.h5", 2, "only 1 experiment");
 }
 
 TEST_F(WatchPlanTest, KnowsTheFrequenciesBetterThanTheFlatMultisine) {
@@ -56,8 +52,8 @@ TEST_F(WatchPlanTest, KnowsTheFrequenciesBetterThanTheFlatMultisine) {
 }
 
 TEST_F(WatchPlanTest, KeepsTheSensorsWithinARms) {
-  design({"--rms-nm", "5"});
-  const Json predicted = tell({"design", "w.yaml", "-o", "w.h5"});
+  design("--rms-nm 5");
+  const Json predicted = tell("design w.yaml -o w.h5");
   double most = 0.0;
   for (const Json& sensor : predicted["sensors"])
     most = std::max(most, sensor["rms"].get<double>());
@@ -65,14 +61,14 @@ TEST_F(WatchPlanTest, KeepsTheSensorsWithinARms) {
 }
 
 TEST_F(WatchPlanTest, NeedsNoiseInTheBandAndLevels) {
-  fail({"design", config_, "--watch", "model.json", "-o", "w.yaml"}, 2, "--frf");
-  fail({"design", config_, "--watch", "model.json", "--frf", "frf.h5", "-o", "w.h5"}, 2, ".yaml");
-  refuse({"--drift", "1e300"}, "expected", config_);
-  refuse({"--rms-nm", "1e-300"}, "expected", config_);
-  refuse({"--rms-nm", "inf"}, "expected", config_);
-  refuse({"--accuracy", "1e-6"}, "--accuracy", config_);
-  refuse({}, "rms_n", experiment("peak.yaml", "rms_n: 1.0", "peak_n: 1.0"));
-  refuse({}, "narrow band_hz", experiment("wide.yaml", "[16, 800]", "[16, 950]"));
+  fail("design " + config_ + " --watch model.json -o w.yaml", 2, "--frf");
+  fail("design " + config_ + " --watch model.json --frf frf.h5 -o w.h5", 2, ".yaml");
+  refuse("--drift 1e300", "expected", config_);
+  refuse("--rms-nm 1e-300", "expected", config_);
+  refuse("--rms-nm inf", "expected", config_);
+  refuse("--accuracy 1e-6", "--accuracy", config_);
+  refuse("", "rms_n", experiment("peak.yaml", "rms_n: 1.0", "peak_n: 1.0"));
+  refuse("", "narrow band_hz", experiment("wide.yaml", "[16, 800]", "[16, 950]"));
 }
 
 TEST_F(WatchPlanTest, TheFileNamesAStageInAFolderWithAnyName) {
@@ -88,7 +84,7 @@ TEST_F(WatchPlanTest, TheFileNamesAStageInAFolderWithAnyName) {
 
 TEST_F(WatchPlanTest, ListedLinesAndPhasesAreChecked) {
   const auto refuses = [&](const std::string& lines, const std::string& text) {
-    fail({"design", experiment("x.yaml", "lines: all", lines), "-o", "x.h5"}, 2, text);
+    fail("design " + experiment("x.yaml", "lines: all", lines) + " -o x.h5", 2, text);
   };
   refuses("lines: [8, 7]", "increasing whole numbers");
   refuses("lines: [8.5]", "increasing whole numbers");

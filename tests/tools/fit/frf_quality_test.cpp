@@ -23,15 +23,15 @@ class FrfQuality : public ProgramTest {};
 
 TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
   make_log();
-  const ProgramResult linear = succeed({"frf", "run.slog", "-o", "f.h5", "--json"});
+  const ProgramResult linear = succeed("frf run.slog -o f.h5 --json");
   EXPECT_THAT(linear.err, HasSubstr("nonlinear pairs"));
   EXPECT_EQ(json::parse(linear.out)["nonlinearity"]["tested"], true);
   const std::string config =
       stage("cubic.yaml", "  plate:", "  cubic_stiffness_n_m3: 1.0e+16\n  plate:");
   // A distorted stage needs longer to settle.
   write_bytes(config, replaced(read_bytes(config), "transient_periods: 2", "transient_periods: 8"));
-  succeed({"run", config, "-o", "cubic.slog"});
-  const ProgramResult cubic = succeed({"frf", "cubic.slog", "-o", "c.h5", "--json"});
+  succeed("run " + config + " -o cubic.slog");
+  const ProgramResult cubic = succeed("frf cubic.slog -o c.h5 --json");
   const json found = json::parse(cubic.out)["nonlinearity"];
   EXPECT_EQ(found["nonlinear"], true);
   EXPECT_GT(found["bands"][0]["distortion"].get<double>(), 0.0);
@@ -44,7 +44,7 @@ TEST_F(FrfQuality, TellsWhetherTheStageIsLinear) {
 
 TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
   make_log();
-  succeed({"frf", "run.slog", "-o", "f.h5"});
+  succeed("frf run.slog -o f.h5");
   FrfEstimate frf = read_frf(at("f.h5"));
   const Eigen::Index bands = frf.nonlinearity.band_hz.rows();
   frf.nonlinearity.settled_p_value = Eigen::VectorXd::Ones(bands);
@@ -62,11 +62,10 @@ TEST_F(FrfQuality, SaysWhereTheRecordsAreNotSettled) {
 
 TEST_F(FrfQuality, SaysWhyItWasNotTested) {
   make_log();
-  const ProgramResult one =
-      succeed({"frf", "run.slog", "-o", "f.h5", "--realizations", "1", "--json"});
+  const ProgramResult one = succeed("frf run.slog -o f.h5 --realizations 1 --json");
   EXPECT_THAT(one.err, HasSubstr("measure two realizations"));
   EXPECT_EQ(json::parse(one.out)["nonlinearity"]["tested"], false);
-  const ProgramResult lpm = succeed({"frf", "run.slog", "-o", "f.h5", "--method", "lpm"});
+  const ProgramResult lpm = succeed("frf run.slog -o f.h5 --method lpm");
   EXPECT_THAT(lpm.err, HasSubstr("estimate with 'periodic'"));
 }
 
@@ -81,13 +80,12 @@ void silence(const std::filesystem::path& file, const std::string& signal, hsize
 
 TEST_F(FrfQuality, ChannelsWithoutASignalAreNamed) {
   make_log();
-  succeed({"log", "convert", "run.slog", "-o", "sensors.h5"});
-  succeed({"log", "convert", "run.slog", "-o", "actuators.h5"});
+  succeed("log convert run.slog -o sensors.h5");
+  succeed("log convert run.slog -o actuators.h5");
   Hdf5Surgery(at("sensors.h5")).remove("/runs/0008");
   silence(at("sensors.h5"), "sensors", 2, 8);
-  const json told = json::parse(
-      ends({"frf", "sensors.h5", "-o", "f.h5", "--json"}, 3, "no complete run of experiment 3")
-          .out);
+  const json told =
+      json::parse(ends("frf sensors.h5 -o f.h5 --json", 3, "no complete run of experiment 3").out);
   EXPECT_EQ(told["health"][0]["cause"], "dead");
   EXPECT_EQ(told["health"][0]["channel"], "s1");
   // The last realization lacks an experiment.
@@ -95,13 +93,13 @@ TEST_F(FrfQuality, ChannelsWithoutASignalAreNamed) {
   EXPECT_EQ(read_frf(at("f.h5")).left_out_realizations.size(), 1u);
   EXPECT_EQ(read_frf(at("f.h5")).nonlinearity.distortion.maxCoeff(), 0.0);
   silence(at("actuators.h5"), "actuators", 3, 9);
-  fail({"frf", "actuators.h5", "-o", "g.h5"}, 2, "channel a1 is constant");
+  fail("frf actuators.h5 -o g.h5", 2, "channel a1 is constant");
 }
 
 TEST_F(FrfQuality, SmoothsTheCovariance) {
   make_log();
-  succeed({"frf", "run.slog", "-o", "one.h5"});
-  succeed({"frf", "run.slog", "-o", "nine.h5", "--smooth-covariance", "9"});
+  succeed("frf run.slog -o one.h5");
+  succeed("frf run.slog -o nine.h5 --smooth-covariance 9");
   EXPECT_EQ(read_frf(at("nine.h5")).noise_dof, 9.0 * read_frf(at("one.h5")).noise_dof);
 }
 

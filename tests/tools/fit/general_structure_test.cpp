@@ -16,9 +16,9 @@ class GeneralStructure : public ProgramTest {};
 
 TEST_F(GeneralStructure, OneDenominatorForTwoModesBesideTheOthers) {
   make_frf();
-  const std::vector<std::string> fit = {
-      "fit", "frf.h5",  "-o",      "m.json",       "--band", "120",           "800", "--submodel",
-      "n=4", "--modes", "488,567", "--rigid-body", "full",   "--direct-term", "full"};
+  const std::string fit =
+      "fit frf.h5 -o m.json --band 120 800 --submodel n=4 --modes 488,567 --rigid-body full "
+      "--direct-term full";
   const ProgramResult result = succeed(fit);
   EXPECT_THAT(result.out, HasSubstr("submodel of order 4: poles start at the modes 181"));
   const std::string bytes = read_bytes(at("m.json"));
@@ -29,22 +29,20 @@ TEST_F(GeneralStructure, OneDenominatorForTwoModesBesideTheOthers) {
   EXPECT_NEAR(fourth.poles[0].natural_frequency_hz, 181.147, 0.01);
   EXPECT_NEAR(fourth.poles[1].natural_frequency_hz, 422.22, 0.05);
   EXPECT_GT(fourth.poles[0].natural_frequency_std_hz.value(), 0.0);
-  succeed(joined(fit, {"--threads", "2"}));
+  succeed(fit + " --threads 2");
   EXPECT_TRUE(same_bytes(read_bytes(at("m.json")), bytes));
 }
 
 TEST_F(GeneralStructure, WhatTheDataDoNotDetermineEndsWithThree) {
   make_frf();
-  ends({"fit", "frf.h5", "-o", "m.json", "--band", "120", "800", "--submodel", "n=2,m=1,f=181",
-        "--submodel", "n=2,m=1,f=181"},
-       3, "submodel ");
+  ends("fit frf.h5 -o m.json --band 120 800 --submodel n=2,m=1,f=181 --submodel n=2,m=1,f=181", 3,
+       "submodel ");
   EXPECT_THAT(read_bytes(at("m.json")), testing::Not(HasSubstr("null")));
 }
 
 TEST_F(GeneralStructure, ASuspensionIsFittedFromTheLowestLine) {
   make_frf();
-  succeed({"fit", "frf.h5", "-o", "m.json", "--rigid-body", "suspension:0.4:0.5", "--direct-term",
-           "full"});
+  succeed("fit frf.h5 -o m.json --rigid-body suspension:0.4:0.5 --direct-term full");
   const AdditiveModel model = read_model(at("m.json"));
   EXPECT_NEAR(model.fit.band_hz[0], 16.0, 1e-9);
   // Two of the suspension, four flexible ones, a direct term; no substitute modes.

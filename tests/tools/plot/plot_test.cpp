@@ -70,22 +70,21 @@ struct Plot : ProgramTest {
 
 TEST_F(Plot, StyleAndBandAreThoseThatAreAskedFor) {
   make_model();
-  const auto width = [&](const std::vector<std::string>& more) {
-    succeed(joined({"plot", "cmif", "frf.h5", "-o", "styled.png"}, more));
+  const auto width = [&](const std::string& more) {
+    succeed("plot cmif frf.h5 -o styled.png " + more);
     return png_width(read_bytes(at("styled.png")));
   };
-  EXPECT_NEAR(width({"--preset", "single"}), 3.5 * 300, 2);
-  EXPECT_NEAR(width({"--preset", "double"}), 7.16 * 300, 2);
-  EXPECT_NEAR(width({"--width", "127", "--height", "50", "--font", "Times", "--font-size", "10"}),
-              5.0 * 300, 2);
-  succeed({"plot", "bode", "frf.h5", "-o", "grey.svg", "--theme", "grey", "--band", "100", "400"});
+  EXPECT_NEAR(width("--preset single"), 3.5 * 300, 2);
+  EXPECT_NEAR(width("--preset double"), 7.16 * 300, 2);
+  EXPECT_NEAR(width("--width 127 --height 50 --font Times --font-size 10"), 5.0 * 300, 2);
+  succeed("plot bode frf.h5 -o grey.svg --theme grey --band 100 400");
   const std::string svg = read_bytes(at("grey.svg"));
   EXPECT_EQ(svg.find("rgb(240, 160,  48)"), std::string::npos);  // of the measurement
   EXPECT_NE(svg.find("rgb(171, 171, 171)"), std::string::npos);  // 0.299, 0.587 and 0.114 of it
-  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--width", "5"}, 2, "expected 30 to 1000");
-  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font-size", "1"}, 2, "expected 4 to 40");
-  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--font", "a'b"}, 2, "name of a font");
-  fail({"plot", "cmif", "frf.h5", "-o", "x.pdf", "--preset", "triple"}, 2, "triple");
+  fail("plot cmif frf.h5 -o x.pdf --width 5", 2, "expected 30 to 1000");
+  fail("plot cmif frf.h5 -o x.pdf --font-size 1", 2, "expected 4 to 40");
+  fail("plot cmif frf.h5 -o x.pdf --font a'b", 2, "name of a font");
+  fail("plot cmif frf.h5 -o x.pdf --preset triple", 2, "triple");
 }
 
 /// What is drawn on the first page.
@@ -102,8 +101,8 @@ std::string content_of_pdf(const std::string& pdf) {
 
 TEST_F(Plot, WidthsOfLinesAreInPointsInEveryFormat) {
   make_model();
-  for (const char* file : {"widths.pdf", "widths.svg"})
-    succeed({"plot", "cmif", "frf.h5", "-o", file});
+  for (const std::string file : {"widths.pdf", "widths.svg"})
+    succeed("plot cmif frf.h5 -o " + file);
   EXPECT_THAT(content_of_pdf(read_bytes(at("widths.pdf"))),
               AllOf(HasSubstr(" 0.5 w\n"), HasSubstr(" 1 w\n")));  // the frame, the first curve
   EXPECT_THAT(read_bytes(at("widths.svg")),
@@ -131,17 +130,14 @@ TEST_F(Plot, TheEntryHasThePhaseOfTheData) {
 
 TEST_F(Plot, ASmallExperimentIsDrawnInAllFormatsAndTwiceTheSame) {
   make_model();
-  const std::vector<std::vector<std::string>> figures = {
-      {"cmif"}, {"bode"}, {"entry", "--output-channel", "s2", "--input-channel", "a3"}};
-  for (const auto& figure : figures)
+  const std::string inputs = " frf.h5 model.json ";
+  for (const std::string& figure : {"cmif" + inputs, "bode" + inputs,
+                                    "entry" + inputs + "--output-channel s2 --input-channel a3 "})
     for (const std::string ending : {".pdf", ".svg", ".png"}) {
-      SCOPED_TRACE(figure[0] + ending);
-      std::vector<std::string> command = {"plot", figure[0], name("frf.h5"), name("model.json")};
-      command.insert(command.end(), figure.begin() + 1, figure.end());
-      command.insert(command.end(), {"-o", name("one" + ending)});
-      EXPECT_THAT(succeed(command).out, HasSubstr("wrote " + name("one" + ending)));
-      command.back() = name("two" + ending);
-      succeed(command);
+      SCOPED_TRACE(figure + ending);
+      const std::string command = "plot " + figure + "-o ";
+      EXPECT_THAT(succeed(command + "one" + ending).out, HasSubstr("wrote one" + ending));
+      succeed(command + "two" + ending);
       const std::string bytes = read_bytes(at("one" + ending));
       EXPECT_TRUE(same_bytes(bytes, read_bytes(at("two" + ending))));
       if (ending == ".pdf") {
@@ -240,35 +236,36 @@ TEST_F(Plot, NothingIsLeftInTheTemporaryDirectory) {
   const char* const old = std::getenv("TMPDIR");
   const std::string kept = old == nullptr ? "" : old;
   ::setenv("TMPDIR", name("tmp").c_str(), 1);
-  succeed({"plot", "cmif", name("frf.h5"), "-o", name("c.svg")});
+  succeed("plot cmif " + name("frf.h5") + " -o " + name("c.svg"));
   ProgramOptions full;
   full.largest_file_bytes = 2000;
-  fail({"plot", "cmif", name("frf.h5"), "-o", name("full.pdf")}, 1, "stageid-plot-", full);
+  fail("plot cmif " + name("frf.h5") + " -o " + name("full.pdf"), 1, "stageid-plot-", full);
   full.largest_file_bytes = 20000;  // the tables fit, the picture does not
-  fail({"plot", "entry", name("frf.h5"), "--output-channel", "s1", "--input-channel", "a1", "-o",
-        name("full.png")},
+  fail("plot entry " + name("frf.h5") + " --output-channel s1 --input-channel a1 -o " +
+           name("full.png"),
        1, "full.png: gnuplot failed", full);
   ::setenv("TMPDIR", name("no_such").c_str(), 1);
-  fail({"plot", "cmif", name("frf.h5"), "-o", name("d.pdf")}, 1, "");
+  fail("plot cmif " + name("frf.h5") + " -o " + name("d.pdf"), 1, "");
   old == nullptr ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", kept.c_str(), 1);
   EXPECT_TRUE(std::filesystem::is_empty(at("tmp")));
 }
 
 TEST_F(Plot, RequestsThatAreWrong) {
   make_model();
-  const auto wrong = [&](const std::vector<std::string>& words, const std::string& text) {
-    fail(joined({"plot"}, words), 2, text);
+  const auto wrong = [&](const std::string& words, const std::string& text) {
+    fail("plot " + words, 2, text);
   };
   const std::string frf = name("frf.h5");
   const std::string out = name("p.pdf");
-  wrong({"cmif", "-o", out}, "inputs");
-  wrong({"cmif", frf, "--input-channel", "a1", "-o", out}, "are for bode and entry");
-  wrong({"entry", frf, frf, "-o", out}, "duplicate file");
+  wrong("cmif -o " + out, "inputs");
+  wrong("cmif " + frf + " --input-channel a1 -o " + out, "are for bode and entry");
+  wrong("entry " + frf + " " + frf + " -o " + out, "duplicate file");
   for (const char* copy : {"b.h5", "c.h5"}) std::filesystem::copy_file(frf, at(copy));
-  wrong({"entry", frf, name("b.h5"), name("c.h5"), "-o", out}, "is of the same kind");
-  fail({"plot", "cmif", frf, "-o", name("no/p.pdf")}, 1, "no/p.pdf");
+  wrong("entry " + frf + " " + name("b.h5") + " " + name("c.h5") + " -o " + out,
+        "is of the same kind");
+  fail("plot cmif " + frf + " -o " + name("no/p.pdf"), 1, "no/p.pdf");
   std::filesystem::create_directory(at("folder.pdf"));
-  fail({"plot", "cmif", frf, "-o", name("folder.pdf")}, 1, "is a directory");
+  fail("plot cmif " + frf + " -o " + name("folder.pdf"), 1, "is a directory");
 }
 
 TEST(Pictures, RefuseWhatCannotBeDrawn) {

@@ -31,10 +31,10 @@ struct FitDetailsTest : test::ProgramTest {
 
 TEST_F(FitDetailsTest, BandAndLoopAreThoseOfTheCommands) {
   make_model();
-  succeed({"fit", "frf.h5", "-o", "same.json", "--band", "120", "800", "--direct-term", "full",
-           "--covariance", "covariance.h5"});
-  succeed({"export", "same.json", "--controller-view", "small_stage.yaml", "--covariance",
-           "covariance.h5", "--frf", "frf.h5", "-o", "view.json"});
+  succeed("fit frf.h5 -o same.json --band 120 800 --direct-term full --covariance covariance.h5");
+  succeed(
+      "export same.json --controller-view small_stage.yaml --covariance covariance.h5 --frf frf.h5 "
+      "-o view.json");
   const StageConfig stage = stage_file();
   const auto details = of_fit(&stage);
 
@@ -70,7 +70,7 @@ TEST_F(FitDetailsTest, AnOpenedModelShowsWhatItsFilesTell) {
   const auto bare = details_of_files(input, model, frf, nullptr);
   EXPECT_EQ(bare->deviation.text + bare->loop, "");
   EXPECT_TRUE(margin(details_of_files(input, model, frf, &stage)->loop)["radius_95"].is_null());
-  succeed({"export", "model.json", "--controller-view", "small_stage.yaml", "-o", "view.json"});
+  succeed("export model.json --controller-view small_stage.yaml -o view.json");
   input.controller_view = at("view.json");
   EXPECT_EQ(Json::parse(details_of_files(input, model, frf, nullptr)->loop)["model_fingerprint"],
             fingerprint_of_file(at("model.json")));
