@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -267,8 +268,7 @@ TEST(ExperimentPlan, RunsFollowTheSeedAlone) {
   EXPECT_NE(ExperimentPlan(small_grid(), spec).excitation({1, 1}), first);
 }
 
-template <typename Change>
-void expect_refused(const Change& change, const std::string& word) {
+void expect_refused(const std::function<void(ExperimentSpec&)>& change, const std::string& word) {
   ExperimentSpec spec = spec_of(3, ExcitationScheme::single_axis);
   change(spec);
   test::expect_error<std::invalid_argument>([&] { ExperimentPlan(small_grid(), spec); },

@@ -134,7 +134,7 @@ TEST(LimitedDesign, IsTheSameAgainAndFromAFile) {
 TEST(LimitedDesign, RefusesWhatCannotBeDesigned) {
   const FrequencyGrid grid = small_grid();
   const LimitedDesignSpec good = small_problem(grid, ExcitationScheme::orthogonal_dft);
-  const auto refuse = [&](auto change, const char* text) {
+  const auto refuse = [&](void (*change)(LimitedDesignSpec&), const char* text) {
     LimitedDesignSpec spec = good;
     change(spec);
     test::expect_error<std::invalid_argument>([&] { design_within_limits(grid, spec); }, "", text);

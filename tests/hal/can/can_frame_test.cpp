@@ -116,7 +116,7 @@ TEST(CanLayout, TheFingerprintTellsWhatBothSidesMustAgreeOn) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
   const CanSpec spec = test::one_bus_spec(info);
   const std::uint32_t fingerprint = can_layout(spec, info).fingerprint;
-  const auto differs = [&](auto change) {
+  const auto differs = [&](void (*change)(CanSpec&, StageInfo&)) {
     CanSpec other = spec;
     StageInfo other_info = info;
     change(other, other_info);
@@ -132,7 +132,7 @@ TEST(CanLayout, TheFingerprintTellsWhatBothSidesMustAgreeOn) {
 
 TEST(CanLayout, RefusesWhatMakesNoSense) {
   const StageInfo info = test::silent_wafer_stage_spec().info;
-  const auto refused = [&](auto change) {
+  const auto refused = [&](void (*change)(CanSpec&)) {
     CanSpec spec = test::one_bus_spec(info);
     change(spec);
     EXPECT_THROW(can_layout(spec, info), std::invalid_argument);

@@ -189,7 +189,7 @@ TEST(CanResidentStage, ANodeWhoseHostFallsSilentStops) {
 TEST(CanResidentStage, RefusesWhatDoesNotFit) {
   CanRig rig;
   const auto stage = rig.resident();
-  const auto refused = [&](auto change) {
+  const auto refused = [&](void (*change)(Waveforms&)) {
     Waveforms w = waveforms();
     change(w);
     EXPECT_THROW(stage->upload(w), std::invalid_argument);

@@ -69,7 +69,7 @@ TEST_P(ModbusRtuWire, WithoutADrainTheLateReplyWouldBeTakenForTheNextAnswer) {
 }
 
 TEST(ModbusClient, AddressesAndTimesThatMakeNoSenseAreRefused) {
-  const auto with = [](auto change) {
+  const auto with = [](void (*change)(ModbusAddress&)) {
     ModbusAddress address;
     address.device = "/dev/null";
     change(address);

@@ -202,7 +202,7 @@ TEST_F(StageNodeTest, AFaultOfTheStageCutsPowerWithoutHolding) {
 }
 
 TEST_F(StageNodeTest, ThePanelMustBeInRange) {
-  const auto refused = [&](auto change, FaultCause cause, const char* message) {
+  const auto refused = [&](void (*change)(NodePanel&), FaultCause cause, const char* message) {
     NodePanel bad = test::good_panel();
     change(bad);
     node_->set_panel(bad);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <ctime>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -201,7 +202,7 @@ TEST(SimulatedStage, AgainstTheWallClockIsLateOnlyWhenCalledTooLate) {
 
 TEST(SimulatedStage, RefusesABadSpecNamingTheField) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto refuse = [](const char* field, auto change) {
+  const auto refuse = [](const char* field, const std::function<void(SimulatedSpec&)>& change) {
     SimulatedSpec spec = test::small_stage_spec();
     change(spec);
     EXPECT_THAT([&] { test::simulated(spec); },
@@ -238,18 +239,11 @@ TEST(SimulatedStage, RefusesABadSpecNamingTheField) {
   refuse("sensors", [](SimulatedSpec& s) { s.info.sensors.resize(65, s.info.sensors[0]); });
   refuse("direction", [](SimulatedSpec& s) { s.info.sensors[0].direction[2] = 0.5; });
   refuse("position_m", [](SimulatedSpec& s) { s.info.actuators[0].position_m[0] = 0.6; });
-  refuse("faults", [](SimulatedSpec& s) {
-    s.simulation.faults = {{Kind::dead_sensor, 1, 0, 1, -1}};
-  });
-  refuse("faults", [](SimulatedSpec& s) {
-    s.simulation.faults = {{Kind::stuck_actuator, -1, 0, 1, -1}};
-  });
-  refuse("faults", [](SimulatedSpec& s) {
-    s.simulation.faults = {{Kind::missed_cycle, 0, 0, 0, -1}};
-  });
-  refuse("faults", [](SimulatedSpec& s) {
-    s.simulation.faults = {{Kind::extra_delay, -1, 0, 1, -1, 0.5}};
-  });
+  for (const SimulationSpec::Fault& fault : {SimulationSpec::Fault{Kind::dead_sensor, 1, 0, 1, -1},
+                                             {Kind::stuck_actuator, -1, 0, 1, -1},
+                                             {Kind::missed_cycle, 0, 0, 0, -1},
+                                             {Kind::extra_delay, -1, 0, 1, -1, 0.5}})
+    refuse("faults", [&](SimulatedSpec& s) { s.simulation.faults = {fault}; });
 }
 
 TEST(SimulatedStage, WantsRoomForEverySensor) {

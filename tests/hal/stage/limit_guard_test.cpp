@@ -184,7 +184,7 @@ TEST(LimitGuard, WithoutAMotionNothingIsPredicted) {
 
 TEST(LimitGuard, RefusesAMotionThatDoesNotFit) {
   const test::SimulatedSpec spec = test::stop_stage_spec();
-  const auto make = [&](auto change) {
+  const auto make = [&](void (*change)(RigidMotion&)) {
     StageLimits limits = spec.limits;
     change(limits.motion);
     return LimitGuard(limits, spec.info);

@@ -252,13 +252,15 @@ TEST_F(UnlimitedStageTest, RefusesNothingButWhatIsNoNumber) {
 }
 
 TEST(LimitedStage, RefusesLimitsThatDoNotFit) {
-  const auto make = [](auto change) {
+  const auto make = [](void (*change)(StageLimits&)) {
     StageLimits limits = generous();
     change(limits);
     return LimitedStage(std::make_unique<test::FakeStage>(2, 3, 1e3), limits);
   };
   EXPECT_NO_THROW(make([](StageLimits&) {}));
-  const auto refused = [&](auto change) { EXPECT_THROW(make(change), std::invalid_argument); };
+  const auto refused = [&](void (*change)(StageLimits&)) {
+    EXPECT_THROW(make(change), std::invalid_argument);
+  };
   refused([](StageLimits& l) { l.actuator_n.resize(3); });
   refused([](StageLimits& l) { l.actuator_n[1] = 0.0; });
   refused([](StageLimits& l) { l.slew_n_s[0] = -1.0; });

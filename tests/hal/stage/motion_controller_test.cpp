@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -138,16 +138,15 @@ TEST(MotionController, HasNoFixedSize) {
 }
 
 TEST(MotionController, RefusesWhatMakesNoSense) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto refuse = [](auto change) {
+  const auto refuse = [](void (*change)(AxisController&)) {
     AxisController axis = full_axis();
     change(axis);
     EXPECT_THROW(MotionController{single(axis)}, std::invalid_argument);
   };
   refuse([](AxisController& a) { a.crossover_hz = 5000.0; });
-  refuse([&](AxisController& a) { a.crossover_hz = nan; });
+  refuse([](AxisController& a) { a.crossover_hz = NAN; });
   refuse([](AxisController& a) { a.crossover_hz = -1.0; });
-  refuse([&](AxisController& a) { a.gain = nan; });
+  refuse([](AxisController& a) { a.gain = NAN; });
   refuse([](AxisController& a) { a.integrator_hz = -1.0; });
   refuse([](AxisController& a) { a.lead_zero_hz = 6000.0; });
   refuse([](AxisController& a) { a.lead_pole_hz = 0.0; });
@@ -156,14 +155,14 @@ TEST(MotionController, RefusesWhatMakesNoSense) {
   refuse([](AxisController& a) { a.notches[0].frequency_hz = 0.0; });
   refuse([](AxisController& a) { a.notches[0].zero_damping = -0.1; });
   refuse([](AxisController& a) { a.notches[1].pole_damping = 0.0; });
-  const auto refuse_spec = [](auto change) {
+  const auto refuse_spec = [](void (*change)(MotionControllerSpec&)) {
     MotionControllerSpec spec = single(full_axis());
     change(spec);
     EXPECT_THROW(MotionController{spec}, std::invalid_argument);
   };
   refuse_spec([](MotionControllerSpec& s) { s.sample_rate_hz = 0.0; });
   refuse_spec([](MotionControllerSpec& s) { s.sensor_decoupling.resize(2, 1); });
-  refuse_spec([&](MotionControllerSpec& s) { s.actuator_decoupling(0, 0) = nan; });
+  refuse_spec([](MotionControllerSpec& s) { s.actuator_decoupling(0, 0) = NAN; });
   refuse_spec([](MotionControllerSpec& s) { s.axes.clear(); });
 }
 

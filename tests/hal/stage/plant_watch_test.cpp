@@ -110,7 +110,8 @@ TEST(PlantWatch, EnablesWatchesAndDisables) {
                                                                    SupervisorCommand::disable}));
 }
 
-template <typename Change>
+using Change = void (*)(FakeSupervisor&);
+
 std::string reason_after(Change change) {
   FakeSupervisor supervisor;
   const PlantWatch watch(supervisor, conditions());
@@ -139,14 +140,14 @@ TEST(PlantWatch, StaysTripped) {
 }
 
 TEST(PlantWatch, DoesNotBringUpAPlantThatIsNotReady) {
-  const auto watching = [](auto change) {
+  const auto watching = [](Change change) {
     return [change] {
       FakeSupervisor supervisor;
       change(supervisor);
       const PlantWatch watch(supervisor, conditions());
     };
   };
-  const auto refused = [&](auto change, const char* text) {
+  const auto refused = [&](Change change, const char* text) {
     EXPECT_THAT(watching(change), testing::ThrowsMessage<StageError>(HasSubstr(text)));
   };
   EXPECT_NO_THROW(watching([](auto&) {})());

@@ -117,7 +117,7 @@ TEST(ReplayTest, RefusesARunThatIsNotThereOrDoesNotFit) {
   ReplayStage one = stage({recorded(0.0)});
   Host host(one);
   EXPECT_THROW(host.start(), StageError);
-  const auto refuse = [&](auto change) {
+  const auto refuse = [&](void (*change)(Recorded&)) {
     Recorded run = recorded(0.0);
     change(run);
     ReplayStage replay = stage({run});
