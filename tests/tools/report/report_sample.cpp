@@ -2,6 +2,7 @@
 //   report_sample DIRECTORY [full|full_compared|small|compared|bare|hostile|large|list]
 
 #include <algorithm>
+#include <complex>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -39,14 +40,19 @@ class Summary {
   double low_ = 0.0, high_ = 0.0, first_ = 0.0, last_ = 0.0, weighted_ = 0.0;
 };
 
-template <typename Matrix>
-Json summary_of(const Matrix& values, bool floats) {
+Json summary_of(const Eigen::MatrixXd& values, bool floats) {
   Summary out(floats);
   for (Eigen::Index c = 0; c < values.rows(); ++c)
-    for (Eigen::Index k = 0; k < values.cols(); ++k) {
-      out.add(std::real(values(c, k)));
-      if constexpr (Eigen::NumTraits<typename Matrix::Scalar>::IsComplex)
-        out.add(std::imag(values(c, k)));
+    for (const double value : values.row(c)) out.add(value);
+  return out.json();
+}
+
+Json complex_summary(const Eigen::MatrixXcd& values, bool floats) {
+  Summary out(floats);
+  for (Eigen::Index c = 0; c < values.rows(); ++c)
+    for (const std::complex<double> value : values.row(c)) {
+      out.add(value.real());
+      out.add(value.imag());
     }
   return out.json();
 }
@@ -65,9 +71,9 @@ Json extremes(const Eigen::MatrixXcd& values) {
 Json expected_nyquist(const ReportData& data) {
   Json out = Json::array();
   for (const Eigen::Index c : {Eigen::Index{0}, data.frf->response.rows() - 1}) {
-    Json element = {{"measured", summary_of(data.frf->response.row(c), true)}};
+    Json element = {{"measured", complex_summary(data.frf->response.row(c), true)}};
     if (data.model_response.size() > 0)
-      element["model"] = summary_of(data.model_response.row(c), false);
+      element["model"] = complex_summary(data.model_response.row(c), false);
     if (data.frf->total_variance.size() > 0) {
       const double nu = data.frf->total_dof;
       const double point = nu > 0.0 ? nu * (std::pow(0.05, -1.0 / nu) - 1.0) : -std::log(0.05);
@@ -141,8 +147,8 @@ Json expected(const ReportData& data) {
   const FrfEstimate& frf = *data.frf;
   if (data.comparison) {
     out["comparison"] = expected_comparison(data);
-    out["arrays"]["other_response"] = summary_of(data.comparison->response, false);
-    out["arrays"]["other_model"] = summary_of(data.comparison->model_response, false);
+    out["arrays"]["other_response"] = complex_summary(data.comparison->response, false);
+    out["arrays"]["other_model"] = complex_summary(data.comparison->model_response, false);
   }
   out["stabilization"] = Json::array();
   for (const StabilizationPole& pole : data.stabilization)
@@ -158,7 +164,7 @@ Json expected(const ReportData& data) {
   out["measured"] = extremes(frf.response);
   out["nyquist"] = expected_nyquist(data);
   out["arrays"]["frequency"] = summary_of(frf.frequency_hz.transpose(), false);
-  out["arrays"]["response"] = summary_of(frf.response, true);
+  out["arrays"]["response"] = complex_summary(frf.response, true);
   if (frf.interpolation_misfit.size() > 0) {
     Eigen::Index worst = 0;
     frf.interpolation_misfit.maxCoeff(&worst);
@@ -169,7 +175,7 @@ Json expected(const ReportData& data) {
         {"at_hz", frf.frequency_hz[worst]}};
   }
   if (data.model_response.size() > 0) {
-    out["arrays"]["residual"] = summary_of(frf.response - data.model_response, false);
+    out["arrays"]["residual"] = complex_summary(frf.response - data.model_response, false);
     out["model"] = extremes(data.model_response);
   }
   if (frf.total_variance.size() > 0)

@@ -1,9 +1,13 @@
 # Tests of the report page: in C++, and in a browser.
-add_executable(report_sample
-  report/report_sample.cpp
-  report/synthetic_report.cpp)
-target_link_libraries(report_sample PRIVATE stageid::tools fmt::fmt nlohmann_json::nlohmann_json
-  stageid::warnings)
+add_library(synthetic_report STATIC report/synthetic_report.cpp)
+target_link_libraries(synthetic_report PUBLIC stageid::tools nlohmann_json::nlohmann_json
+  PRIVATE fmt::fmt stageid::warnings)
+target_precompile_headers(synthetic_report REUSE_FROM stageid_precompiled_tools)
+add_executable(report_sample report/report_sample.cpp)
+target_link_libraries(report_sample PRIVATE synthetic_report stageid::warnings)
+# The precompiled headers of the tests are used as they were compiled.
+target_compile_options(report_sample PRIVATE $<TARGET_PROPERTY:GTest::gtest,INTERFACE_COMPILE_OPTIONS>)
+target_precompile_headers(report_sample REUSE_FROM stageid_precompiled_tests)
 
 find_package(Python3 3.9 COMPONENTS Interpreter)
 if(Python3_Interpreter_FOUND)

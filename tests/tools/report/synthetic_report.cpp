@@ -222,13 +222,11 @@ void add_runs(ReportData& data, const SyntheticSize& size) {
 
 /// A controller view of two loops: circles around the critical point, one with a 95 % disc of half its distance.
 void add_loops(ReportData& data) {
-  nlohmann::json view = {{"stable", true},
-                         {"largest_pole", 0.9962},
-                         {"largest_pole_hz", 3.826},
-                         {"encirclements", 0},
-                         {"unstable_poles", {{"closed_loop", 0}, {"open_loop", 0}}}};
-  const nlohmann::json margin = {
-      {"value", 11.6}, {"radius_95", 0.2}, {"frequency_hz", 62.13}, {"extrapolated", true}};
+  nlohmann::json view = nlohmann::json::parse(
+      R"({"stable": true, "largest_pole": 0.9962, "largest_pole_hz": 3.826, "encirclements": 0,
+          "unstable_poles": {"closed_loop": 0, "open_loop": 0}})");
+  const nlohmann::json margin = nlohmann::json::parse(
+      R"({"value": 11.6, "radius_95": 0.2, "frequency_hz": 62.13, "extrapolated": true})");
   std::vector<double> f, re, im;
   for (int k = 0; k < 50; ++k) {
     f.push_back(10.0 * (k + 1));
