@@ -22,7 +22,7 @@
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/stage/limited_stage.hpp"
 #include "tests/acquisition/loop/small_plan.hpp"
-#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/process/heap_use.hpp"
 #include "tests/support/process/lock_counter.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/analytic_stage.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "tests/acquisition/loop/measurement_loop_fixture.hpp"
-#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/process/heap_use.hpp"
 #include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid::test_measurement_loop {

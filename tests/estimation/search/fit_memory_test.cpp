@@ -6,7 +6,7 @@
 #include "estimation/problem/fit_start.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
-#include "tests/support/process/heap_peak.hpp"
+#include "tests/support/process/heap_use.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
 namespace stageid {

@@ -10,7 +10,7 @@
 #include "hal/stage/replay_stage.hpp"
 #include "tests/hal/stage/fake_stage.hpp"
 #include "tests/hal/stage_bench.hpp"
-#include "tests/support/process/allocation_counter.hpp"
+#include "tests/support/process/heap_use.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test_allocation {
