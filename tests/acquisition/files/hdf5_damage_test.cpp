@@ -41,8 +41,7 @@ struct Everything {
 
 bool has_nan(const Everything& all) {
   const auto nan = [](double value) { return std::isnan(value); };
-  return std::any_of(all.values.begin(), all.values.end(), nan) ||
-         std::any_of(all.rows.begin(), all.rows.end(), nan);
+  return std::ranges::any_of(all.values, nan) || std::ranges::any_of(all.rows, nan);
 }
 
 /// Reads everything; any damage must be reported as FormatError.
@@ -58,19 +57,20 @@ Everything read_everything(const fs::path& path) {
   return all;
 }
 
+template <typename Error>
+void expect_refused(const fs::path& file, const char* reason) {
+  expect_error<Error>([&] { Hdf5File::open(file); }, file, reason);
+}
+
 using DamagedHdf5 = test::DirectoryTest;
 
 TEST_F(DamagedHdf5, IsToldFromMissingAndForeignFiles) {
-  expect_error<FileError>([&] { Hdf5File::open(directory_ / "absent.h5"); },
-                          directory_ / "absent.h5", std::strerror(ENOENT));
-  expect_error<FileError>([&] { Hdf5File::open(directory_.path()); }, directory_.path(),
-                          "is not a regular file");
-  write_bytes(directory_ / "text.h5", "this is not HDF5\n");
-  expect_error<FormatError>([&] { Hdf5File::open(directory_ / "text.h5"); }, directory_ / "text.h5",
-                            "not an HDF5 file");
-  write_bytes(directory_ / "empty.h5", "");
-  expect_error<FormatError>([&] { Hdf5File::open(directory_ / "empty.h5"); },
-                            directory_ / "empty.h5", "not an HDF5 file");
+  expect_refused<FileError>(directory_ / "absent.h5", std::strerror(ENOENT));
+  expect_refused<FileError>(directory_.path(), "is not a regular file");
+  for (const char* bytes : {"this is not HDF5\n", ""}) {
+    write_bytes(directory_ / "other.h5", bytes);
+    expect_refused<FormatError>(directory_ / "other.h5", "not an HDF5 file");
+  }
 }
 
 TEST_F(DamagedHdf5, CutShortAnywhereIsAFormatError) {
@@ -81,8 +81,7 @@ TEST_F(DamagedHdf5, CutShortAnywhereIsAFormatError) {
     EXPECT_THROW(read_everything(directory_ / "cut.h5"), FormatError) << length << " bytes";
   }
   write_bytes(directory_ / "cut.h5", healthy.substr(0, healthy.size() - 1));
-  expect_error<FormatError>([&] { read_everything(directory_ / "cut.h5"); }, directory_ / "cut.h5",
-                            "truncated");
+  expect_refused<FormatError>(directory_ / "cut.h5", "truncated");
 }
 
 TEST_F(DamagedHdf5, AHugeSizeDoesNotAskForAllTheMemory) {
@@ -130,12 +129,9 @@ TEST_F(DamagedHdf5, OneWrongByteIsNoticedOrChangesNothing) {
     write_bytes(directory_ / "damaged.h5", damaged);
     try {
       const Everything read = read_everything(directory_ / "damaged.h5");
-      if (has_nan(read)) {
-        ++noticed;  // detected by the caller, who needs numbers
-      } else {
-        EXPECT_TRUE(read == truth) << "byte " << at << " ^ " << bits;
-        ++harmless;
-      }
+      const bool found = has_nan(read);  // by the caller, who needs numbers
+      EXPECT_TRUE(found || read == truth) << "byte " << at << " ^ " << bits;
+      ++(found ? noticed : harmless);
     } catch (const FormatError&) {
       ++noticed;
     }
@@ -160,8 +156,7 @@ TEST_F(DamagedHdf5, AHeapWhoseTextsOverlapIsRefused) {
       std::string damaged = healthy;
       damaged[place + byte] = static_cast<char>(damaged[place + byte] ^ 0x80);
       write_bytes(directory_ / "damaged.h5", damaged);
-      expect_error<FormatError>([&] { Hdf5File::open(directory_ / "damaged.h5"); },
-                                directory_ / "damaged.h5", "damaged");
+      expect_refused<FormatError>(directory_ / "damaged.h5", "damaged");
     }
   }
 }

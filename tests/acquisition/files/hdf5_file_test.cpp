@@ -7,6 +7,7 @@
 #include <cmath>
 #include <complex>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <string>
 #include <thread>
@@ -23,8 +24,10 @@ namespace fs = std::filesystem;
 using test::expect_error;
 using Complex = std::complex<double>;
 
+using Action = std::function<void()>;
+
 /// A file with objects of every kind.
-void write_everything(const fs::path& path) {
+fs::path with_everything(const fs::path& path) {
   Hdf5File file = Hdf5File::create(path);
   file.write_attribute("/", "rate", 1.0 / 3.0);
   file.write_attribute("/", "count", -9'007'199'254'740'993LL);
@@ -50,14 +53,16 @@ void write_everything(const fs::path& path) {
   }
   file.append_rows("/table", 0, static_cast<const double*>(nullptr));
   file.close();
+  return path;
 }
 
 using Hdf5FileTest = test::DirectoryTest;
 
-TEST_F(Hdf5FileTest, GivesBackAllThatWasWritten) {
-  write_everything(directory_ / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
+struct Hdf5FileOfAllKinds : Hdf5FileTest {
+  const Hdf5File file = Hdf5File::open(with_everything(directory_ / "f.h5"));
+};
 
+TEST_F(Hdf5FileOfAllKinds, GivesBackAllThatWasWritten) {
   EXPECT_EQ(file.read_real_attribute("/", "rate"), 1.0 / 3.0);
   EXPECT_EQ(file.read_integer_attribute("/", "count"), -9'007'199'254'740'993LL);
   EXPECT_EQ(file.read_text_attribute("/", "title"), "5 \xC2\xB5m");
@@ -82,9 +87,7 @@ TEST_F(Hdf5FileTest, GivesBackAllThatWasWritten) {
             (std::vector<std::string>{"z1", "", "a long name with blanks "}));
 }
 
-TEST_F(Hdf5FileTest, KnowsWhatThereIs) {
-  write_everything(directory_ / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
+TEST_F(Hdf5FileOfAllKinds, KnowsWhatThereIs) {
   EXPECT_TRUE(file.exists("/"));
   EXPECT_TRUE(file.exists("/runs/0001/reals"));
   EXPECT_FALSE(file.exists("/runs/0002"));
@@ -102,9 +105,7 @@ TEST_F(Hdf5FileTest, KnowsWhatThereIs) {
   EXPECT_EQ(file.kind("/texts"), Hdf5Kind::text);
 }
 
-TEST_F(Hdf5FileTest, ReadsRowsAnywhere) {
-  write_everything(directory_ / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
+TEST_F(Hdf5FileOfAllKinds, ReadsRowsAnywhere) {
   ASSERT_EQ(file.shape("/table"), (std::vector<hsize_t>{15, 2}));
   const std::vector<double> all = file.read_reals("/table");
   EXPECT_EQ(all[2 * 13], 4.5);  // row 13 is the second of the fifth block
@@ -123,7 +124,6 @@ TEST_F(Hdf5FileTest, ReadsRowsAnywhere) {
 }
 
 TEST_F(Hdf5FileTest, IntegersAndFloatsStandForEachOtherInAttributes) {
-  write_everything(directory_ / "f.h5");
   {
     Hdf5File file = Hdf5File::create(directory_ / "g.h5");
     file.write_attribute("/", "float", 40'000.0);
@@ -141,10 +141,9 @@ TEST_F(Hdf5FileTest, IntegersAndFloatsStandForEachOtherInAttributes) {
 }
 
 TEST_F(Hdf5FileTest, WritesTheSameBytesAtAnotherTime) {
-  write_everything(directory_ / "first.h5");
+  const std::string first = test::bytes_of(with_everything(directory_ / "first.h5"));
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // HDF5 stores whole seconds
-  write_everything(directory_ / "second.h5");
-  EXPECT_EQ(test::bytes_of(directory_ / "first.h5"), test::bytes_of(directory_ / "second.h5"));
+  EXPECT_EQ(test::bytes_of(with_everything(directory_ / "second.h5")), first);
 }
 
 TEST_F(Hdf5FileTest, WritesEmptyThings) {
@@ -167,13 +166,10 @@ TEST_F(Hdf5FileTest, WritesEmptyThings) {
   file.read_rows("/none", 0, 0, nullptr);
 }
 
-TEST_F(Hdf5FileTest, NamesFilePlaceAndRemedyOfWhatIsWrong) {
-  write_everything(directory_ / "f.h5");
-  const Hdf5File file = Hdf5File::open(directory_ / "f.h5");
-  const std::string path = file.path().string();
+TEST_F(Hdf5FileOfAllKinds, NamesFilePlaceAndRemedyOfWhatIsWrong) {
   double sink[64];
-  const auto wrong = [&](const auto& action, const std::string& place, const std::string& word) {
-    expect_error<FormatError>(action, path + ":" + place + ": ", word);
+  const auto wrong = [&](const Action& action, const std::string& place, const char* word) {
+    expect_error<FormatError>(action, file.path().string() + ":" + place + ": ", word);
   };
   wrong([&] { file.read_reals("/absent"); }, "/absent", "missing");
   wrong([&] { file.read_reals("/runs"); }, "/runs", "expected a dataset");
@@ -211,7 +207,7 @@ TEST_F(Hdf5FileTest, SaysThatWritingIsImpossible) {
   const double value = 1.0;
   file.write_reals("/twice", {1}, &value);
   file.write_attribute("/", "twice", 1.0);
-  const auto wrong = [&](const auto& action, const std::string& place, const char* word) {
+  const auto wrong = [&](const Action& action, const std::string& place, const char* word) {
     expect_error<FileError>(action, file.path().string() + ":" + place, word);
   };
   wrong([&] { file.write_reals("/twice", {1}, &value); }, "/twice", "exists");

@@ -9,6 +9,7 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/loop/event_recorder.hpp"
 #include "hal/stage/stage.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
 #include "tests/support/process/file_size_limit.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
@@ -52,8 +53,8 @@ TEST_F(EventLogTest, ContinuesWhatIsThere) {
 }
 
 TEST_F(EventLogTest, AFileThatCannotBeMadeIsAnError) {
-  EXPECT_THAT([&] { EventLog(directory_ / "no" / "such.jsonl"); },
-              testing::ThrowsMessage<FileError>(HasSubstr("such.jsonl")));
+  const auto file = directory_ / "no/such.jsonl";
+  test::expect_error<FileError>([&] { EventLog{file}; }, file, "");
 }
 
 TEST_F(EventLogTest, AFullDiskIsToldAndStopsNothing) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "acquisition/slog/slog_json.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
 
 namespace stageid::test_run_timing {
 
@@ -86,8 +87,7 @@ TEST(RunTiming, ABinThatIsNoneIsRefused) {
   end.timing.lateness.add(32);  // bins of 32: [32, 36)
   std::string text = run_end_json(end);
   text.replace(text.find("[32,"), 4, "[33,");
-  EXPECT_THAT([&] { parse_run_end(text); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("33 ns")));
+  test::expect_error<std::invalid_argument>([&] { parse_run_end(text); }, "", "33 ns");
 }
 
 }  // namespace stageid::test_run_timing

@@ -11,13 +11,12 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/row_transpose.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
 #include "tests/acquisition/record/small_log.hpp"
 
 namespace stageid::test_slog_reader {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using test::expect_error;
 
 TEST(SlogStatus, PacksAndUnpacks) {
   const SampleStatus status{9, true, 0xFEDCBA98U};
@@ -138,9 +137,8 @@ TEST_F(SlogReaderTest, NamesTheChannelOfAValueThatIsNotFinite) {
     });
     const SlogReader reader(file_);
     LogSamples samples;
-    EXPECT_THAT([&] { reader.read(0, 12, 24, samples); },
-                ThrowsMessage<FormatError>(AllOf(HasSubstr(file_.string()), HasSubstr("0000"),
-                                                 HasSubstr("row 17"), HasSubstr("s2"))));
+    expect_error<FormatError>([&] { reader.read(0, 12, 24, samples); },
+                              file_.string() + ":/runs/0000: row 17", "'s2'");
     EXPECT_NO_THROW(reader.read(0, 0, 17, samples));
   }
 }
@@ -152,8 +150,7 @@ TEST_F(SlogReaderTest, RefusesCompleteRunsOfNoWholePeriods) {
     create([&](SlogWriter& log) { test::write_run(log, 0, rows); });
     const SlogReader reader(file_);
   };
-  EXPECT_THAT([&] { read(35); },
-              ThrowsMessage<FormatError>(AllOf(HasSubstr("/runs/0000"), HasSubstr("35 samples"))));
+  expect_error<FormatError>([&] { read(35); }, file_.string() + ":/runs/0000", "35 samples");
   EXPECT_THROW(read(12), FormatError) << "transient only";
   EXPECT_THROW(read(0), FormatError);
   EXPECT_NO_THROW(read(24));
@@ -164,8 +161,7 @@ TEST_F(SlogReaderTest, RefusesTheSameCompleteRunTwice) {
     test::write_run(log, 1);
     test::write_run(log, 1);
   });
-  EXPECT_THAT([&] { SlogReader reader(file_); },
-              ThrowsMessage<FormatError>(HasSubstr("duplicate realization")));
+  expect_error<FormatError>([&] { SlogReader{file_}; }, file_, "duplicate realization");
 }
 
 TEST_F(SlogReaderTest, SaysThatALogWasNotClosed) {
@@ -175,8 +171,7 @@ TEST_F(SlogReaderTest, SaysThatALogWasNotClosed) {
     log.begin_run(test::run_of(1), test::excitation_of(1));
     log.write(test::rows_of(1, 0, 10));
   }
-  EXPECT_THAT([&] { open_log(file_); },
-              ThrowsMessage<FormatError>(HasSubstr("stageid log recover")));
+  expect_error<FormatError>([&] { open_log(file_); }, file_, "stageid log recover");
   const auto reader = open_log(file_, false);
   ASSERT_EQ(reader->runs().size(), 2U);
   EXPECT_TRUE(reader->runs()[0].complete);
@@ -189,12 +184,10 @@ using OpenLog = test::SmallLogTest;
 TEST_F(OpenLog, SaysWhatAFileIsNot) {
   EXPECT_THROW(open_log(directory_ / "none"), FileError);
   EXPECT_THROW(open_log(directory_.path()), FileError);
-  test::write_bytes(directory_ / "empty", "");
-  EXPECT_THAT([&] { open_log(directory_ / "empty"); },
-              ThrowsMessage<FormatError>(HasSubstr("is empty")));
-  test::write_bytes(directory_ / "text", "time,u,y\n");
-  EXPECT_THAT([&] { open_log(directory_ / "text"); },
-              ThrowsMessage<FormatError>(HasSubstr("neither")));
+  test::write_bytes(file_, "");
+  expect_error<FormatError>([&] { open_log(file_); }, file_, "is empty");
+  test::write_bytes(file_, "time,u,y\n");
+  expect_error<FormatError>([&] { open_log(file_); }, file_, "neither");
 }
 
 TEST(RowTranspose, MovesEveryValueAndSeesEveryNonFiniteOne) {

@@ -1,6 +1,5 @@
 #include "acquisition/slog/slog_writer.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -8,13 +7,13 @@
 
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/slog/slog_reader.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
 #include "tests/acquisition/record/small_log.hpp"
 #include "tests/support/process/file_size_limit.hpp"
 
 namespace stageid::test_slog_writer {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using test::expect_error;
 
 using SlogWriterTest = test::SmallLogTest;
 
@@ -80,7 +79,7 @@ TEST_F(SlogWriterTest, ARunWithoutExcitationHasNone) {
 
 TEST_F(SlogWriterTest, RefusesAnExistingFileAndLeavesItAlone) {
   test::write_bytes(file_, "precious");
-  EXPECT_THAT([&] { create(); }, ThrowsMessage<FileError>(HasSubstr("already exists")));
+  expect_error<FileError>([&] { create(); }, file_, "already exists");
   EXPECT_EQ(test::bytes_of(file_), "precious");
   EXPECT_THROW(SlogWriter::create(directory_ / "none/a.slog", test::small_info()), FileError);
   EXPECT_THROW(SlogWriter::resume(directory_ / "none.slog", test::small_info()), FileError);
@@ -123,7 +122,7 @@ TEST_F(SlogWriterTest, RefusesCallsOutOfOrderAndOfWrongSize) {
 
 TEST_F(SlogWriterTest, OneWriterAtATime) {
   const SlogWriter log = create();
-  EXPECT_THAT([&] { resume(); }, ThrowsMessage<FileError>(HasSubstr("another process")));
+  expect_error<FileError>([&] { resume(); }, file_, "another process");
 }
 
 TEST_F(SlogWriterTest, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
@@ -133,8 +132,7 @@ TEST_F(SlogWriterTest, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
     log.begin_run(test::run_of(0), test::excitation_of(0));
     log.write(test::rows_of(0, 0, 10));
     const test::FileSizeLimit limit(log.bytes() + 200);  // room for a part of the next block
-    EXPECT_THAT([&] { log.write(test::rows_of(0, 10, 10)); },
-                ThrowsMessage<FileError>(HasSubstr("are kept")));
+    expect_error<FileError>([&] { log.write(test::rows_of(0, 10, 10)); }, file_, "are kept");
     EXPECT_THROW(log.write(test::rows_of(0, 10, 1)), FileError) << "a gap would follow";
     acknowledged = log.acknowledged_rows();
     EXPECT_EQ(std::filesystem::file_size(file_), log.bytes());
@@ -173,8 +171,8 @@ TEST_F(SlogWriterTest, ResumeRefusesAnotherExperiment) {
   const std::string before = test::bytes_of(file_);
   LogInfo other = test::small_info();
   other.period_samples = 24;
-  EXPECT_THAT([&] { SlogWriter::resume(file_, other); },
-              ThrowsMessage<FormatError>(HasSubstr("a different experiment")));
+  expect_error<FormatError>([&] { SlogWriter::resume(file_, other); }, file_,
+                            "a different experiment");
   other = test::small_info();
   other.sensors.names[0] = "s9";
   EXPECT_THROW(SlogWriter::resume(file_, other), FormatError);
@@ -217,7 +215,7 @@ TEST_F(SlogWriterTest, ResumeDoesNotThrowIntactBlocksAway) {
   std::string bytes = test::bytes_of(file_);
   bytes[bytes.size() / 2] ^= 1;
   test::write_bytes(file_, bytes);
-  EXPECT_THAT([&] { resume(); }, ThrowsMessage<FormatError>(HasSubstr("recover")));
+  expect_error<FormatError>([&] { resume(); }, file_, "recover");
   EXPECT_EQ(test::bytes_of(file_), bytes);
 }
 
