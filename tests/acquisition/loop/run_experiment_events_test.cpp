@@ -3,22 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <memory>
 
 #include "acquisition/loop/run_experiment.hpp"
 #include "acquisition/slog/slog_reader.hpp"
-#include "acquisition/slog/slog_writer.hpp"
-#include "tests/acquisition/loop/small_plan.hpp"
+#include "tests/acquisition/loop/run_experiment_fixture.hpp"
 #include "tests/support/process/error_message.hpp"
-#include "tests/support/process/temporary_directory.hpp"
-#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid::test_run_experiment_events {
 
-using test::AnalyticStage;
 using testing::HasSubstr;
-
-constexpr std::uint64_t kSamples = 3 * test::kPlanPeriod;
 
 /// Counts the calls that it receives.
 struct Counter final : RunObserver {
@@ -30,23 +23,12 @@ struct Counter final : RunObserver {
   std::size_t words = 0;
 };
 
-struct RunExperimentEvents : testing::Test {
-  void make_stage(Clock clock = Clock::virtual_time) {
-    auto stage = std::make_unique<AnalyticStage>(2, 1, 1000.0, clock);
-    stage->spoil_missing = false;
-    inner_ = stage.get();
-    StageLimits limits;
-    limits.actuator_n = Eigen::VectorXd::Constant(2, 50.0);
-    stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
-    controller_ = std::make_unique<MotionController>(test::analytic_controller(inner_->info()));
-  }
+struct RunExperimentEvents : test::RunExperimentTest {
+  RunExperimentEvents() { plan_ = test::small_plan(2, 2, {{"u1", 1.0, {}}}); }
 
   ExperimentResult measure(RunExperimentOptions options) {
     options.events = &events_;
-    SlogWriter log = SlogWriter::create(log_, experiment_log_info(plan_, stage_->info()));
-    const ExperimentResult result = run_experiment(plan_, *stage_, *controller_, log, options);
-    log.close(0, "");
-    return result;
+    return measure_into("a.slog", options);
   }
 
   /// The events with that name, as text.
@@ -57,17 +39,11 @@ struct RunExperimentEvents : testing::Test {
     return found;
   }
 
-  test::TemporaryDirectory directory_;
   std::filesystem::path log_ = directory_ / "a.slog";
   EventLog events_{event_log_of(log_)};
-  ExperimentPlan plan_ = test::small_plan(2, 2, {{"u1", 1.0, {}}});
-  AnalyticStage* inner_ = nullptr;
-  std::unique_ptr<LimitedStage> stage_;
-  std::unique_ptr<MotionController> controller_;
 };
 
 TEST_F(RunExperimentEvents, RunsAndMissesAreTold) {
-  make_stage();
   inner_->outcomes = {{20, Outcome::stale}, {21, Outcome::stale}};
   measure({});
   EXPECT_EQ(told("run_begin").size(), 2U);
@@ -79,7 +55,6 @@ TEST_F(RunExperimentEvents, RunsAndMissesAreTold) {
 }
 
 TEST_F(RunExperimentEvents, AStopIsToldWithItsReasonAndCycle) {
-  make_stage();
   inner_->first_sensor = {{140, 1e9}};
   measure({});
   const auto stops = told("stop");
@@ -88,7 +63,6 @@ TEST_F(RunExperimentEvents, AStopIsToldWithItsReasonAndCycle) {
 }
 
 TEST_F(RunExperimentEvents, ATripOfThePlantIsToldAsSuch) {
-  make_stage();
   std::atomic<bool> tripped = false;
   inner_->raise = {{150, &tripped}};
   measure({.plant_tripped = &tripped, .plant_reason = [] { return std::string("too hot"); }});
@@ -98,20 +72,18 @@ TEST_F(RunExperimentEvents, ATripOfThePlantIsToldAsSuch) {
 }
 
 TEST_F(RunExperimentEvents, ObserversSeeEveryRowOfEveryRun) {
-  make_stage();
   Counter counter;
   measure({.observers = {&counter}});
   EXPECT_EQ(counter.begun, 2);
   EXPECT_EQ(counter.complete, 2);
-  EXPECT_EQ(counter.words, 2 * kSamples * 4);
+  EXPECT_EQ(counter.words, 2 * kSamples * (kActuators + kSensors + 1));
 }
 
 TEST_F(RunExperimentEvents, TimingIsMeasuredAgainstTheWallClockOnlyAndKeptInTheLog) {
-  make_stage();
   EXPECT_TRUE(measure({}).timing.empty());
   std::filesystem::remove(log_);
 
-  make_stage(Clock::wall);
+  use_wall_clock();
   inner_->outcomes = {{50, Outcome::late}};
   inner_->lateness_ns = 2'500'000;  // two and a half periods
   ExperimentProgress last;
@@ -130,7 +102,7 @@ TEST_F(RunExperimentEvents, TimingIsMeasuredAgainstTheWallClockOnlyAndKeptInTheL
 }
 
 TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstRun) {
-  make_stage(Clock::wall);
+  use_wall_clock();
   RunExperimentOptions options;
   options.real_time = {RealTimePolicy::require, 80, -1, false};
   // Refused by the same rules as in an earlier query: a kernel without PREEMPT_RT, or missing permissions.
@@ -142,7 +114,7 @@ TEST_F(RunExperimentEvents, RealTimeThatIsRequiredAndNotThereEndsBeforeTheFirstR
 }
 
 TEST_F(RunExperimentEvents, HoldingIsToldAsNotRecorded) {
-  make_stage(Clock::wall);
+  use_wall_clock();
   measure({.between_runs = BetweenRuns::hold});
   EXPECT_EQ(told("run_end").size(), 2U);
   const std::vector<std::string> holds = told("hold");

@@ -10,57 +10,17 @@
 #include "acquisition/files/file_error.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/slog/slog_reader.hpp"
-#include "acquisition/slog/slog_writer.hpp"
-#include "tests/acquisition/loop/small_plan.hpp"
+#include "tests/acquisition/files/expect_error.hpp"
+#include "tests/acquisition/loop/run_experiment_fixture.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/file_size_limit.hpp"
-#include "tests/support/process/temporary_directory.hpp"
-#include "tests/support/stages/analytic_stage.hpp"
 
 namespace stageid::test_run_experiment {
 
-using test::AnalyticStage;
+using test::expect_error;
 using testing::HasSubstr;
-using testing::ThrowsMessage;
 
-constexpr int kActuators = 3;
-constexpr int kSensors = 2;
-constexpr int kPeriod = test::kPlanPeriod;
-constexpr std::uint64_t kSamples = 3 * kPeriod;
-
-struct RunExperiment : testing::Test {
-  RunExperiment() {
-    auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors);
-    stage->noise = 1e-3;
-    stage->spoil_missing = false;  // a driver holds the last measurement, as LimitedStage requires
-    inner_ = stage.get();
-    StageLimits limits;
-    limits.actuator_n = Eigen::VectorXd::Constant(kActuators, 50.0);
-    stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
-    controller_ = std::make_unique<MotionController>(test::analytic_controller(inner_->info()));
-  }
-
-  SlogWriter create(const std::string& name) {
-    return SlogWriter::create(directory_ / name, experiment_log_info(plan_, stage_->info()));
-  }
-
-  ExperimentResult measure(SlogWriter& log, const RunExperimentOptions& options = {}) {
-    return run_experiment(plan_, *stage_, *controller_, log, options);
-  }
-
-  /// Measures into a closed log.
-  ExperimentResult measure_into(const std::string& name, const RunExperimentOptions& options = {}) {
-    SlogWriter log = create(name);
-    const ExperimentResult result = measure(log, options);
-    log.close(0, result.message.c_str());
-    return result;
-  }
-
-  void use_wall_clock(const StageLimits& limits) {
-    auto stage = std::make_unique<AnalyticStage>(kActuators, kSensors, 1000.0, Clock::wall);
-    inner_ = stage.get();
-    stage_ = std::make_unique<LimitedStage>(std::move(stage), limits);
-  }
-
+struct RunExperiment : test::RunExperimentTest {
   static LogSamples all_samples(const LogReader& reader, std::size_t run) {
     LogSamples samples;
     reader.read(run, 0, reader.runs()[run].samples, samples);
@@ -70,12 +30,6 @@ struct RunExperiment : testing::Test {
   static bool same(const LogSamples& a, const LogSamples& b) {
     return a.actuators == b.actuators && a.sensors == b.sensors && (a.marked == b.marked).all();
   }
-
-  test::TemporaryDirectory directory_;
-  ExperimentPlan plan_ = test::small_plan();
-  AnalyticStage* inner_ = nullptr;
-  std::unique_ptr<LimitedStage> stage_;
-  std::unique_ptr<MotionController> controller_;
 };
 
 TEST_F(RunExperiment, LogsEveryRunOfThePlan) {
@@ -114,8 +68,8 @@ TEST_F(RunExperiment, TheRecordIsControllerPlusExcitationOnTheRightActuators) {
       const Eigen::VectorXd y = samples.sensors.row(n);
       Eigen::VectorXd u(kActuators);
       again.update(y.data(), u.data());
-      u[2] += excitation(n % kPeriod, 0);
-      u[0] += excitation(n % kPeriod, 1);
+      u[2] += excitation(n % test::kPlanPeriod, 0);
+      u[0] += excitation(n % test::kPlanPeriod, 1);
       ASSERT_EQ(u, samples.actuators.row(n).transpose()) << "run " << run << ", row " << n;
     }
   }
@@ -301,8 +255,8 @@ TEST_F(RunExperiment, ReportsProgressFromTheCallingThread) {
 TEST_F(RunExperiment, AnExceptionOfTheProgressFunctionStopsTheStage) {
   RunExperimentOptions options;
   options.progress = [](const ExperimentProgress&) { throw std::runtime_error("enough"); };
-  EXPECT_THAT([&] { measure_into("a.slog", options); },
-              ThrowsMessage<std::runtime_error>("enough"));
+  EXPECT_EQ(test::error_message<std::runtime_error>([&] { measure_into("a.slog", options); }),
+            "enough");
   EXPECT_EQ(inner_->stops(), static_cast<int>(inner_->seeds().size()));
 }
 
@@ -312,8 +266,7 @@ TEST_F(RunExperiment, RefusesAPlanThatDoesNotFit) {
   EXPECT_THROW(experiment_log_info(plan_, other), std::invalid_argument);
   other = inner_->info();
   other.actuators[2].name = "u9";
-  EXPECT_THAT([&] { experiment_log_info(plan_, other); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("'u3'")));
+  expect_error<std::invalid_argument>([&] { experiment_log_info(plan_, other); }, "", "'u3'");
   other = inner_->info();
   other.maximum_rate_hz = 500.0;
   EXPECT_THROW(experiment_log_info(plan_, other), std::invalid_argument);
@@ -371,7 +324,7 @@ TEST_F(RunExperiment, AHeldStageIsStartedAndStoppedOnce) {
 
 // Deciding whether it is enough may take long: the loop must not wait for it.
 TEST_F(RunExperiment, AHeldStageIsControlledWhileTheResultIsEvaluated) {
-  use_wall_clock({});
+  use_wall_clock();
   RunExperimentOptions options;
   options.between_runs = BetweenRuns::hold;
   std::atomic<bool> cycled = false;

@@ -5,59 +5,137 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include "acquisition/slog/slog_reader.hpp"
-#include "acquisition/slog/slog_writer.hpp"
-#include "tests/acquisition/loop/playing_stage.hpp"
-#include "tests/acquisition/loop/small_plan.hpp"
-#include "tests/support/process/temporary_directory.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "hal/stage/resident_stage.hpp"
+#include "tests/acquisition/loop/run_experiment_fixture.hpp"
 
 namespace stageid::test_run_resident {
 
 using testing::HasSubstr;
 
-constexpr int kActuators = 3;
-constexpr int kSensors = 2;
-constexpr std::uint64_t kSamples = 300;
+/// An analytic stage that closes the loop by itself, with scripted failures.
+class PlayingStage final : public ResidentStage {
+ public:
+  PlayingStage() { plant_.noise = 1e-3; }
 
-struct RunResident : testing::Test {
+  // The script.
+  std::uint64_t polls = 1;            ///< until a run is over
+  std::function<void()> at_poll;      ///< called in every poll
+  std::uint64_t fails_at = 0;         ///< rows after which a run fails; 0: never
+  Outcome failure = Outcome::fault;   ///< its outcome
+  int loses_upload = -1;              ///< the upload of this run throws
+  int loses_download = -1;            ///< the download of this run stops half-way
+  Outcome odd_outcome = Outcome::ok;  ///< of row 7
+
+  int stops = 0;
+  std::vector<Trigger> triggers;
+
+  const StageInfo& info() const noexcept override { return plant_.info(); }
+  std::uint64_t depth_samples() const noexcept override { return depth; }
+  std::uint64_t depth = 1000;
+
+  JobProgress upload(const Waveforms& waveforms) override {
+    if (static_cast<int>(triggers.size()) == loses_upload) throw StageError("the node fell silent");
+    waveforms_ = waveforms;
+    return {JobStatus::done, 0, 0, ""};
+  }
+
+  JobProgress arm(const Trigger& trigger) override {
+    triggers.push_back(trigger);
+    polled_ = 0;
+    play(trigger.run_seed);
+    return {JobStatus::running, 0, 0, ""};
+  }
+
+  JobProgress poll() override {
+    if (at_poll) at_poll();
+    if (++polled_ < polls) return {JobStatus::running, polled_, rows_, ""};
+    if (fails_at == 0) return {JobStatus::done, rows_, rows_, ""};
+    return {JobStatus::failed, rows_, rows_, "the stage says no", failure};
+  }
+
+  JobProgress download(const TraceSink& sink) override {
+    const std::size_t columns = info().actuators.size() + info().sensors.size();
+    const bool lost = static_cast<int>(triggers.size()) - 1 == loses_download;
+    const std::size_t rows = lost ? rows_ / 2 : rows_;
+    for (std::size_t row = 0; row < rows; row += 64) {
+      const std::size_t count = std::min<std::size_t>(64, rows - row);
+      std::vector<Outcome> outcomes(count, Outcome::ok);
+      if (row == 0) outcomes[7] = odd_outcome;
+      sink({trace_.data() + row * columns, count * columns}, outcomes);
+    }
+    if (lost) throw StageError("the node fell silent");
+    return {JobStatus::done, 0, 0, ""};
+  }
+
+  void stop() noexcept override { ++stops; }
+
+ private:
+  void play(std::uint64_t run_seed) {
+    std::vector<double> y(info().sensors.size());
+    std::vector<double> u(info().actuators.size());
+    Inputs inputs;
+    inputs.y = y;
+    controller_.reset();
+    plant_.start(run_seed, inputs);
+    trace_.clear();
+    const Eigen::Index period = waveforms_.samples.rows();
+    rows_ = static_cast<std::size_t>(period) *
+            static_cast<std::size_t>(waveforms_.periods + waveforms_.transient_periods);
+    if (fails_at > 0) rows_ = fails_at;
+    for (std::size_t n = 0; n < rows_; ++n) {
+      controller_.update(y.data(), u.data());
+      for (std::size_t i = 0; i < u.size(); ++i)
+        u[i] +=
+            waveforms_.samples(static_cast<Eigen::Index>(n) % period, static_cast<Eigen::Index>(i));
+      trace_.insert(trace_.end(), u.begin(), u.end());
+      trace_.insert(trace_.end(), y.begin(), y.end());
+      static_cast<void>(plant_.exchange({n, u}, inputs, {}));
+    }
+    plant_.stop();
+  }
+
+  test::AnalyticStage plant_{test::RunExperimentTest::kActuators,
+                             test::RunExperimentTest::kSensors};
+  MotionController controller_{test::analytic_controller(plant_.info())};
+  Waveforms waveforms_;
+  std::vector<double> trace_;
+  std::size_t rows_ = 0;
+  std::uint64_t polled_ = 0;
+};
+
+struct RunResident : test::RunExperimentTest {
   ExperimentResult measure(const RunExperimentOptions& options = {}) {
-    SlogWriter log = SlogWriter::create(file_, experiment_log_info(plan_, stage_.info()));
-    const ExperimentResult result = run_resident_experiment(plan_, stage_, log, options);
+    SlogWriter log = create("a.slog");
+    const ExperimentResult result = run_resident_experiment(plan_, playing_, log, options);
     log.close(0, "done");
     return result;
   }
 
-  std::vector<std::uint64_t> samples_of_runs() const {
-    std::vector<std::uint64_t> samples;
+  using Runs = std::vector<std::pair<std::uint64_t, bool>>;  // samples, complete
+  Runs runs() const {
+    Runs runs;
     const SlogReader reader(file_);
-    for (const LogRun& run : reader.runs()) samples.push_back(run.samples);
-    return samples;
+    for (const LogRun& run : reader.runs()) runs.emplace_back(run.samples, run.complete);
+    return runs;
   }
 
-  bool complete(std::size_t run) const { return SlogReader(file_).runs().at(run).complete; }
-
-  test::TemporaryDirectory directory_;
   std::filesystem::path file_ = directory_ / "a.slog";
-  ExperimentPlan plan_ = test::small_plan();
-  test::PlayingStage stage_{kActuators, kSensors};
+  PlayingStage playing_;
 };
 
 TEST_F(RunResident, LeavesTheLogOfALoopOnThisSide) {
   EXPECT_EQ(measure().runs_done, 4);
-  const std::filesystem::path other = directory_ / "b.slog";
-  {
-    auto inner = std::make_unique<test::AnalyticStage>(kActuators, kSensors);
-    inner->noise = 1e-3;
-    MotionController controller(test::analytic_controller(inner->info()));
-    LimitedStage limited(std::move(inner), {});
-    SlogWriter log = SlogWriter::create(other, experiment_log_info(plan_, limited.info()));
-    EXPECT_EQ(run_experiment(plan_, limited, controller, log).runs_done, 4);
-    log.close(0, "done");
-  }
+  EXPECT_EQ(measure_into("b.slog").runs_done, 4);
   const SlogReader played(file_);
-  const SlogReader streamed(other);
+  const SlogReader streamed(directory_ / "b.slog");
   ASSERT_EQ(played.runs().size(), streamed.runs().size());
   for (std::size_t run = 0; run < 4; ++run) {
     EXPECT_TRUE(played.runs()[run].complete);
@@ -77,12 +155,12 @@ TEST_F(RunResident, LeavesTheLogOfALoopOnThisSide) {
 TEST_F(RunResident, SkipsWhatIsThere) {
   const ExperimentResult result = measure({.skip = {{0, 0}, {1, 1}}});
   EXPECT_EQ(result.runs_done, 2);
-  ASSERT_EQ(stage_.triggers.size(), 2U);
-  EXPECT_EQ(stage_.triggers[0].run_seed, run_seed(17, {0, 1}));
+  ASSERT_EQ(playing_.triggers.size(), 2U);
+  EXPECT_EQ(playing_.triggers[0].run_seed, run_seed(17, {0, 1}));
 }
 
 TEST_F(RunResident, OddOutcomesOfTheTraceAreMarked) {
-  stage_.odd_outcome = Outcome::late;
+  playing_.odd_outcome = Outcome::late;
   const ExperimentResult result = measure();
   EXPECT_EQ(result.health.late, 4U);
   EXPECT_EQ(result.health.marked, 4U);
@@ -93,76 +171,72 @@ TEST_F(RunResident, OddOutcomesOfTheTraceAreMarked) {
   EXPECT_EQ((samples.marked != 0).count(), 1);
 }
 
-TEST_F(RunResident, ALimitOfTheStageEndsItWithWhatWasRecorded) {
-  stage_.fails_at = 120;
-  stage_.failure = Outcome::limit;
-  const ExperimentResult result = measure();
-  EXPECT_EQ(result.end, ExperimentEnd::limit);
-  EXPECT_THAT(result.message, HasSubstr("the stage says no"));
-  EXPECT_THAT(samples_of_runs(), testing::ElementsAre(120U));
-  EXPECT_FALSE(complete(0));
-  EXPECT_GE(stage_.stops, 1);
-}
-
-TEST_F(RunResident, AFaultOfTheStageIsOne) {
-  stage_.fails_at = 120;
-  EXPECT_EQ(measure().end, ExperimentEnd::fault);
+TEST_F(RunResident, ALimitOrAFaultOfTheStageEndsItWithWhatWasRecorded) {
+  playing_.fails_at = 120;
+  for (const auto& [failure, end] : {std::pair(Outcome::limit, ExperimentEnd::limit),
+                                     std::pair(Outcome::fault, ExperimentEnd::fault)}) {
+    std::filesystem::remove(file_);
+    playing_.failure = failure;
+    playing_.stops = 0;
+    const ExperimentResult result = measure();
+    EXPECT_EQ(result.end, end);
+    EXPECT_THAT(result.message, HasSubstr("the stage says no"));
+    EXPECT_EQ(runs(), (Runs{{120, false}}));
+    EXPECT_GE(playing_.stops, 1);
+  }
 }
 
 TEST_F(RunResident, AnInterruptStopsTheStageAndKeepsTheRest) {
   std::atomic<bool> interrupt = false;
-  stage_.polls = 3;
-  stage_.at_poll = [&] { interrupt = stage_.triggers.size() == 2; };
+  playing_.polls = 3;
+  playing_.at_poll = [&] { interrupt = playing_.triggers.size() == 2; };
   const ExperimentResult result = measure({.interrupt = &interrupt});
   EXPECT_EQ(result.end, ExperimentEnd::interrupted);
   EXPECT_EQ(result.runs_done, 1);
-  EXPECT_TRUE(complete(0));
-  EXPECT_FALSE(complete(1));
-  EXPECT_GE(stage_.stops, 1);
+  EXPECT_TRUE(runs().at(0).second);
+  EXPECT_FALSE(runs().at(1).second);
+  EXPECT_GE(playing_.stops, 1);
 }
 
 TEST_F(RunResident, ThePlantEndsItAndSaysWhy) {
   std::atomic<bool> tripped = false;
-  stage_.polls = 3;
-  stage_.at_poll = [&] { tripped = true; };
+  playing_.polls = 3;
+  playing_.at_poll = [&] { tripped = true; };
   const ExperimentResult result =
       measure({.plant_tripped = &tripped, .plant_reason = [] { return std::string("too hot"); }});
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_EQ(result.message, "too hot");
-  EXPECT_FALSE(complete(0));
+  EXPECT_FALSE(runs().at(0).second);
 }
 
 TEST_F(RunResident, AStageLostInADownloadKeepsItsRows) {
-  stage_.loses_download = 1;
+  playing_.loses_download = 1;
   const ExperimentResult result = measure();
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_THAT(result.message, HasSubstr("the node fell silent"));
-  EXPECT_THAT(samples_of_runs(), testing::ElementsAre(kSamples, kSamples / 2));
-  EXPECT_TRUE(complete(0));
-  EXPECT_FALSE(complete(1));
+  EXPECT_EQ(runs(), (Runs{{kSamples, true}, {kSamples / 2, false}}));
 }
 
 TEST_F(RunResident, AStageLostInAnUploadLeavesTheRunsBefore) {
-  stage_.loses_upload = 2;
+  playing_.loses_upload = 2;
   const ExperimentResult result = measure();
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_EQ(result.runs_done, 2);
-  EXPECT_THAT(samples_of_runs(), testing::ElementsAre(kSamples, kSamples, 0U));
-  EXPECT_FALSE(complete(2));
+  EXPECT_EQ(runs(), (Runs{{kSamples, true}, {kSamples, true}, {0, false}}));
 }
 
 TEST_F(RunResident, ARunLongerThanTheTraceIsRefused) {
-  stage_.depth = kSamples - 1;
+  playing_.depth = kSamples - 1;
   EXPECT_THROW(measure(), std::invalid_argument);
 }
 
 TEST_F(RunResident, ALogOfAnotherPlanIsRefused) {
-  SlogWriter log = SlogWriter::create(file_, experiment_log_info(plan_, stage_.info()));
+  SlogWriter log = create("a.slog");
   ExperimentSpec spec = plan_.spec();
   spec.periods = 3;
   spec.transient_periods = 0;
   const ExperimentPlan another{plan_.grid(), spec};
-  EXPECT_THROW(run_resident_experiment(another, stage_, log, {}), std::invalid_argument);
+  EXPECT_THROW(run_resident_experiment(another, playing_, log, {}), std::invalid_argument);
 }
 
 }  // namespace stageid::test_run_resident
