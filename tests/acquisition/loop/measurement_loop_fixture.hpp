@@ -37,6 +37,12 @@ struct MeasurementLoopTest : ::testing::Test {
     excitation_.samples = kSamples;
   }
 
+  /// Every `every`-th exchange of [from, to) does this instead of `ok`.
+  void script(std::uint64_t from, std::uint64_t to, Outcome outcome, std::uint64_t every = 1) {
+    stage_.outcomes.clear();
+    for (std::uint64_t n = from; n < to; n += every) stage_.outcomes[n] = outcome;
+  }
+
   MeasurementLoop make_loop(const LoopOptions& options = {.ramp_s = 0.01}) {
     return MeasurementLoop(stage_, controller_, ring_, options);
   }
