@@ -90,8 +90,7 @@ inline void take_motion(const WatchedStage& watch, const SimulatedSpec& spec, St
 
 /// The host's loop around a stage. `disturb` is called in cycle kFaultCycle; false: the host is dead.
 template <typename Disturb>
-Stopped stream(std::unique_ptr<CyclicStage> link, const SimulatedSpec& spec, Disturb disturb) {
-  LimitedStage stage(std::move(link), spec.limits);
+Stopped stream(LimitedStage& stage, const SimulatedSpec& spec, Disturb disturb) {
   MotionController controller(spec.controller);
   SampleRing ring(3, 1U << 15);
   MeasurementLoop loop(stage, controller, ring, {.ramp_s = kStopRamp_s});
@@ -127,22 +126,8 @@ inline Stopped stop_in_process(const SimulatedSpec& spec, bool as_plugin) {
                    {{"stage", std::to_string(reinterpret_cast<std::uintptr_t>(owner.get()))}}},
         0.0);
   }
-  // The watched stage must outlive the loop.
-  Stopped result;
-  {
-    struct Borrowed final : CyclicStage {
-      explicit Borrowed(CyclicStage& stage) : inner(stage) {}
-      const StageInfo& info() const noexcept override { return inner.info(); }
-      void start(std::uint64_t seed, Inputs& first) override { inner.start(seed, first); }
-      Outcome exchange(const Outputs& u, Inputs& y, Deadline d) noexcept override {
-        return inner.exchange(u, y, d);
-      }
-      void stop() noexcept override { inner.stop(); }
-      std::string trouble() const override { return inner.trouble(); }
-      CyclicStage& inner;
-    };
-    result = stream(std::make_unique<Borrowed>(*link), spec, [] { return true; });
-  }
+  LimitedStage stage(std::move(link), spec.limits);
+  Stopped result = stream(stage, spec, [] { return true; });
   take_motion(watch, spec, result);
   return result;
 }
@@ -259,12 +244,16 @@ class ZeroMqStopRig {
 
 inline Stopped stop_over_can(const SimulatedSpec& spec, LinkEvent event) {
   CanStopRig rig(spec, 0.0);
-  Stopped result =
-      stream(std::make_unique<CanStage>(spec.info, rig.can(), rig.host_bus(), CanHostOptions{}),
-             spec, [&] {
-               if (event != LinkEvent::none) rig.cut();
-               return event != LinkEvent::host_killed;
-             });
+  Stopped result;
+  {
+    LimitedStage stage(
+        std::make_unique<CanStage>(spec.info, rig.can(), rig.host_bus(), CanHostOptions{}),
+        spec.limits);
+    result = stream(stage, spec, [&] {
+      if (event != LinkEvent::none) rig.cut();
+      return event != LinkEvent::host_killed;
+    });
+  }
   take_motion(rig.at_rest(), spec, result);
   return result;
 }
@@ -322,8 +311,11 @@ inline Stopped stop_over_modbus(const SimulatedSpec& spec, LinkEvent event) {
   Stopped result;
   {
     ServerThread server(registers, &script);
-    result = stream(std::make_unique<ModbusStage>(spec.info, server.address(), kTiming), spec,
-                    [&] { return event != LinkEvent::host_killed; });
+    {
+      LimitedStage stage(std::make_unique<ModbusStage>(spec.info, server.address(), kTiming),
+                         spec.limits);
+      result = stream(stage, spec, [&] { return event != LinkEvent::host_killed; });
+    }
     for (int i = 0; i < kRest_ms; ++i) {
       const NodeState state = node.state();
       if (state == NodeState::fault || state == NodeState::switch_on_disabled) break;

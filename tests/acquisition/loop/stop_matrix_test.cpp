@@ -4,18 +4,74 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "tests/acquisition/loop/stop_links.hpp"
-#include "tests/acquisition/loop/stop_table.hpp"
+#include "tests/hal/stage_bench.hpp"
+#include "tests/support/process/docs_table.hpp"
 
 namespace stageid::test_stop_matrix {
 
 using Kind = SimulationSpec::Fault::Kind;
 using testing::HasSubstr;
 using namespace test;
+
+// The tables of docs/stops.md, whose cells are results of tests. With the environment variable STAGEID_STOP_TABLE, the
+// tests write their cells instead of comparing them.
+
+/// A value with a unit is measured and may differ by 5 % or two units; a count or a word may not.
+bool same_value(const std::string& a, const std::string& b) {
+  if (a == b) return true;
+  std::array<std::string, 2> units;
+  std::array<double, 2> values{};
+  std::istringstream(a) >> values[0] >> units[0];
+  std::istringstream(b) >> values[1] >> units[1];
+  return !units[0].empty() && units[0] == units[1] &&
+         std::abs(values[0] - values[1]) <= 2.0 + 0.05 * std::abs(values[0]);
+}
+
+/// Compares `found` ("176 um, 650 N, 24 ms, 4, 134") with the cell of this row and column.
+void expect_in_docs(const std::string& row, const std::string& column, const std::string& found) {
+  const std::string file = STAGEID_SOURCE_DIR "/docs/stops.md";
+  std::ifstream in(file);
+  std::vector<std::string> lines = split(std::string(std::istreambuf_iterator<char>(in), {}), "\n");
+  const auto head = std::find_if(lines.begin(), lines.end(), [&](const std::string& line) {
+    return line.starts_with("| fault |") && line.find("| " + column + " |") != std::string::npos;
+  });
+  const auto line = std::find_if(head, lines.end(), [&](const std::string& text) {
+    return text.starts_with("| " + row + " |");
+  });
+  ASSERT_NE(line, lines.end()) << "docs/stops.md has no row '" << row << "' or column '" << column
+                               << "'";
+  const auto columns = split(*head, " | ");
+  auto cells = split(*line, " | ");
+  ASSERT_EQ(cells.size(), columns.size()) << *line;
+  std::size_t at = 0;
+  while (columns[at] != column && columns[at] != column + " |") ++at;
+  std::string& cell = cells[at];
+  const std::string end = at + 1 == cells.size() ? " |" : "";
+  if (std::getenv("STAGEID_STOP_TABLE") != nullptr) {
+    cell = found + end;
+    *line = cells[0];
+    for (std::size_t i = 1; i < cells.size(); ++i) *line += " | " + cells[i];
+    std::ofstream out(file);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      out << lines[i] << (i + 1 < lines.size() ? "\n" : "");
+    return;
+  }
+  const auto told = split(cell.substr(0, cell.size() - end.size()), ", ");
+  const auto now = split(found, ", ");
+  EXPECT_TRUE(std::equal(told.begin(), told.end(), now.begin(), now.end(), same_value))
+      << "docs/stops.md, '" << row << "', '" << column << "': " << cell << ", but found " << found
+      << "; STAGEID_STOP_TABLE=1 writes it";
+}
 
 struct Case {
   const char* name;
@@ -127,15 +183,9 @@ const auto kLinkEvents =
                     Case{"host killed", Kind::none, 0.0, 1.0, "", 2.0 * kStopWindow, 2e-3,
                          StopReason::none, LinkEvent::host_killed});
 
-/// `text` as the name of a test.
-std::string letters_of(std::string text) {
-  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_'; });
-  return text;
-}
-
 std::string name_of(const testing::TestParamInfo<StopMatrix::ParamType>& at) {
   const auto& [link, c] = at.param;
-  return letters_of(fmt::format("{}_{}", to_string(link), c.name));
+  return test_name(fmt::format("{}_{}", to_string(link), c.name));
 }
 
 enum class Strategy : std::uint8_t { ramp, cut, brake };
@@ -170,7 +220,7 @@ TEST_P(StopStrategies, TheBrakeIsTheOnlyOneThatStopsEverything) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, StopStrategies, kFaults,
-                         [](const auto& at) { return letters_of(at.param.name); });
+                         [](const auto& at) { return test_name(at.param.name); });
 INSTANTIATE_TEST_SUITE_P(Faults, StopMatrix,
                          testing::Combine(testing::Values(StopLink::sim, StopLink::plugin,
                                                           StopLink::can, StopLink::resident,
