@@ -56,74 +56,63 @@ inline std::vector<NamedFault> faults_to_plant(std::uint64_t seed, const MemoryL
     return most;
   };
   std::vector<NamedFault> faults;
-  const auto plant = [&](const char* name, bool in_recording, const PlantedFault& fault,
-                         Cause cause) {
-    faults.push_back(
-        {name, in_recording, fault, false, cause, channel_text(fault, clean.log_info)});
+  const auto plant_at = [&](const std::string& name, const PlantedFault& fault, Cause cause,
+                            const std::string& channel) {
+    faults.push_back({name, name.starts_with("recorded"), fault, false, cause, channel});
+  };
+  const auto plant = [&](const char* name, const PlantedFault& fault, Cause cause) {
+    plant_at(name, fault, cause, channel_text(fault, clean.log_info));
   };
   faults.push_back({"clean", true, {}, true, Cause::dead, ""});
   const int s = sensor();
   const int a = actuator();
-  plant("recorded: sensors swapped", true, {Kind::recorded_swap, true, s, other(s, kZSensors)},
+  plant("recorded: sensors swapped", {Kind::recorded_swap, true, s, other(s, kZSensors)},
         Cause::swapped);
-  plant("recorded: actuators swapped", true, {Kind::recorded_swap, false, a, other(a, kZActuators)},
+  plant("recorded: actuators swapped", {Kind::recorded_swap, false, a, other(a, kZActuators)},
         Cause::swapped);
-  plant("recorded: sensor's sign", true, {Kind::recorded_gain, true, sensor(), 0, -1.0},
+  plant("recorded: sensor's sign", {Kind::recorded_gain, true, sensor(), 0, -1.0}, Cause::sign);
+  plant("recorded: actuator's sign", {Kind::recorded_gain, false, actuator(), 0, -1.0},
         Cause::sign);
-  plant("recorded: actuator's sign", true, {Kind::recorded_gain, false, actuator(), 0, -1.0},
-        Cause::sign);
-  plant("recorded: sensor x 1000", true, {Kind::recorded_gain, true, sensor(), 0, 1000.0},
+  plant("recorded: sensor x 1000", {Kind::recorded_gain, true, sensor(), 0, 1000.0}, Cause::scale);
+  plant("recorded: actuator x 1000", {Kind::recorded_gain, false, actuator(), 0, 1000.0},
         Cause::scale);
-  plant("recorded: actuator x 1000", true, {Kind::recorded_gain, false, actuator(), 0, 1000.0},
-        Cause::scale);
-  plant("recorded: sensor / 1000", true, {Kind::recorded_gain, true, sensor(), 0, 1e-3},
-        Cause::scale);
-  plant("recorded: sensor 10 us late", true, {Kind::recorded_skew, true, sensor(), 0, 10e-6},
+  plant("recorded: sensor / 1000", {Kind::recorded_gain, true, sensor(), 0, 1e-3}, Cause::scale);
+  plant("recorded: sensor 10 us late", {Kind::recorded_skew, true, sensor(), 0, 10e-6},
         Cause::skew);
-  plant("recorded: actuator 10 us late", true, {Kind::recorded_skew, false, actuator(), 0, 10e-6},
+  plant("recorded: actuator 10 us late", {Kind::recorded_skew, false, actuator(), 0, 10e-6},
         Cause::skew);
-  plant("recorded: excitation", true, {Kind::mapped_excitation, false, actuator()},
-        Cause::injection);
+  plant("recorded: excitation", {Kind::mapped_excitation, false, actuator()}, Cause::injection);
   const int clipped = sensor();
-  plant("recorded: sensor clipped", true,
+  plant("recorded: sensor clipped",
         {Kind::saturation, true, clipped, 0, 0.7 * largest(true, clipped)}, Cause::saturated);
-  plant("stage: actuators swapped", false, {Kind::wired_swap, false, a, other(a, kZActuators)},
+  plant("stage: actuators swapped", {Kind::wired_swap, false, a, other(a, kZActuators)},
         Cause::swapped);
-  plant("stage: sensors swapped", false, {Kind::wired_swap, true, s, other(s, kZSensors)},
-        Cause::swapped);
-  plant("stage: actuator's sign", false, {Kind::wired_gain, false, actuator(), 0, -1.0},
-        Cause::sign);
-  plant("stage: actuator / 1000", false, {Kind::wired_gain, false, actuator(), 0, 1e-3},
-        Cause::dead);
-  plant("stage: sensor 10 us late", false, {Kind::wired_skew, true, sensor(), 0, 10e-6},
-        Cause::skew);
-  plant("stage: actuator 10 us late", false, {Kind::wired_skew, false, actuator(), 0, 10e-6},
-        Cause::skew);
-  plant("stage: sensor dead", false, {Kind::dead_sensor, true, sensor()}, Cause::dead);
-  plant("stage: sensor stuck", false, {Kind::stuck_sensor, true, sensor()}, Cause::dead);
+  plant("stage: sensors swapped", {Kind::wired_swap, true, s, other(s, kZSensors)}, Cause::swapped);
+  plant("stage: actuator's sign", {Kind::wired_gain, false, actuator(), 0, -1.0}, Cause::sign);
+  plant("stage: actuator / 1000", {Kind::wired_gain, false, actuator(), 0, 1e-3}, Cause::dead);
+  plant("stage: sensor 10 us late", {Kind::wired_skew, true, sensor(), 0, 10e-6}, Cause::skew);
+  plant("stage: actuator 10 us late", {Kind::wired_skew, false, actuator(), 0, 10e-6}, Cause::skew);
+  plant("stage: sensor dead", {Kind::dead_sensor, true, sensor()}, Cause::dead);
+  plant("stage: sensor stuck", {Kind::stuck_sensor, true, sensor()}, Cause::dead);
   const int limited = actuator();
-  plant("stage: actuator saturated", false,
+  plant("stage: actuator saturated",
         {Kind::saturation, false, limited, 0, 0.7 * largest(false, limited)}, Cause::saturated);
-  plant("stage: in-plane axis excited", false,
+  plant("stage: in-plane axis excited",
         {Kind::hidden_excitation, false, random.integer(kZActuators, kZActuators + 3), 0, 0.2},
         Cause::unrecorded);
-  const auto plant_in_time = [&](const char* name, bool in_recording, const PlantedFault& fault,
-                                 Cause cause, const char* channel) {
-    faults.push_back({name, in_recording, fault, false, cause, channel});
-  };
   const int runs = static_cast<int>(clean.log_runs.size());
   const int period = clean.log_info.period_samples;
   const int rows = static_cast<int>(clean.log_runs.front().samples);
   for (const int lost : {1, 3})
-    plant_in_time(lost == 1 ? "recorded: a sample lost" : "recorded: three samples lost", true,
-                  {Kind::lost_samples, true, random.integer(0, runs - 1),
-                   random.integer(period + period / 10, rows - period / 10), double(lost)},
-                  Cause::lost_samples, "");
-  plant_in_time("recorded: excitation late", true,
-                {Kind::late_excitation, true, 0, 0, double(random.integer(1, 3))},
-                Cause::excitation_timing, "excitation");
-  plant_in_time("stage: a mode drifts by 0.05 %", false,
-                {Kind::drifting_mode, true, kFirstFlexibleMode, 0, 5e-4}, Cause::drift, "");
+    plant_at(lost == 1 ? "recorded: a sample lost" : "recorded: three samples lost",
+             {Kind::lost_samples, true, random.integer(0, runs - 1),
+              random.integer(period + period / 10, rows - period / 10), double(lost)},
+             Cause::lost_samples, "");
+  plant_at("recorded: excitation late",
+           {Kind::late_excitation, true, 0, 0, double(random.integer(1, 3))},
+           Cause::excitation_timing, "excitation");
+  plant_at("stage: a mode drifts by 0.05 %",
+           {Kind::drifting_mode, true, kFirstFlexibleMode, 0, 5e-4}, Cause::drift, "");
   return faults;
 }
 
