@@ -40,35 +40,31 @@ double density(ColouredNoise& noise, double hz) {
   return 2.0 * sum / kPeriodograms / (0.375 * kSamples * kRateHz);
 }
 
-double density(NoiseColour colour, double reference_hz, double hz) {
-  ColouredNoise noise(spec_of(colour, reference_hz));
-  noise.restart(7, 1);
-  return density(noise, hz);
-}
-
 // The standard deviation of a mean of 2000 periodograms is 2.2 %; the bounds are five of them.
 constexpr double kBound = 0.12;
+// |H(f0)|^2 / |H(2 f0)|^2 of a second-order system; the sampled one is close to it.
+constexpr double kResonance = (9.0 + 16.0 * 0.0025) / (4.0 * 0.0025);
 
-TEST(ColouredNoise, WhiteIsFlat) {
-  EXPECT_NEAR(density(NoiseColour::white, 50.0, 20.0) / 4.0, 1.0, kBound);
-  EXPECT_NEAR(density(NoiseColour::white, 50.0, 400.0) / 4.0, 1.0, kBound);
-}
-
-TEST(ColouredNoise, FlickerFallsWithTheFrequency) {
-  EXPECT_NEAR(density(NoiseColour::flicker, 50.0, 50.0) / 4.0, 1.0, kBound + 0.03);
-  EXPECT_NEAR(density(NoiseColour::flicker, 50.0, 10.0) / 20.0, 1.0, kBound + 0.03);
-}
-
-TEST(ColouredNoise, DriftFallsWithTheSquare) {
-  EXPECT_NEAR(density(NoiseColour::drift, 50.0, 50.0) / 4.0, 1.0, kBound);
-  EXPECT_NEAR(density(NoiseColour::drift, 50.0, 10.0) / 100.0, 1.0, kBound);
-}
-
-TEST(ColouredNoise, ResonantHasItsDensityAtTheResonance) {
-  EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 50.0) / 4.0, 1.0, kBound);
-  // |H(f0)|^2 / |H(2 f0)|^2 of a second-order system is (9 + 16 zeta^2) / (4 zeta^2); the sampled one is close to it.
-  const double ratio = (9.0 + 16.0 * 0.0025) / (4.0 * 0.0025);
-  EXPECT_NEAR(density(NoiseColour::resonant, 50.0, 100.0) * ratio / 4.0, 1.0, 0.25);
+TEST(ColouredNoise, HasTheDensityOfItsColour) {
+  struct Case {
+    NoiseColour colour;
+    double hz;
+    double density;
+    double bound;
+  };
+  for (const Case& c : {Case{NoiseColour::white, 20.0, 4.0, kBound},
+                        {NoiseColour::white, 400.0, 4.0, kBound},
+                        {NoiseColour::flicker, 50.0, 4.0, kBound + 0.03},
+                        {NoiseColour::flicker, 10.0, 20.0, kBound + 0.03},
+                        {NoiseColour::drift, 50.0, 4.0, kBound},
+                        {NoiseColour::drift, 10.0, 100.0, kBound},
+                        {NoiseColour::resonant, 50.0, 4.0, kBound},
+                        {NoiseColour::resonant, 100.0, 4.0 / kResonance, 0.25}}) {
+    ColouredNoise noise(spec_of(c.colour, 50.0));
+    noise.restart(7, 1);
+    EXPECT_NEAR(density(noise, c.hz) / c.density, 1.0, c.bound)
+        << to_string(c.colour) << " at " << c.hz << " Hz";
+  }
 }
 
 TEST(ColouredNoise, RepeatsFromItsSeed) {

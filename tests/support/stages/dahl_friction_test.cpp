@@ -4,17 +4,6 @@
 
 namespace stageid::test_dahl_friction {
 
-TEST(DahlFriction, IsASpringForSmallMotion) {
-  DahlFriction friction(2.0, 1e6);
-  EXPECT_NEAR(friction.move_to(1e-9), -1e-3, 1e-6);
-}
-
-TEST(DahlFriction, SlidesWithTheFullForceAgainstTheMotion) {
-  DahlFriction friction(2.0, 1e6);
-  EXPECT_NEAR(friction.move_to(1e-3), -2.0, 1e-12);
-  EXPECT_NEAR(friction.move_to(0.0), 2.0, 1e-12);
-}
-
 TEST(DahlFriction, HoldsItsForceAtStandstill) {
   DahlFriction friction(2.0, 1e6);
   const double force_n = friction.move_to(1e-6);
