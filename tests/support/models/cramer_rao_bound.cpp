@@ -1,9 +1,10 @@
 #include "tests/support/models/cramer_rao_bound.hpp"
 
-#include <Eigen/QR>
 #include <cmath>
 #include <functional>
+#include <utility>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
@@ -71,6 +72,11 @@ SharedFunctions shared_functions(const AdditiveModel& truth, const Eigen::Vector
   return out;
 }
 
+Eigen::MatrixXd triangular_factor(Eigen::MatrixXd m) {
+  qr_in_place(m);
+  return m.topRows(m.cols()).triangularView<Eigen::Upper>();
+}
+
 /// Triangular factor of one channel's weighted real matrix [numerators, shared unknowns].
 Eigen::MatrixXd channel_factor(const SharedFunctions& shared, const Eigen::VectorXd& B,
                                const Eigen::VectorXd& deviation) {
@@ -82,8 +88,7 @@ Eigen::MatrixXd channel_factor(const SharedFunctions& shared, const Eigen::Vecto
   J.array().colwise() /= deviation.array();
   Eigen::MatrixXd tall(2 * N, J.cols());
   tall << J.real(), J.imag();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(tall);
-  return qr.matrixQR().topRows(J.cols()).triangularView<Eigen::Upper>();
+  return triangular_factor(std::move(tall));
 }
 
 Eigen::MatrixXd upper_inverse(const Eigen::MatrixXd& R) {
@@ -110,14 +115,10 @@ CramerRaoBound cramer_rao_bound(const AdditiveModel& truth, const Eigen::VectorX
     const Eigen::VectorXd deviation = variance.row(c).transpose().cwiseSqrt();
     Eigen::MatrixXd R = channel_factor(shared, B, deviation);
     const Eigen::MatrixXd lower = R.bottomRightCorner(2 * n + 1, 2 * n + 1)(Eigen::all, unknown);
-    rest.middleRows(c * m, m) = Eigen::HouseholderQR<Eigen::MatrixXd>(lower)
-                                    .matrixQR()
-                                    .topRows(m)
-                                    .triangularView<Eigen::Upper>();
+    rest.middleRows(c * m, m) = triangular_factor(lower);
     factors.push_back(std::move(R));
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(rest);
-  const Eigen::MatrixXd root = upper_inverse(qr.matrixQR().topRows(m)) / std::sqrt(2.0);
+  const Eigen::MatrixXd root = upper_inverse(triangular_factor(std::move(rest))) / std::sqrt(2.0);
 
   CramerRaoBound bound;
   bound.frequency_std_hz.setZero(n);

@@ -1,9 +1,9 @@
 #include "tests/support/models/model_dense_step.hpp"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test {
@@ -76,7 +76,12 @@ void fill_numerator_columns(const DenseProblem& problem, const Submodel& s, Eige
 
 Eigen::MatrixXd real_product(const Eigen::MatrixXcd& left, const Eigen::VectorXd& W,
                              const Eigen::MatrixXcd& right) {
-  return (left.adjoint() * W.cast<Complex>().asDiagonal() * right).real();
+  const Eigen::MatrixXcd weighted = W.cast<Complex>().asDiagonal() * right;
+  return (left.adjoint() * weighted).real();
+}
+
+Eigen::MatrixXd solved(const Eigen::MatrixXd& M, const Eigen::MatrixXd& rhs) {
+  return solve(M.cast<Complex>(), rhs.cast<Complex>()).real();
 }
 
 }  // namespace
@@ -156,7 +161,7 @@ PaperStep paper_step(const DenseProblem& problem, Left left) {
     M += real_product(z, problem.W.col(k), phi);
     rhs += real_product(z, problem.W.col(k), upsilon);
   }
-  PaperStep step{M.fullPivLu().solve(rhs), Eigen::VectorXd(first.back())};
+  PaperStep step{solved(M, rhs), Eigen::VectorXd(first.back())};
   for (Eigen::Index i = 0; i < K; ++i) {
     const Eigen::Index begin = first[i];
     const Eigen::Index size = first[static_cast<std::size_t>(i) + 1] - begin;
@@ -174,7 +179,7 @@ Eigen::VectorXd gauss_newton_step(const DenseProblem& problem) {
     M += real_product(J, problem.W.col(k), J);
     r += real_product(J, problem.W.col(k), error_at(problem, k));
   }
-  return M.fullPivLu().solve(r);
+  return solved(M, r);
 }
 
 double first_order_condition(const DenseProblem& problem, bool common_delay) {

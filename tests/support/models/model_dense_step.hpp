@@ -6,7 +6,7 @@
 #include "estimation/model/additive_model.hpp"
 
 // The paper's estimator as printed: dense, line by line, all K right-hand sides. Only for
-// problems of a few parameters; shares nothing with the library but the structs.
+// problems of a few parameters; shares nothing with the library but the structs and a solver of linear equations.
 
 namespace stageid::test {
 
