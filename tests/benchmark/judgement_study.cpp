@@ -31,6 +31,7 @@
 
 namespace {
 
+using namespace stageid;
 using namespace stageid::test;
 using Json = nlohmann::ordered_json;
 
@@ -56,7 +57,7 @@ Arguments parse(int argc, char** argv) {
     if (i + 1 == argc) throw std::invalid_argument(word + ": a value is missing");
     const std::string value = argv[++i];
     if (word == "--trouble") {
-      const auto trouble = trouble_of(value);
+      const auto trouble = from_word<Trouble>(value);
       if (!trouble) throw std::invalid_argument("--trouble: unknown '" + value + "'");
       a.troubles.push_back(*trouble);
     } else if (word == "--jobs") {
@@ -72,7 +73,8 @@ Arguments parse(int argc, char** argv) {
     }
   }
   if (a.troubles.empty())
-    for (int i = 0; i < kTroubles; ++i) a.troubles.push_back(static_cast<Trouble>(i));
+    for (std::size_t i = 0; i < kWords<Trouble>.size(); ++i)
+      a.troubles.push_back(static_cast<Trouble>(i));
   return a;
 }
 

@@ -1,6 +1,7 @@
 #include "tests/support/judgement/judgement_case.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include "acquisition/files/json_members.hpp"
@@ -68,12 +70,6 @@ class Session {
   std::filesystem::path program_;
   double seconds_ = 0.0;
 };
-
-std::string realization_list(int last) {
-  std::string list = "1";
-  for (int m = 2; m <= last; ++m) list += fmt::format(",{}", m);
-  return list;
-}
 
 std::string last_line(const std::string& text) {
   std::size_t end = text.find_last_not_of('\n');
@@ -205,8 +201,12 @@ void run_steps(const JudgementStage& stage, const TroublePlan& plan, Session& se
   const auto path = [&](const char* name) { return (directory / name).string(); };
   convert_log(measure_with_trouble(stage, plan), directory / "log.h5");
   std::vector<std::string> words = {
-      "frf",          path("log.h5"),   "-o",
-      path("frf.h5"), "--realizations", realization_list(stage.realizations - 1)};
+      "frf",
+      path("log.h5"),
+      "-o",
+      path("frf.h5"),
+      "--realizations",
+      fmt::format("{}", fmt::join(std::views::iota(1, stage.realizations), ","))};
   if (stage.stage_file) {
     write_bytes(directory / "stage.yaml", stage.nominal_text());
     words.insert(words.end(), {"--stage", path("stage.yaml")});

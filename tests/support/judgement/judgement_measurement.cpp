@@ -1,10 +1,10 @@
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
 #include "acquisition/loop/run_experiment.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/noise.hpp"
@@ -161,16 +161,8 @@ void spoil(const TroublePlan& plan, int run, Eigen::Index transient, MemoryLog& 
   LogSamples& record = log.records.back();
   const Eigen::Index samples = record.sensors.rows() - kSpareSamples;
   if (plan.late >= 0) {
-    PlantedFault fault;
-    fault.kind = PlantedFault::Kind::recorded_skew;
-    fault.of_sensor = plan.late_sensor;
-    fault.a = plan.late;
-    fault.value = plan.late_samples / log.log_info.sample_rate_hz;
-    MemoryLog one;
-    one.log_info = log.log_info;
-    one.records.push_back(std::move(record));
-    spoil_recording(fault, one);
-    record = std::move(one.records.front());
+    Eigen::MatrixXd& x = plan.late_sensor ? record.sensors : record.actuators;
+    x.col(plan.late) = delayed(x.col(plan.late), plan.late_samples);
   }
   if (run == plan.lost_run)
     lose_sample(record, transient + static_cast<Eigen::Index>(
@@ -260,11 +252,11 @@ Eigen::MatrixXcd best_linear_approximation(const JudgementStage& stage, const Tr
       take(r.col(j), R, j, e);
     }
     if (e + 1 < E) continue;  // a realization is complete
-    for (std::size_t k = 0; k < lines.size(); ++k) sum[k] += Z[k] * R[k].inverse();
+    for (std::size_t k = 0; k < lines.size(); ++k) sum[k] += Z[k] * inverse(R[k]);
   }
   Eigen::MatrixXcd G(n_y * n_u, static_cast<Eigen::Index>(lines.size()));
   for (std::size_t k = 0; k < lines.size(); ++k)
-    G.col(k) = (sum[k].topRows(n_y) * sum[k].bottomRows(n_u).inverse()).reshaped();
+    G.col(k) = (sum[k].topRows(n_y) * inverse(sum[k].bottomRows(n_u))).reshaped();
   return G;
 }
 

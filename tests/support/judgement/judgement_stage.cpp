@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "hal/simulator/modal_plant.hpp"
 #include "hal/simulator/rigid_body.hpp"
 #include "tests/support/process/random_numbers.hpp"
@@ -254,7 +254,7 @@ double heave_motion(const JudgementStage& stage) {
     const Eigen::MatrixXcd g =
         sampled_response(modes, spec.info.delay_s, spec.info.sample_rate_hz, hz);
     const Eigen::MatrixXcd u =
-        (Eigen::MatrixXcd::Identity(axes, axes) - loop.response(hz) * g).inverse();
+        inverse(Eigen::MatrixXcd::Identity(axes, axes) - loop.response(hz) * g);
     const double omega = 2.0 * kPi * hz;
     power += (modes[kHeave].actuator_shape.transpose() * u).squaredNorm() /
              (spec.plant.mass_kg * std::pow(omega, 4));

@@ -1,6 +1,5 @@
 #include "tests/support/judgement/judgement_trouble.hpp"
 
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -8,12 +7,6 @@
 
 namespace stageid::test {
 namespace {
-
-constexpr std::array<const char*, kTroubles> kNames = {
-    "clean",           "dac_step",       "adc_step",    "cubic",
-    "friction",        "slow_noise",     "mode_drift",  "lost_sample",
-    "late_channel",    "unexcited_axis", "unsettled",   "late_reference",
-    "setpoint_motion", "wrong_map",      "changed_run", "saturation"};
 
 /// The force on the heave that goes with its motion at the crossover: what keeps the loop stable.
 double loop_force(const JudgementStage& stage) {
@@ -67,16 +60,6 @@ void draw_wrong_map(RandomNumbers& random, JudgementStage& stage, TroublePlan& p
 }
 
 }  // namespace
-
-const char* to_string(Trouble trouble) noexcept {
-  return kNames[static_cast<std::size_t>(trouble)];
-}
-
-std::optional<Trouble> trouble_of(const std::string& name) noexcept {
-  for (int i = 0; i < kTroubles; ++i)
-    if (name == kNames[i]) return static_cast<Trouble>(i);
-  return std::nullopt;
-}
 
 TroublePlan draw_trouble(Trouble trouble, JudgementStage& stage) {
   RandomNumbers random(stage.seed * 0x9e37ULL + 101 * static_cast<std::uint64_t>(trouble) + 3);

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "excitation/words/words.hpp"
 #include "tests/support/judgement/judgement_stage.hpp"
 #include "tests/support/logs/memory_log.hpp"
 #include "tests/support/stages/dahl_friction.hpp"
@@ -30,9 +31,18 @@ enum class Trouble : std::uint8_t {
   changed_run,  ///< the stage differs in one run, or from one run on
   saturation    ///< the amplifiers limit the force below the recorded commands
 };
-inline constexpr int kTroubles = 16;
-const char* to_string(Trouble trouble) noexcept;
-std::optional<Trouble> trouble_of(const std::string& name) noexcept;
+}  // namespace stageid::test
+
+namespace stageid {
+template <>
+inline constexpr std::array kWords<test::Trouble> = {
+    "clean",           "dac_step",       "adc_step",    "cubic",
+    "friction",        "slow_noise",     "mode_drift",  "lost_sample",
+    "late_channel",    "unexcited_axis", "unsettled",   "late_reference",
+    "setpoint_motion", "wrong_map",      "changed_run", "saturation"};
+}
+
+namespace stageid::test {
 
 /// The trouble planted in one measurement; drawn by draw_trouble().
 struct TroublePlan {

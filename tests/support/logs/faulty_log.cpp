@@ -29,22 +29,6 @@ using Kind = PlantedFault::Kind;
 constexpr int kTaps = 32;               // a side, of the fractional delay
 constexpr Eigen::Index kRetuned = 200;  // samples between changes of a mode that drifts
 
-/// x(t - delay), by a windowed sinc; delay in samples, less than one.
-Eigen::VectorXd delayed(const Eigen::VectorXd& x, double delay) {
-  Eigen::VectorXd taps(2 * kTaps + 1);
-  for (int i = -kTaps; i <= kTaps; ++i) {
-    const double t = i - delay;
-    const double angle = std::numbers::pi * t;
-    const double window = 0.5 + 0.5 * std::cos(angle / (kTaps + 1.0));
-    taps[i + kTaps] = window * (std::abs(t) < 1e-12 ? 1.0 : std::sin(angle) / angle);
-  }
-  Eigen::VectorXd y = Eigen::VectorXd::Zero(x.size());
-  for (Eigen::Index n = 0; n < x.size(); ++n)
-    for (int i = -kTaps; i <= kTaps; ++i)
-      if (n - i >= 0 && n - i < x.size()) y[n] += taps[i + kTaps] * x[n - i];
-  return y;
-}
-
 /// One run of the loop.
 class Loop {
  public:
@@ -215,6 +199,21 @@ MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFaul
       log.append(m, axis, std::move(r), std::move(record));
     }
   return log;
+}
+
+Eigen::VectorXd delayed(const Eigen::VectorXd& x, double delay) {
+  Eigen::VectorXd taps(2 * kTaps + 1);
+  for (int i = -kTaps; i <= kTaps; ++i) {
+    const double t = i - delay;
+    const double angle = std::numbers::pi * t;
+    const double window = 0.5 + 0.5 * std::cos(angle / (kTaps + 1.0));
+    taps[i + kTaps] = window * (std::abs(t) < 1e-12 ? 1.0 : std::sin(angle) / angle);
+  }
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(x.size());
+  for (Eigen::Index n = 0; n < x.size(); ++n)
+    for (int i = -kTaps; i <= kTaps; ++i)
+      if (n - i >= 0 && n - i < x.size()) y[n] += taps[i + kTaps] * x[n - i];
+  return y;
 }
 
 void lose_samples(const PlantedFault& fault, Eigen::Index period, Eigen::MatrixXd& x) {

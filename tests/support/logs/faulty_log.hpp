@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -58,6 +59,9 @@ SimulatedSpec random_wafer_stage(std::uint64_t seed, const SimulatedSpec& nomina
 
 /// @returns a log without runs if the loop did not stay in its sensors' windows: no measurement then.
 MemoryLog simulate_faulty_log(const FaultyLogRequest& request, const PlantedFault& fault);
+
+/// x(t - delay), by a windowed sinc; delay in samples.
+Eigen::VectorXd delayed(const Eigen::VectorXd& x, double delay);
 
 /// Spoils the recorded signals of a good log: recorded_swap, recorded_gain, recorded_skew, lost_samples (the last rows
 /// are those of the period before), late_excitation, and saturation
