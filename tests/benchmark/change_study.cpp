@@ -22,12 +22,10 @@
 
 namespace {
 
-using Fault = stageid::SimulationSpec::Fault;
-using stageid::AdditiveModel;
-using stageid::ModelTracker;
-using stageid::TrackedKind;
-using stageid::TrackedParameter;
-using stageid::test::JudgementStage;
+using namespace stageid;
+using namespace stageid::test;
+
+using Fault = SimulationSpec::Fault;
 
 constexpr int kLearning = 32;
 constexpr int kBefore = 8;  // watched periods before the change
@@ -36,20 +34,20 @@ constexpr double kFalseAlarms = 1e-6;  // per period
 
 /// The plant itself, mode by mode.
 AdditiveModel exact_model(const JudgementStage& stage) {
-  const stageid::StageInfo& info = stage.spec.info;
+  const StageInfo& info = stage.spec.info;
   AdditiveModel model;
   for (const auto& [channels, list] :
        {std::pair{&info.actuators, &model.inputs}, {&info.sensors, &model.outputs}})
-    for (const stageid::Channel& channel : *channels) {
+    for (const Channel& channel : *channels) {
       list->names.push_back(channel.name);
       list->units.push_back(channel.unit);
     }
   model.sample_rate_hz = info.sample_rate_hz;
-  model.hold = stageid::HoldModel::exact;
+  model.hold = HoldModel::exact;
   model.output_delay_s = Eigen::VectorXd::Constant(model.n_outputs(), info.delay_s);
-  for (const stageid::PlantMode& mode : stageid::plant_modes(info, stage.spec.plant)) {
+  for (const PlantMode& mode : plant_modes(info, stage.spec.plant)) {
     const double omega = 2.0 * M_PI * mode.natural_frequency_hz;
-    stageid::Submodel submodel;
+    Submodel submodel;
     submodel.denominator = {1.0, 2.0 * mode.damping_ratio / omega, 1.0 / (omega * omega)};
     submodel.numerator = {mode.sensor_shape * mode.actuator_shape.transpose() / (omega * omega)};
     if (submodel.numerator[0].squaredNorm() > 0.0) model.submodels.push_back(submodel);
@@ -59,30 +57,30 @@ AdditiveModel exact_model(const JudgementStage& stage) {
 
 struct Bench {
   explicit Bench(std::uint64_t seed)
-      : stage(stageid::test::draw_judgement_stage(seed)), model(exact_model(stage)) {
+      : stage(draw_judgement_stage(seed)), model(exact_model(stage)) {
     const double spacing_hz = stage.spec.info.sample_rate_hz / stage.period_samples;
     const int first = static_cast<int>(std::ceil(stage.band_low_hz / spacing_hz));
     const int last = static_cast<int>(std::floor(stage.band_high_hz / spacing_hz));
     const int step = std::max(1, (last - first) / 500);
     for (int l = std::max(1, first); l <= last; l += step) lines.push_back(l);
-    const stageid::FrequencyGrid grid(stage.spec.info.sample_rate_hz, stage.period_samples, lines);
+    const FrequencyGrid grid(stage.spec.info.sample_rate_hz, stage.period_samples, lines);
     frequency_hz = grid.frequency_hz();
     excitation.setZero(stage.period_samples, model.n_inputs());
     for (Eigen::Index j = 0; j < excitation.cols(); ++j) {
-      stageid::MultisineSpec spec;
+      MultisineSpec spec;
       spec.level = stage.level_n;
       spec.seed = seed * 100 + static_cast<std::uint64_t>(j);
-      excitation.col(j) = stageid::random_phase_multisine(grid, spec).samples;
+      excitation.col(j) = random_phase_multisine(grid, spec).samples;
     }
   }
-  stageid::test::ExcitedLoop loop(const std::vector<Fault>& faults) const {
-    stageid::test::SimulatedSpec spec = stage.spec;
+  ExcitedLoop loop(const std::vector<Fault>& faults) const {
+    SimulatedSpec spec = stage.spec;
     spec.simulation.faults = faults;
     spec.simulation.seed += 7;
     return {spec, excitation, lines, model.inputs.names, model.outputs.names, stage.seed};
   }
   ModelTracker tracker() const {
-    stageid::TrackerOptions options;
+    TrackerOptions options;
     options.learning_periods = kLearning;
     options.false_alarms_per_period = kFalseAlarms;
     return {model, frequency_hz, options};
@@ -127,13 +125,13 @@ struct Planted {
 };
 
 Planted plant(const Bench& bench, const Kind& kind, const ModelTracker& tracker, double deviations,
-              stageid::test::RandomNumbers& random) {
+              RandomNumbers& random) {
   const Eigen::VectorXd deviation =
       tracker.covariance().diagonal().cwiseSqrt() * std::sqrt(kLearning / 4.0);
   // A mode that the data determine: a small change of it is below half of the value.
   std::vector<std::size_t> candidates;
   for (std::size_t p = 0; p < tracker.parameters().size(); ++p) {
-    const double small = deviations * deviation[static_cast<Eigen::Index>(p)];
+    const double small = deviations * deviation[p];
     const bool of_mode = kind.place == TrackedKind::frequency || kind.place == TrackedKind::damping;
     const double most = !of_mode ? 0.3 : kind.place == TrackedKind::frequency ? 0.01 : 0.3;
     if (tracker.parameters()[p].kind == kind.place && small < most) candidates.push_back(p);
@@ -144,7 +142,7 @@ Planted plant(const Bench& bench, const Kind& kind, const ModelTracker& tracker,
   const TrackedParameter& parameter = tracker.parameters()[p];
   const double sign = random.integer(0, 1) == 0 ? 1.0 : -1.0;
   double size = kind.size;
-  if (size == 0.0) size = deviations * deviation[static_cast<Eigen::Index>(p)];
+  if (size == 0.0) size = deviations * deviation[p];
   if (size < 0.3 && kind.fault != Fault::Kind::extra_delay) size *= sign;
   Planted planted;
   planted.fault.kind = kind.fault;
@@ -156,14 +154,10 @@ Planted plant(const Bench& bench, const Kind& kind, const ModelTracker& tracker,
   planted.fault.value = factor ? 1.0 + size : size;
   planted.fault.channel = static_cast<int>(parameter.index);
   planted.name = describe(parameter, bench.model);
-  if (kind.place == TrackedKind::frequency || kind.place == TrackedKind::damping) {
-    const auto modes = stageid::plant_modes(bench.stage.spec.info, bench.stage.spec.plant);
-    const double hz =
-        bench.model.submodels[static_cast<std::size_t>(parameter.index)].natural_frequency_hz();
-    for (std::size_t m = 0; m < modes.size(); ++m)
-      if (std::abs(modes[m].natural_frequency_hz - hz) < 1e-9 * hz)
-        planted.fault.channel = static_cast<int>(m);
-  }
+  if (kind.place == TrackedKind::frequency || kind.place == TrackedKind::damping)
+    planted.fault.channel =
+        nearest_mode(bench.stage.spec.info, bench.stage.spec.plant,
+                     bench.model.submodels[parameter.index].natural_frequency_hz());
   if (kind.place == TrackedKind::delay) planted.fault.channel = 0;
   if (kind.fault == Fault::Kind::sensor_noise)
     planted.name = "noise of sensor '" + bench.model.outputs.name(parameter.index) + "'";
@@ -181,8 +175,7 @@ struct Count {
 };
 
 void study(const Bench& bench, const Kind& kind, double deviations, Count& count) {
-  stageid::test::RandomNumbers random(bench.stage.seed * 31 +
-                                      static_cast<std::uint64_t>(kind.name[0]));
+  RandomNumbers random(bench.stage.seed * 31 + static_cast<std::uint64_t>(kind.name[0]));
   // The deviations come from a stage without change; the stage that changes is the same until then.
   ModelTracker learned = bench.tracker();
   auto quiet = bench.loop({});
@@ -195,7 +188,7 @@ void study(const Bench& bench, const Kind& kind, double deviations, Count& count
   loop.next();
   ++count.planted;
   for (int t = 0; t < kLearning + kBefore + kAfter; ++t) {
-    const stageid::TrackedPeriod state = tracker.add(loop.next());
+    const TrackedPeriod state = tracker.add(loop.next());
     if (!state.change) continue;
     const std::string name = describe(state.change->what, tracker.parameters(), bench.model);
     if (t < kLearning + kBefore) {

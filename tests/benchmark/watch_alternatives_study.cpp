@@ -31,10 +31,8 @@
 
 namespace {
 
-using stageid::AdditiveModel;
-using stageid::ExperimentConfig;
-using stageid::PeriodSpectra;
-using stageid::TrackedKind;
+using namespace stageid;
+using namespace stageid::test;
 
 constexpr int kLearning = 32;
 constexpr int kQuiet = 400;  // watched periods of a quiet run, and of one with a step after it
@@ -57,9 +55,9 @@ class Bench {
  public:
   Bench(const ExperimentConfig& config, AdditiveModel model)
       : config_(config), model_(std::move(model)) {
-    frequency_hz_ = stageid::make_plan(config).grid().frequency_hz();
-    for (const auto& p : stageid::tracked_parameters(
-             model_, {frequency_hz_[0], frequency_hz_[frequency_hz_.size() - 1]}))
+    frequency_hz_ = make_plan(config).grid().frequency_hz();
+    for (const auto& p :
+         tracked_parameters(model_, {frequency_hz_[0], frequency_hz_[frequency_hz_.size() - 1]}))
       if (p.kind == TrackedKind::frequency) modes_.push_back(p);
     choose_channels();
   }
@@ -71,16 +69,16 @@ class Bench {
 
   /// One if the tracker has named a change.
   Trace watch(const ExperimentConfig& config, const Case& of) const {
-    const stageid::ExperimentPlan plan = stageid::make_plan(config);
-    stageid::TrackerOptions options;
+    const ExperimentPlan plan = make_plan(config);
+    TrackerOptions options;
     options.learning_periods = kLearning;
     options.false_alarms_per_period = kFalseAlarms;
-    stageid::ModelTracker tracker(model_, plan.grid().frequency_hz(), options);
+    ModelTracker tracker(model_, plan.grid().frequency_hz(), options);
     auto loop = make_loop(plan, of);
     loop.next();
     Trace trace;
     for (int p = 0; p < of.periods; ++p) {
-      const stageid::TrackedPeriod state = tracker.add(loop.next());
+      const TrackedPeriod state = tracker.add(loop.next());
       trace.push_back(Eigen::VectorXd::Constant(1, state.change ? 1.0 : 0.0));
     }
     return trace;
@@ -89,8 +87,8 @@ class Bench {
   /// Natural frequencies of a fit to every block of experiments.
   Trace refit(int measured, const Case& of) const {
     ExperimentConfig config = config_;
-    config.experiment.scheme = stageid::ExcitationScheme::orthogonal_dft;
-    const stageid::ExperimentPlan plan = stageid::make_plan(config);
+    config.experiment.scheme = ExcitationScheme::orthogonal_dft;
+    const ExperimentPlan plan = make_plan(config);
     auto loop = make_loop(plan, of);
     loop.next();
     const int block = plan.experiments() * (1 + measured);
@@ -101,9 +99,8 @@ class Bench {
       if (p % (1 + measured) == 0) loop.excite(samples(plan, experiment));
       const PeriodSpectra period = loop.next();
       if (p % (1 + measured) > 0) {
-        Z[static_cast<std::size_t>(experiment)].emplace_back(model_.n_outputs() + model_.n_inputs(),
-                                                             period.Y.cols());
-        Z[static_cast<std::size_t>(experiment)].back() << period.Y, period.U;
+        Z[experiment].emplace_back(model_.n_outputs() + model_.n_inputs(), period.Y.cols());
+        Z[experiment].back() << period.Y, period.U;
       }
       trace.emplace_back();
       if (p % block + 1 < block) continue;
@@ -117,10 +114,10 @@ class Bench {
   Trace siso(double memory, const Case& of) const {
     ExperimentConfig config = config_;
     auto& axes = config.experiment.axes;
-    std::erase_if(axes, [&](const stageid::ExcitationAxis& axis) {
+    std::erase_if(axes, [&](const ExcitationAxis& axis) {
       return axis.channel != model_.inputs.name(input_);
     });
-    const stageid::ExperimentPlan plan = stageid::make_plan(config);
+    const ExperimentPlan plan = make_plan(config);
     auto loop = make_loop(plan, of);
     loop.next();
     std::vector<Eigen::RowVectorXcd> learned;
@@ -147,7 +144,7 @@ class Bench {
       }
       information = kept * information + 1.0;
       for (Eigen::Index m = 0; m < modes(); ++m) {
-        const Eigen::RowVectorXcd& d = sensitivity_[static_cast<std::size_t>(m)];
+        const Eigen::RowVectorXcd& d = sensitivity_[m];
         const double now =
             (weight.array() * (d.conjugate().array() * (G - mean).array()).real()).sum() /
             (weight.array() * d.array().abs2()).sum();
@@ -159,20 +156,18 @@ class Bench {
   }
 
  private:
-  Eigen::MatrixXd samples(const stageid::ExperimentPlan& plan, int experiment) const {
+  Eigen::MatrixXd samples(const ExperimentPlan& plan, int experiment) const {
     const auto& actuators = config_.stage.spec.info.actuators;
     const Eigen::MatrixXd of_axes = plan.excitation({0, experiment});
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(of_axes.rows(), std::ssize(actuators));
     for (Eigen::Index a = 0; a < of_axes.cols(); ++a)
-      out.col(stageid::channel_index(
-          actuators, plan.spec().axes[static_cast<std::size_t>(a)].channel)) = of_axes.col(a);
+      out.col(channel_index(actuators, plan.spec().axes[a].channel)) = of_axes.col(a);
     return out;
   }
 
-  stageid::test::ExcitedLoop make_loop(const stageid::ExperimentPlan& plan, const Case& of) const {
-    using Fault = stageid::SimulationSpec::Fault;
-    stageid::test::SimulatedSpec spec{config_.stage.spec, *config_.stage.plant,
-                                      config_.stage.simulation};
+  ExcitedLoop make_loop(const ExperimentPlan& plan, const Case& of) const {
+    using Fault = SimulationSpec::Fault;
+    SimulatedSpec spec{config_.stage.spec, *config_.stage.plant, config_.stage.simulation};
     spec.simulation.seed = of.seed;
     if (of.step != 0.0) {
       Fault fault;
@@ -181,12 +176,7 @@ class Bench {
       // One period precedes the first.
       fault.from_cycle = static_cast<std::uint64_t>(of.period + 1) *
                          static_cast<std::uint64_t>(plan.grid().samples_per_period());
-      const auto modes = stageid::plant_modes(spec.info, spec.plant);
-      const double hz = submodel(of.mode).natural_frequency_hz();
-      const auto nearest = std::min_element(modes.begin(), modes.end(), [&](auto& a, auto& b) {
-        return std::abs(a.natural_frequency_hz - hz) < std::abs(b.natural_frequency_hz - hz);
-      });
-      fault.channel = static_cast<int>(nearest - modes.begin());
+      fault.channel = nearest_mode(spec.info, spec.plant, submodel(of.mode).natural_frequency_hz());
       spec.simulation.faults.push_back(fault);
     }
     return {
@@ -194,18 +184,16 @@ class Bench {
         of.seed};
   }
 
-  const stageid::Submodel& submodel(int mode) const {
-    return model_.submodels[static_cast<std::size_t>(modes_[static_cast<std::size_t>(mode)].index)];
-  }
+  const Submodel& submodel(int mode) const { return model_.submodels[modes_[mode].index]; }
 
   Eigen::VectorXd fitted(const std::vector<std::vector<Eigen::MatrixXcd>>& Z) const {
     const Eigen::Index n_y = model_.n_outputs(), n_u = model_.n_inputs(), E = std::ssize(Z);
-    stageid::FrfEstimate frf;
+    FrfEstimate frf;
     frf.frequency_hz = frequency_hz_;
     frf.inputs = model_.inputs;
     frf.outputs = model_.outputs;
     frf.sample_rate_hz = config_.stage.spec.info.sample_rate_hz;
-    frf.hold = stageid::Hold::zoh;
+    frf.hold = Hold::zoh;
     frf.response.resize(n_y * n_u, frequency_hz_.size());
     frf.noise_variance.resize(n_y * n_u, frequency_hz_.size());
     const Eigen::VectorXd periods = Eigen::VectorXd::Constant(E, static_cast<double>(Z[0].size()));
@@ -215,39 +203,38 @@ class Bench {
       Eigen::MatrixXcd mean = Eigen::MatrixXcd::Zero(n_y + n_u, E);
       Eigen::MatrixXcd scatter = Eigen::MatrixXcd::Zero(n_y + n_u, n_y + n_u);
       for (Eigen::Index e = 0; e < E; ++e) {
-        const auto& runs = Z[static_cast<std::size_t>(e)];
+        const auto& runs = Z[e];
         for (const auto& z : runs) mean.col(e) += z.col(k) / periods[e];
-        for (const auto& z : runs)
-          scatter += (z.col(k) - mean.col(e)) * (z.col(k) - mean.col(e)).adjoint();
+        for (const auto& z : runs) {
+          const Eigen::VectorXcd deviation = z.col(k) - mean.col(e);
+          scatter += deviation * deviation.adjoint();
+        }
       }
       // With as many experiments as inputs, the response does not depend on the excitation's spectrum.
-      const stageid::LineEstimate line =
-          stageid::estimate_line(Eigen::MatrixXcd::Identity(n_u, E), mean, n_y);
-      const stageid::LineNoise noise = stageid::line_noise(line, scatter, dof, periods);
+      const LineEstimate line = estimate_line(Eigen::MatrixXcd::Identity(n_u, E), mean, n_y);
+      const LineNoise noise = line_noise(line, scatter, dof, periods);
       frf.response.col(k) = line.G.reshaped();
       frf.noise_variance.col(k) =
           (noise.residual.diagonal().real().asDiagonal() * noise.gain).reshaped();
     }
-    stageid::FitOptions options;
-    options.weighting = stageid::Weighting::noise_variance;
-    options.hold = stageid::HoldModel::exact;
+    FitOptions options;
+    options.weighting = Weighting::noise_variance;
+    options.hold = HoldModel::exact;
     options.delay_s = model_.mean_delay_s();
     options.uncertainty = false;
     options.threads = 1;
-    const stageid::FitResult fit = stageid::fit_additive_model(frf, model_, options);
+    const FitResult fit = fit_additive_model(frf, model_, options);
     Eigen::VectorXd out(modes());
     for (int m = 0; m < modes(); ++m)
-      out[m] =
-          fit.model.submodels[static_cast<std::size_t>(modes_[static_cast<std::size_t>(m)].index)]
-                  .natural_frequency_hz() /
-              submodel(m).natural_frequency_hz() -
-          1.0;
+      out[m] = fit.model.submodels[modes_[m].index].natural_frequency_hz() /
+                   submodel(m).natural_frequency_hz() -
+               1.0;
     return out;
   }
 
   /// The pair that shows the worst mode best, relative to the best pair for it.
   void choose_channels() {
-    const stageid::TrackedResponse response(model_, modes_, frequency_hz_);
+    const TrackedResponse response(model_, modes_, frequency_hz_);
     constexpr double kSmall = 1e-7;
     const Eigen::MatrixXcd P = response.at(Eigen::VectorXd::Zero(modes()));
     std::vector<Eigen::MatrixXcd> d;
@@ -272,7 +259,7 @@ class Bench {
   ExperimentConfig config_;
   AdditiveModel model_;
   Eigen::VectorXd frequency_hz_;
-  std::vector<stageid::TrackedParameter> modes_;
+  std::vector<TrackedParameter> modes_;
   Eigen::Index output_ = 0, input_ = 0;
   std::vector<Eigen::RowVectorXcd> sensitivity_;  // by mode, zero far from it
 };
@@ -294,7 +281,7 @@ struct Calibration {
   /// The first alarm from period `from` on; -1: none.
   int first_alarm(const Trace& trace, int from) const {
     for (int p = from; p < std::ssize(trace); ++p)
-      if (statistic(trace[static_cast<std::size_t>(p)]) > threshold) return p;
+      if (statistic(trace[p]) > threshold) return p;
     return -1;
   }
 };
@@ -323,7 +310,7 @@ Calibration calibrate(const Method& method, const std::vector<Trace>& quiet) {
   for (const Trace& trace : quiet) {
     largest.push_back(0.0);
     for (int p = kLearning; p < std::ssize(trace); ++p)
-      largest.back() = std::max(largest.back(), out.statistic(trace[static_cast<std::size_t>(p)]));
+      largest.back() = std::max(largest.back(), out.statistic(trace[p]));
   }
   std::sort(largest.begin(), largest.end());
   out.threshold = largest[static_cast<std::size_t>(std::exp(-kFalseAlarms * kQuiet) *
@@ -335,8 +322,8 @@ Calibration calibrate(const Method& method, const std::vector<Trace>& quiet) {
 
 int main(int argc, char** argv) {
   if (argc < 3) return 2;
-  const ExperimentConfig config = stageid::load_experiment_config(argv[1]);
-  const Bench bench(config, stageid::read_model(argv[2]));
+  const ExperimentConfig config = load_experiment_config(argv[1]);
+  const Bench bench(config, read_model(argv[2]));
   const int runs = argc > 3 ? std::atoi(argv[3]) : 100;
   const int quiet_runs = argc > 4 ? std::atoi(argv[4]) : 200;
   const auto first = static_cast<std::uint64_t>(argc > 5 ? std::atoi(argv[5]) : 1);
@@ -346,8 +333,9 @@ int main(int argc, char** argv) {
       {"watch", [&](const Case& of) { return bench.watch(config, of); }, true}};
   if (argc > 6 && std::string(argv[6]) != "-")
     methods.push_back({"watch, designed",
-                       [&bench, designed = stageid::load_experiment_config(argv[6])](
-                           const Case& of) { return bench.watch(designed, of); },
+                       [&bench, designed = load_experiment_config(argv[6])](const Case& of) {
+                         return bench.watch(designed, of);
+                       },
                        true});
   for (const int measured : {3, 9})
     methods.push_back({fmt::format("refit {}", axes * (1 + measured)),
@@ -376,7 +364,7 @@ int main(int argc, char** argv) {
       int counted = 0;
       for (int run = 0; run < runs; ++run) {
         Case of{first + static_cast<std::uint64_t>(quiet_runs + run)};
-        stageid::test::RandomNumbers random(of.seed);
+        RandomNumbers random(of.seed);
         of.mode = random.integer(0, bench.modes() - 1);
         of.step = (random.integer(0, 1) == 0 ? 1.0 : -1.0) * step;
         // Anywhere in a block of refits.
@@ -388,9 +376,9 @@ int main(int argc, char** argv) {
         early += too_early ? 1.0 : 0.0;
         if (too_early) continue;
         ++counted;
-        ++planted[static_cast<std::size_t>(of.mode)];
+        ++planted[of.mode];
         if (alarm < 0) continue;
-        ++told[static_cast<std::size_t>(of.mode)];
+        ++told[of.mode];
         delays.push_back(alarm - of.period + 1);
       }
       std::sort(delays.begin(), delays.end());

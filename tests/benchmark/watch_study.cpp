@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,27 +22,28 @@
 #include "excitation/multisine/multisine.hpp"
 #include "frf/file/frf_file.hpp"
 #include "hal/simulator/plant_spec.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/excited_loop.hpp"
-#include "tests/support/stages/point_to_point.hpp"
 #include "tools/config/stage_config.hpp"
 #include "tools/experiment/config_plan.hpp"
 #include "tools/experiment/watch_plan.hpp"
 
 namespace {
 
-using stageid::AdditiveModel;
-using stageid::PeriodSpectra;
+using namespace stageid;
+using namespace stageid::test;
 
 struct Request {
-  int runs = 20;
-  int periods = 100;
-  std::string kind = "none";
-  double size = 1e-5;
-  double rms = 0.2;
-  std::uint64_t seed = 1;
-  double alarms = 1e-3;
-  double ramp = 0.0;
+  Arguments argument;
+  int runs = argument(3, 20);
+  int periods = argument(4, 100);
+  std::string kind = argument.word(5, "none");
+  double size = argument(6, 1e-5);
+  double rms = argument(7, 0.2);
+  std::uint64_t seed = argument(8, std::uint64_t{1});
+  double alarms = argument(9, 1e-3);
+  double ramp = argument(10, 0.0);
 };
 
 /// Periodic excitation of the stage's actuators.
@@ -54,46 +54,75 @@ struct Excitation {
   Eigen::MatrixXd samples;  ///< of one period, by axis
 };
 
-Excitation flat_excitation(const stageid::StageConfig& config, const AdditiveModel& model,
-                           double rms, std::uint64_t seed) {
+Excitation flat_excitation(const StageConfig& config, const AdditiveModel& model, double rms,
+                           std::uint64_t seed) {
   Excitation out;
   out.period_samples = static_cast<int>(config.spec.info.sample_rate_hz);
   for (int l = 21; l < 2000 && l < out.period_samples / 2; l += 4) out.lines.push_back(l);
   out.axes = model.inputs.names;
-  const stageid::FrequencyGrid grid(config.spec.info.sample_rate_hz, out.period_samples, out.lines);
+  const FrequencyGrid grid(config.spec.info.sample_rate_hz, out.period_samples, out.lines);
   out.samples.resize(out.period_samples, std::ssize(out.axes));
   for (std::size_t j = 0; j < out.axes.size(); ++j) {
-    stageid::MultisineSpec spec;
+    MultisineSpec spec;
     spec.level = rms;
     spec.seed = 1000 * seed + j;
-    out.samples.col(static_cast<Eigen::Index>(j)) =
-        stageid::random_phase_multisine(grid, spec).samples;
+    out.samples.col(j) = random_phase_multisine(grid, spec).samples;
   }
   return out;
 }
 
-Excitation designed_excitation(const stageid::ExperimentConfig& experiment) {
-  const stageid::ExperimentPlan plan = stageid::make_plan(experiment);
+Excitation designed_excitation(const ExperimentConfig& experiment) {
+  const ExperimentPlan plan = make_plan(experiment);
   Excitation out{
       plan.grid().lines(), plan.grid().samples_per_period(), {}, plan.excitation({0, 0})};
-  for (const stageid::ExcitationAxis& axis : experiment.experiment.axes)
-    out.axes.push_back(axis.channel);
+  for (const ExcitationAxis& axis : experiment.experiment.axes) out.axes.push_back(axis.channel);
   return out;
 }
 
-stageid::test::ExcitedLoop make_loop(const stageid::StageConfig& config,
-                                     const stageid::SimulationSpec& simulation,
-                                     const AdditiveModel& model, const Excitation& excitation,
-                                     std::uint64_t seed) {
-  const std::vector<stageid::Channel>& actuators = config.spec.info.actuators;
+ExcitedLoop make_loop(const StageConfig& config, const SimulationSpec& simulation,
+                      const AdditiveModel& model, const Excitation& excitation,
+                      std::uint64_t seed) {
+  const std::vector<Channel>& actuators = config.spec.info.actuators;
   Eigen::MatrixXd samples = Eigen::MatrixXd::Zero(excitation.period_samples, std::ssize(actuators));
   for (std::size_t j = 0; j < excitation.axes.size(); ++j)
-    samples.col(stageid::channel_index(actuators, excitation.axes[j])) =
-        excitation.samples.col(static_cast<Eigen::Index>(j));
-  const stageid::test::SimulatedSpec spec{config.spec, *config.plant, simulation};
+    samples.col(channel_index(actuators, excitation.axes[j])) = excitation.samples.col(j);
+  const SimulatedSpec spec{config.spec, *config.plant, simulation};
   return {spec, std::move(samples), excitation.lines, model.inputs.names, model.outputs.names,
           seed};
 }
+
+/// A motion that never repeats: moves to random places within +- stroke, with rests between them. Position, velocity and
+/// acceleration are continuous.
+class PointToPoint {
+ public:
+  PointToPoint(double stroke_m, double sample_rate_hz, std::uint64_t seed)
+      : stroke_m_(stroke_m), sample_rate_hz_(sample_rate_hz), random_(seed) {}
+
+  /// The position at the next sample, m.
+  double next() {
+    if (++sample_ > moving_ + resting_) plan();
+    const double t = sample_ < moving_ ? static_cast<double>(sample_) / moving_ : 1.0;
+    return from_m_ + (to_m_ - from_m_) * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
+  }
+
+ private:
+  void plan() {
+    from_m_ = to_m_;
+    to_m_ = random_.uniform(-stroke_m_, stroke_m_);
+    moving_ = static_cast<int>(random_.uniform(0.2, 0.5) * sample_rate_hz_);
+    resting_ = static_cast<int>(random_.uniform(0.0, 0.3) * sample_rate_hz_);
+    sample_ = 0;
+  }
+
+  double stroke_m_;
+  double sample_rate_hz_;
+  RandomNumbers random_;
+  double from_m_ = 0.0;
+  double to_m_ = 0.0;
+  int moving_ = 0;
+  int resting_ = 0;
+  int sample_ = 0;
+};
 
 /// A change of the stage, and its name by the tracker.
 struct Planted {
@@ -147,10 +176,9 @@ struct RampLag {
 };
 
 Planted plant_change(const Request& request, int learning, int period_samples,
-                     const stageid::StageConfig& config, const AdditiveModel& model,
-                     std::uint64_t seed, stageid::SimulationSpec& simulation) {
-  using Fault = stageid::SimulationSpec::Fault;
-  using stageid::TrackedKind;
+                     const StageConfig& config, const AdditiveModel& model, std::uint64_t seed,
+                     SimulationSpec& simulation) {
+  using Fault = SimulationSpec::Fault;
   Planted planted;
   planted.period = learning + 8;
   Fault fault;
@@ -160,11 +188,11 @@ Planted plant_change(const Request& request, int learning, int period_samples,
     all = true;
     kind = kind.substr(4);
   }
-  fault.kind = *stageid::from_word<Fault::Kind>(kind);
+  fault.kind = *from_word<Fault::Kind>(kind);
   const auto period = static_cast<std::uint64_t>(period_samples);
   fault.from_cycle = static_cast<std::uint64_t>(planted.period + 1) * period;
   fault.ramp_s = request.ramp;
-  stageid::test::RandomNumbers random(seed);
+  RandomNumbers random(seed);
   // A factor for gains and noise, a relative change for modes.
   const bool factor = kind == "sensor_gain" || kind == "actuator_gain" || kind == "sensor_noise";
   const double sign = random.integer(0, 1) == 1 ? 1.0 : -1.0;
@@ -172,9 +200,9 @@ Planted plant_change(const Request& request, int learning, int period_samples,
                 : kind == "extra_delay" ? request.size
                                         : sign * request.size;
   if (kind == "sensor_noise") fault.value = 1.0 + request.size;
-  const auto parameters = stageid::tracked_parameters(model, {20.0, 2000.0});
+  const auto parameters = tracked_parameters(model, {20.0, 2000.0});
   const auto pick = [&](TrackedKind wanted) {
-    std::vector<stageid::TrackedParameter> of_kind;
+    std::vector<TrackedParameter> of_kind;
     for (const auto& p : parameters)
       if (p.kind == wanted) of_kind.push_back(p);
     return of_kind[static_cast<std::size_t>(
@@ -186,14 +214,8 @@ Planted plant_change(const Request& request, int learning, int period_samples,
     if (!all) {
       const auto p = pick(kind == "mode_frequency" ? TrackedKind::frequency : TrackedKind::damping);
       planted.name = describe(p, model);
-      const auto modes = stageid::plant_modes(config.spec.info, *config.plant);
-      const double hz = model.submodels[static_cast<std::size_t>(p.index)].natural_frequency_hz();
-      double nearest = 1e9;
-      for (std::size_t m = 0; m < modes.size(); ++m)
-        if (std::abs(modes[m].natural_frequency_hz - hz) < nearest) {
-          nearest = std::abs(modes[m].natural_frequency_hz - hz);
-          fault.channel = static_cast<int>(m);
-        }
+      fault.channel = nearest_mode(config.spec.info, *config.plant,
+                                   model.submodels[p.index].natural_frequency_hz());
     }
   } else if (kind == "sensor_gain" || kind == "sensor_noise") {
     planted.name = "gains of all sensors or of all actuators";
@@ -202,21 +224,20 @@ Planted plant_change(const Request& request, int learning, int period_samples,
       const std::string& name = model.outputs.name(p.index);
       planted.name =
           (kind == "sensor_gain" ? "gain of sensor '" : "noise of sensor '") + name + "'";
-      fault.channel = stageid::channel_index(config.spec.info.sensors, name);
+      fault.channel = channel_index(config.spec.info.sensors, name);
     }
   } else if (kind == "actuator_gain") {
     const auto p = pick(TrackedKind::actuator_gain);
     const std::string& name = model.inputs.name(p.index);
     planted.name = "gain of actuator '" + name + "'";
-    fault.channel = stageid::channel_index(config.spec.info.actuators, name);
+    fault.channel = channel_index(config.spec.info.actuators, name);
   } else if (kind == "added_mass") {
     // The tracker has no such name; the study prints what it is called instead.
-    fault.channel = stageid::channel_index(
-        config.spec.info.actuators,
-        model.inputs.name(random.integer(0, static_cast<int>(model.n_inputs()) - 1)));
+    fault.channel =
+        channel_index(config.spec.info.actuators,
+                      model.inputs.name(random.integer(0, static_cast<int>(model.n_inputs()) - 1)));
     fault.value = request.size;
-    planted.name = "mass at actuator '" +
-                   config.spec.info.actuators[static_cast<std::size_t>(fault.channel)].name + "'";
+    planted.name = "mass at actuator '" + config.spec.info.actuators[fault.channel].name + "'";
   } else {
     planted.name = "delay";
     fault.channel = 0;
@@ -230,35 +251,22 @@ Planted plant_change(const Request& request, int learning, int period_samples,
 
 int main(int argc, char** argv) {
   if (argc < 3) return 2;
-  Request request;
-  const auto number = [&](int i, double otherwise) {
-    return i < argc ? std::atof(argv[i]) : otherwise;
-  };
-  request.runs = static_cast<int>(number(3, request.runs));
-  request.periods = static_cast<int>(number(4, request.periods));
-  if (argc > 5) request.kind = argv[5];
-  request.size = number(6, request.size);
-  request.rms = number(7, request.rms);
-  request.seed = static_cast<std::uint64_t>(number(8, 1.0));
-  request.alarms = number(9, request.alarms);
-  request.ramp = number(10, 0.0);
-
-  const stageid::StageConfig config = stageid::load_stage_config(argv[1]);
-  const AdditiveModel model = stageid::read_model(argv[2]);
+  const Request request{{argc, argv}};
+  const StageConfig config = load_stage_config(argv[1]);
+  const AdditiveModel model = read_model(argv[2]);
   std::optional<Excitation> designed;
-  std::optional<stageid::WatchForecast> forecast;
+  std::optional<WatchForecast> forecast;
   if (argc > 11) {
-    const stageid::ExperimentConfig experiment = stageid::load_experiment_config(argv[11]);
+    const ExperimentConfig experiment = load_experiment_config(argv[11]);
     designed = designed_excitation(experiment);
-    if (argc > 12)
-      forecast = stageid::forecast_of(experiment, model, stageid::read_frf(argv[12]), 1e-5);
+    if (argc > 12) forecast = forecast_of(experiment, model, read_frf(argv[12]), 1e-5);
   }
   const auto excitation_of = [&](std::uint64_t seed) {
     return designed ? *designed : flat_excitation(config, model, request.rms, seed);
   };
   const Excitation first = excitation_of(request.seed);
   const Eigen::VectorXd frequency_hz =
-      stageid::FrequencyGrid(config.spec.info.sample_rate_hz, first.period_samples, first.lines)
+      FrequencyGrid(config.spec.info.sample_rate_hz, first.period_samples, first.lines)
           .frequency_hz();
   Eigen::ArrayXXd estimates;
 
@@ -266,14 +274,14 @@ int main(int argc, char** argv) {
   std::vector<int> delays;
   Eigen::ArrayXd sum, square, inside;
   double counted = 0.0;
-  RampLag lag(request, stageid::TrackerOptions{}.memory_periods);
+  RampLag lag(request, TrackerOptions{}.memory_periods);
   int later_alarms = 0, later_right = 0;
   double tracking_s = 0.0, simulated_s = 0.0, slowest_s = 0.0;
   for (int run = 0; run < request.runs; ++run) {
     const std::uint64_t seed = request.seed + static_cast<std::uint64_t>(run);
-    stageid::TrackerOptions options;
+    TrackerOptions options;
     options.false_alarms_per_period = request.alarms;
-    stageid::SimulationSpec simulation = config.simulation;
+    SimulationSpec simulation = config.simulation;
     simulation.seed = seed;
     Planted planted;
     const bool moves = request.kind.ends_with("motion");
@@ -281,7 +289,7 @@ int main(int argc, char** argv) {
       planted = plant_change(request, options.learning_periods, first.period_samples, config, model,
                              seed, simulation);
     auto loop = make_loop(config, simulation, model, excitation_of(seed), seed);
-    stageid::ModelTracker tracker(model, frequency_hz, options);
+    ModelTracker tracker(model, frequency_hz, options);
     bool seen = false;
     Eigen::Index ramped = -1;
     if (request.ramp > 0.0 && request.kind == "mode_frequency")
@@ -292,7 +300,7 @@ int main(int argc, char** argv) {
     const int n_y = static_cast<int>(config.spec.info.sensors.size());
     const double rate_hz = config.spec.info.sample_rate_hz;
     if (moves)
-      loop.follow([=, motion = stageid::test::PointToPoint(request.size, rate_hz, seed),
+      loop.follow([=, motion = PointToPoint(request.size, rate_hz, seed),
                    still_s = request.kind == "later_motion" ? 60.0 : 0.0](std::uint64_t n) mutable {
         const double z = static_cast<double>(n) < still_s * rate_hz ? 0.0 : motion.next();
         return Eigen::VectorXd::Constant(n_y, z);
@@ -302,7 +310,7 @@ int main(int argc, char** argv) {
     for (int p = 0; p < request.periods; ++p) {
       const PeriodSpectra period = loop.next();
       const auto start = std::chrono::steady_clock::now();
-      const stageid::TrackedPeriod state = tracker.add(period);
+      const TrackedPeriod state = tracker.add(period);
       const double spent_s =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       tracking_s += spent_s;
@@ -345,8 +353,7 @@ int main(int argc, char** argv) {
                  fmt::join(tracker.reference().relative_error, " "));
       const Eigen::VectorXd deviation = tracker.covariance().diagonal().cwiseSqrt();
       for (Eigen::Index i = 0; i < deviation.size(); ++i)
-        fmt::print("  {}: {:.3e} +- {:.3e}\n",
-                   describe(tracker.parameters()[static_cast<std::size_t>(i)], model),
+        fmt::print("  {}: {:.3e} +- {:.3e}\n", describe(tracker.parameters()[i], model),
                    tracker.estimate()[i], deviation[i]);
       sum.setZero(deviation.size());
       square.setZero(deviation.size());
@@ -379,8 +386,8 @@ int main(int argc, char** argv) {
   if (forecast) {
     // From the mean of the learned periods to that of all, with weights lambda^n: the error of the model, which depends
     // on the learned weights of the lines, is part of both.
-    const double lambda = std::exp(-1.0 / stageid::TrackerOptions{}.memory_periods);
-    const int learned = stageid::TrackerOptions{}.learning_periods;
+    const double lambda = std::exp(-1.0 / TrackerOptions{}.memory_periods);
+    const int learned = TrackerOptions{}.learning_periods;
     double later = 0.0, squares = 0.0;
     for (int n = 0; n < request.periods - learned; ++n) {
       later += std::pow(lambda, n);

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -9,10 +11,18 @@
 
 #include "estimation/modal/period_spectra.hpp"
 #include "excitation/multisine/dft.hpp"
+#include "hal/simulator/plant_spec.hpp"
 #include "hal/stage/motion_controller.hpp"
 #include "tests/support/stages/simulated_spec.hpp"
 
 namespace stageid::test {
+
+/// The mode of the plant with the nearest natural frequency: the channel of a fault of a mode.
+inline int nearest_mode(const StageInfo& info, const PlantSpec& plant, double hz) {
+  const std::vector<PlantMode> modes = plant_modes(info, plant);
+  const auto distance = [&](const PlantMode& m) { return std::abs(m.natural_frequency_hz - hz); };
+  return static_cast<int>(std::ranges::min_element(modes, {}, distance) - modes.begin());
+}
 
 /// A simulated stage in closed loop under a periodic excitation, for ever; gives the spectra of period after period.
 class ExcitedLoop {
