@@ -1,5 +1,5 @@
-// Cost of the log and of the loop, relative to memcpy on the same machine in the same run, because on a shared
-// machine only the ratios can be compared from day to day.
+// Cost of the log, the loop and a simulated stage, relative to memcpy on the same machine in the same run, because on a
+// shared machine only the ratios can be compared from day to day.
 
 #include <benchmark/benchmark.h>
 
@@ -12,7 +12,13 @@
 #include "acquisition/slog/crc32c.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_writer.hpp"
+#include "hal/simulator/modal_plant.hpp"
+#include "hal/simulator/noise.hpp"
+#include "hal/stage/limited_stage.hpp"
+#include "hal/stage/motion_controller.hpp"
+#include "tests/support/logs/memory_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid {
 namespace {
@@ -56,22 +62,13 @@ void report_bytes(benchmark::State& state, double bytes_an_iteration) {
       benchmark::Counter(bytes / memcpy_rate(), benchmark::Counter::kIsRate);
 }
 
-ChannelList channels(std::size_t count, const char* unit) {
-  ChannelList list;
-  for (std::size_t i = 0; i < count; ++i) {
-    list.names.push_back(std::to_string(i));
-    list.units.emplace_back(unit);
-  }
-  return list;
-}
-
 LogInfo info_of_stage() {
   LogInfo info;
   info.sample_rate_hz = 10'000.0;
   info.period_samples = kPeriod;
-  info.excitation = channels(1, "N");
-  info.actuators = channels(kActuators, "N");
-  info.sensors = channels(kSensors, "m");
+  info.excitation = test::channels("a", 1, "N");
+  info.actuators = test::channels("a", kActuators, "N");
+  info.sensors = test::channels("s", kSensors, "m");
   return info;
 }
 
@@ -262,6 +259,77 @@ void LoopStepWithStamps(benchmark::State& state) {
   step(state, IdleStage(Clock::wall, true), {.jitter_s = 50e-6, .jitter_rms_s = 8e-6}, 1);
 }
 BENCHMARK(LoopStepWithStamps);
+
+// Parts of a cycle of the simulated wafer stage, and the whole.
+
+void plant_step(benchmark::State& state) {
+  const test::SimulatedSpec spec = test::wafer_stage_spec();
+  ModalPlant plant(plant_modes(spec.info, spec.plant), spec.info.delay_s, spec.info.sample_rate_hz);
+  std::vector<double> u(17, 0.1);
+  std::vector<double> y(7);
+  for (auto _ : state) {
+    plant.step(u.data());
+    plant.output(y.data());
+    benchmark::DoNotOptimize(y.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(plant_step);
+
+void controller_update(benchmark::State& state) {
+  MotionController controller(test::wafer_stage_spec().controller);
+  std::vector<double> u(17);
+  std::vector<double> y(7, 1e-9);
+  for (auto _ : state) {
+    controller.update(y.data(), u.data());
+    benchmark::DoNotOptimize(u.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(controller_update);
+
+void noise_sample(benchmark::State& state) {
+  StageNoise noise({17, 7, 1e4, 1e-3, 1e-10, 1e-10, 20.0});
+  noise.restart(1, 1);
+  for (auto _ : state) {
+    noise.next();
+    benchmark::DoNotOptimize(noise.sensor_m());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(noise_sample);
+
+void closed_loop_cycle(benchmark::State& state, const test::SimulatedSpec& spec) {
+  LimitedStage stage(test::simulated(spec), spec.limits);
+  MotionController controller(spec.controller);
+  std::vector<double> y(7);
+  std::vector<double> u(17);
+  Inputs inputs;
+  inputs.y = y;
+  stage.start(1, inputs);
+  Outputs outputs;
+  outputs.u = u;
+  for (auto _ : state) {
+    controller.update(y.data(), u.data());
+    outputs.cycle = inputs.cycle;
+    if (stage.exchange(outputs, inputs, {}) != Outcome::ok) state.SkipWithError("not ok");
+  }
+  state.counters["times_real_time"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) / spec.info.sample_rate_hz,
+                         benchmark::Counter::kIsRate);
+}
+
+void limited_closed_loop_cycle(benchmark::State& state) {
+  closed_loop_cycle(state, test::wafer_stage_spec());
+}
+BENCHMARK(limited_closed_loop_cycle);
+
+void cycle_in_a_ramp_of_all_modes(benchmark::State& state) {
+  test::SimulatedSpec spec = test::wafer_stage_spec();
+  spec.simulation.faults = {{SimulationSpec::Fault::Kind::mode_frequency, -1, 0, 1, -1, 1e-3, 1e6}};
+  closed_loop_cycle(state, spec);
+}
+BENCHMARK(cycle_in_a_ramp_of_all_modes);
 
 }  // namespace
 }  // namespace stageid
