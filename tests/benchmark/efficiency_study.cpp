@@ -14,57 +14,40 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <string>
 #include <vector>
 
 #include "estimation/search/fit_additive_model.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/models/cramer_rao_bound.hpp"
 #include "tests/support/models/model_blind_fit.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
 namespace {
 
-using stageid::AdditiveModel;
-using stageid::FitResult;
-using stageid::Submodel;
-using stageid::test::RandomStage;
+using namespace stageid;
+using namespace stageid::test;
 
 struct Request {
-  int runs = 200;
-  double dof = 0.0;
-  int threads = 0;
-  int rank = 0;
-  int blind_fits = 3;
-  std::uint64_t first_seed = 1;
-  std::uint64_t stage_seed = 5;
+  Arguments argument;
+  int runs = std::max(2, argument(1, 200));
+  double dof = argument(2, 0.0);
+  int threads = argument(3, 0);
+  int rank = argument(4, 0);
+  int blind_fits = argument(5, 3);
+  std::uint64_t first_seed = argument(6, std::uint64_t{1});
+  std::uint64_t stage_seed = argument(7, std::uint64_t{5});
 };
 
-Request request_from(int argc, char** argv) {
-  Request request;
-  const auto number = [&](int i, double otherwise) {
-    return i < argc ? std::atof(argv[i]) : otherwise;
-  };
-  request.runs = std::max(2, static_cast<int>(number(1, request.runs)));
-  request.dof = number(2, request.dof);
-  request.threads = static_cast<int>(number(3, request.threads));
-  request.rank = static_cast<int>(number(4, request.rank));
-  request.blind_fits = static_cast<int>(number(5, request.blind_fits));
-  request.first_seed = static_cast<std::uint64_t>(number(6, 1.0));
-  request.stage_seed = static_cast<std::uint64_t>(number(7, 5.0));
-  return request;
-}
-
 RandomStage make_stage(std::uint64_t seed) {
-  stageid::test::RandomStageSpec spec;
+  RandomStageSpec spec;
   spec.least_modes = spec.most_modes = 17;
   spec.least_noise_db = spec.most_noise_db = -50.0;
-  return stageid::test::draw_random_stage(seed, spec);
+  return draw_random_stage(seed, spec);
 }
 
 /// Another measurement of the same stage.
 void measure_again(RandomStage& stage, const Request& request, int run) {
-  stageid::test::RandomNumbers random(request.first_seed + 1000003ULL * static_cast<unsigned>(run));
+  RandomNumbers random(request.first_seed + 1000003ULL * static_cast<unsigned>(run));
   stage.frf.noise_dof = request.dof;
   for (Eigen::Index k = 0; k < stage.exact.cols(); ++k)
     for (Eigen::Index c = 0; c < stage.exact.rows(); ++c) {
@@ -75,11 +58,11 @@ void measure_again(RandomStage& stage, const Request& request, int run) {
     }
 }
 
-stageid::FitOptions fit_options(const RandomStage& stage, const Request& request) {
-  stageid::FitOptions options;
-  options.weighting = stageid::Weighting::noise_variance;
-  options.hold = stageid::HoldModel::exact;
-  options.delay = stageid::DelayModel::estimate;
+FitOptions fit_options(const RandomStage& stage, const Request& request) {
+  FitOptions options;
+  options.weighting = Weighting::noise_variance;
+  options.hold = HoldModel::exact;
+  options.delay = DelayModel::estimate;
   options.delay_s = stage.delay_s;
   options.threads = request.threads;
   options.residue_rank = request.rank;
@@ -130,8 +113,8 @@ struct Mode {
 };
 
 std::vector<Mode> modes_of(const RandomStage& stage) {
-  const stageid::test::CramerRaoBound bound = stageid::test::cramer_rao_bound(
-      stage.truth, stage.frf.frequency_hz, stageid::HoldModel::exact, stage.variance);
+  const CramerRaoBound bound =
+      cramer_rao_bound(stage.truth, stage.frf.frequency_hz, HoldModel::exact, stage.variance);
   std::vector<Mode> modes;
   for (std::size_t i = 0; i < stage.truth.submodels.size(); ++i) {
     const Submodel& s = stage.truth.submodels[i];
@@ -247,21 +230,21 @@ void print_summary(const std::vector<Mode>& modes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const Request request = request_from(argc, argv);
+  const Request request{{argc, argv}};
   RandomStage stage = make_stage(request.stage_seed);
   fmt::print("{}\n{} runs, variances of {} degrees of freedom (0: exact), residue rank {}\n",
              stage.description(), request.runs, request.dof, request.rank);
   std::vector<Mode> modes = modes_of(stage);
-  const stageid::FitOptions options = fit_options(stage, request);
+  const FitOptions options = fit_options(stage, request);
   for (int run = 0; run < request.runs; ++run) {
     measure_again(stage, request, run);
-    const FitResult fit = stageid::fit_additive_model(stage.frf, stage.truth, options);
+    const FitResult fit = fit_additive_model(stage.frf, stage.truth, options);
     if (!fit.trustworthy() || !add(fit, modes)) {
       fmt::print("run {}: {} ({})\n", run, to_string(fit.status()), fit.message());
       return 1;
     }
     if (run >= request.blind_fits || request.rank > 0) continue;
-    const stageid::test::BlindFit blind = stageid::test::fit_blind(stage, request.threads);
+    const BlindFit blind = fit_blind(stage, request.threads);
     fmt::print("run {} from nothing: {} modes, at most {:.2g} standard deviations away\n", run,
                blind.found_modes, difference(fit.model, blind.blind.model));
     std::fflush(stdout);

@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 
 #include "acquisition/formats/open_log.hpp"
@@ -25,6 +24,7 @@
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/confidence.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/simulated_spec.hpp"
 #include "tools/config/stage_config.hpp"
@@ -40,16 +40,17 @@ double since(Clock::time_point start) {
 }
 
 struct Study {
+  test::Arguments argument;
   test::SimulatedSpec stage;
-  int runs = 1000;
-  double period_s = 4.0;
-  double high_hz = 2000.0;
-  int axes = 13;
-  int realizations = 3;
-  int iterations = 40;
-  double pilot_rms_n = 0.5;
-  double rms_n = 1.0;
-  std::vector<std::string> outputs;
+  int runs = argument(2, 1000);
+  double period_s = argument(3, 4.0);
+  double high_hz = argument(4, 2000.0);
+  int axes = argument(5, 13);
+  int realizations = argument(6, 3);
+  int iterations = argument(7, 40);
+  double pilot_rms_n = argument(8, 0.5);
+  double rms_n = argument(9, 1.0);
+  std::vector<std::string> outputs{};
 
   FrequencyGrid grid(double seconds) const {
     const double rate_hz = stage.info.sample_rate_hz;
@@ -59,8 +60,7 @@ struct Study {
   ExperimentSpec spec(ExcitationScheme scheme, double rms, std::uint64_t seed) const {
     ExperimentSpec spec;
     spec.scheme = scheme;
-    for (int p = 0; p < axes; ++p)
-      spec.axes.push_back({stage.info.actuators[static_cast<std::size_t>(p)].name, rms, {}});
+    for (int p = 0; p < axes; ++p) spec.axes.push_back({stage.info.actuators[p].name, rms, {}});
     spec.realizations = 1;
     spec.periods = 2;
     spec.transient_periods = 1;
@@ -232,20 +232,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "excitation_study STAGE.yaml [runs ...]; see the head of its source\n");
     return 2;
   }
-  const auto number = [&](int i, double otherwise) {
-    return i < argc ? std::atof(argv[i]) : otherwise;
-  };
-  Study study;
   const StageConfig config = load_stage_config(argv[1]);
-  study.stage = {config.spec, config.plant.value(), config.simulation, config.pace};
-  study.runs = static_cast<int>(number(2, study.runs));
-  study.period_s = number(3, study.period_s);
-  study.high_hz = number(4, study.high_hz);
-  study.axes = static_cast<int>(number(5, study.axes));
-  study.realizations = static_cast<int>(number(6, study.realizations));
-  study.iterations = static_cast<int>(number(7, study.iterations));
-  study.pilot_rms_n = number(8, study.pilot_rms_n);
-  study.rms_n = number(9, study.rms_n);
+  Study study{.argument = {argc, argv},
+              .stage = {config.spec, config.plant.value(), config.simulation, config.pace}};
   const auto& direction = study.stage.info.actuators.front().direction;
   for (const Channel& channel : study.stage.info.sensors)
     if (std::equal(std::begin(direction), std::end(direction), std::begin(channel.direction)))

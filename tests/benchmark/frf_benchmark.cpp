@@ -49,12 +49,12 @@ class RepeatingLog : public LogReader {
   const std::vector<LogRun>& runs() const noexcept override { return runs_; }
   Eigen::MatrixXd excitation(std::size_t run) const override {
     Eigen::MatrixXd period = Eigen::MatrixXd::Zero(wave_.rows(), 17);
-    period.col(static_cast<Eigen::Index>(run)) = wave_;
+    period.col(run) = wave_;
     return period;
   }
   void read(std::size_t run, std::uint64_t, std::uint64_t, LogSamples& out) const override {
     out.actuators = noise_.leftCols(17);
-    out.actuators.col(static_cast<Eigen::Index>(run)) += wave_;
+    out.actuators.col(run) += wave_;
     out.sensors = noise_.rightCols(7);
     out.marked.setZero(wave_.rows());
   }

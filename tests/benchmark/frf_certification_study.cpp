@@ -12,20 +12,17 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/response/confidence.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
 namespace {
 
-using stageid::FrfEstimate;
-using stageid::VarianceKind;
-using stageid::test::AxisScheme;
-using stageid::test::ClosedLoop;
-using stageid::test::LoopExperiment;
+using namespace stageid;
+using namespace stageid::test;
 
 /// Gain that falls over the lines (not, if `flat`), phases that differ from entry to entry, and a
 /// loop gain around one, so that what is fed back matters.
@@ -63,7 +60,7 @@ LoopExperiment experiment(int outputs, int inputs, int periods, int realizations
 Eigen::MatrixXcd error_of(const FrfEstimate& frf, const ClosedLoop& loop, const LoopExperiment& x) {
   Eigen::MatrixXcd error = frf.response;
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    error.col(k) -= loop.plant(stageid::test::omega_of(x, k)).reshaped();
+    error.col(k) -= loop.plant(omega_of(x, k)).reshaped();
   return error;
 }
 
@@ -79,7 +76,7 @@ struct Certificate {
     const Eigen::MatrixXd& variance =
         kind == VarianceKind::total ? frf.total_variance : frf.noise_variance;
     if (variance.size() == 0) return;
-    const Eigen::ArrayXXd radius = stageid::confidence_radius(frf, 0.95, kind).array();
+    const Eigen::ArrayXXd radius = confidence_radius(frf, 0.95, kind).array();
     if (seeds++ == 0) squares = reported = Eigen::ArrayXXd::Zero(error.rows(), error.cols());
     dof = kind == VarianceKind::total ? frf.total_dof : frf.noise_dof;
     squares += error.array().abs2();
@@ -110,8 +107,8 @@ Certificates certify(const ClosedLoop& loop, LoopExperiment x, int seeds) {
   Certificates found;
   for (int seed = 1; seed <= seeds; ++seed) {
     x.seed = static_cast<std::uint64_t>(seed);
-    const auto log = stageid::test::simulate_log(loop, x);
-    const FrfEstimate frf = stageid::estimate_plant_frf({&log});
+    const auto log = simulate_log(loop, x);
+    const FrfEstimate frf = estimate_plant_frf({&log});
     const Eigen::MatrixXcd error = error_of(frf, loop, x);
     found.noise.add(error, frf, VarianceKind::noise);
     found.total.add(error, frf, VarianceKind::total);
@@ -143,9 +140,8 @@ void study_covariance(int draws, int outputs, int inputs, int scheme) {
   const int logs = (draws + lines - 1) / lines;
   for (int seed = 1; seed <= logs; ++seed) {
     x.seed = static_cast<std::uint64_t>(seed);
-    const auto log = stageid::test::simulate_log(loop, x);
-    const FrfEstimate frf =
-        stageid::estimate_plant_frf({&log}, {.covariance = stageid::CovarianceKind::full});
+    const auto log = simulate_log(loop, x);
+    const FrfEstimate frf = estimate_plant_frf({&log}, {.covariance = CovarianceKind::full});
     const Eigen::MatrixXcd error = error_of(frf, loop, x);
     sample.noalias() += error * error.adjoint() / (logs * lines);
     reported += frf.covariance.rowwise().mean().reshaped(n_c, n_c) / logs;
@@ -161,10 +157,8 @@ void study_covariance(int draws, int outputs, int inputs, int scheme) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  const auto number = [&](int i, int otherwise) {
-    return i < argc ? std::atoi(argv[i]) : otherwise;
-  };
+  const Arguments number(argc, argv);
+  const std::string what = number.word(1, "");
   if (what == "variance") {
     const int outputs = number(3, 4);
     const int inputs = number(4, 13);

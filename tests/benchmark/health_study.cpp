@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <optional>
 #include <string>
@@ -22,6 +21,7 @@
 #include "excitation/threads/worker_pool.hpp"
 #include "frf/health/data_health.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/logs/faulty_log.hpp"
 #include "tests/support/logs/planted_faults.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
@@ -30,7 +30,7 @@
 namespace {
 
 using namespace stageid;
-using stageid::test::MemoryLog;
+using namespace stageid::test;
 
 struct Tally {
   int logs = 0;
@@ -55,17 +55,16 @@ struct PlantResult {
 };
 
 struct Study {
-  test::SimulatedSpec nominal = test::wafer_stage_spec();
+  SimulatedSpec nominal = wafer_stage_spec();
   std::optional<NominalStage> expectation = nominal_stage(nominal, nominal.plant);
   bool verbose = false;
   std::string only;
 
   PlantResult of_plant(int seed) const;
-  std::string tell(const test::NamedFault& planted, int seed,
-                   const std::vector<Finding>& findings) const;
+  std::string tell(const NamedFault& planted, int seed, const std::vector<Finding>& findings) const;
 };
 
-std::string Study::tell(const test::NamedFault& planted, int seed,
+std::string Study::tell(const NamedFault& planted, int seed,
                         const std::vector<Finding>& findings) const {
   std::string text =
       fmt::format("plant {}, {} ({}):\n", seed, planted.name, planted.expected_channel);
@@ -78,21 +77,20 @@ std::string Study::tell(const test::NamedFault& planted, int seed,
 
 PlantResult Study::of_plant(int seed) const {
   PlantResult result;
-  test::FaultyLogRequest request;
+  FaultyLogRequest request;
   request.configured = nominal;
-  request.stage = test::random_wafer_stage(static_cast<std::uint64_t>(seed), nominal);
+  request.stage = random_wafer_stage(static_cast<std::uint64_t>(seed), nominal);
   request.seed = static_cast<std::uint64_t>(seed) + 1000;
-  const MemoryLog clean = test::simulate_faulty_log(request, {});
-  for (const test::NamedFault& planted :
-       test::faults_to_plant(static_cast<std::uint64_t>(seed), clean)) {
+  const MemoryLog clean = simulate_faulty_log(request, {});
+  for (const NamedFault& planted : faults_to_plant(static_cast<std::uint64_t>(seed), clean)) {
     if (planted.name.find(only) == std::string::npos) continue;
     Tally& tally = result.tallies[planted.name];
     MemoryLog log;
     if (planted.in_recording) {
       log = clean;
-      test::spoil_recording(planted.fault, log);
+      spoil_recording(planted.fault, log);
     } else {
-      log = test::simulate_faulty_log(request, planted.fault);
+      log = simulate_faulty_log(request, planted.fault);
     }
     if (log.log_runs.empty()) {
       ++tally.unstable;
@@ -102,7 +100,7 @@ PlantResult Study::of_plant(int seed) const {
     options.threads = 1;
     FrfAndHealth both = estimate_plant_frf_and_health({&log}, options);
     const auto findings = check_health(std::move(both.health), expectation);
-    const test::Judgement judgement = test::judge(planted, findings, log.log_info);
+    const Judgement judgement = judge(planted, findings, log.log_info);
     tally.add(
         {1, judgement.named ? 1 : 0, judgement.others > 0 ? 1 : 0, 0, std::abs(judgement.error)});
     if (verbose || !judgement.named || judgement.others > 0)
@@ -114,16 +112,14 @@ PlantResult Study::of_plant(int seed) const {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto number = [&](int i, int otherwise) {
-    return i < argc ? std::atoi(argv[i]) : otherwise;
-  };
-  const int plants = number(1, 100);
-  const int first = number(2, 1);
+  const Arguments argument(argc, argv);
+  const int plants = argument(1, 100);
+  const int first = argument(2, 1);
   Study study;
-  study.verbose = number(3, 0) != 0;
-  study.only = argc > 4 ? argv[4] : "";
+  study.verbose = argument(3, 0) != 0;
+  study.only = argument.word(4, "");
   std::vector<PlantResult> results(plants);
-  for_each_task(worker_count(number(5, 0)), results.size(), [&](int, std::size_t i) {
+  for_each_task(worker_count(argument(5, 0)), results.size(), [&](int, std::size_t i) {
     results[i] = study.of_plant(first + static_cast<int>(i));
   });
   std::map<std::string, Tally> tallies;

@@ -14,19 +14,18 @@
 
 namespace {
 
-using stageid::FrfMethod;
-using stageid::test::LoopExperiment;
-using stageid::test::Trials;
+using namespace stageid;
+using namespace stageid::test;
 
 constexpr double kSampleRateHz = 200.0;
 constexpr double kNoise = 0.01;
 
 LoopExperiment experiment(int periods) {
   LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = 800, .axes = 13};
-  x.lines = stageid::test::line_range(21, 161, 2);
+  x.lines = line_range(21, 161, 2);
   x.periods = periods;
   x.transient_periods = 0;
-  x.scheme = stageid::test::AxisScheme::orthogonal;
+  x.scheme = AxisScheme::orthogonal;
   return x;
 }
 
@@ -34,23 +33,23 @@ LoopExperiment experiment(int periods) {
 
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 30;
-  const auto plant = stageid::test::sampled_plant(
-      4, 13, {{12.3, 1.0}, {13.6, 0.7}, {24.0, 0.4}, {37.0, 0.2}}, kSampleRateHz, 0.1);
+  const auto plant = sampled_plant(4, 13, {{12.3, 1.0}, {13.6, 0.7}, {24.0, 0.4}, {37.0, 0.2}},
+                                   kSampleRateHz, 0.1);
   for (const int periods : {3, 4, 10}) {
-    const Trials lpm = stageid::test::repeat(plant, experiment(periods), kNoise,
-                                             {.method = FrfMethod::lpm}, seeds);
+    const Trials lpm =
+        repeat(plant, experiment(periods), kNoise, {.method = FrfMethod::lpm}, seeds);
     const Trials waited =
-        stageid::test::repeat(plant, experiment(periods), kNoise, {.transient_periods = 1}, seeds);
-    const Trials not_waited = stageid::test::repeat(
-        plant, experiment(periods), kNoise, {.periods = stageid::PeriodChoice::unmarked}, seeds);
+        repeat(plant, experiment(periods), kNoise, {.transient_periods = 1}, seeds);
+    const Trials not_waited =
+        repeat(plant, experiment(periods), kNoise, {.periods = PeriodChoice::unmarked}, seeds);
     fmt::print(
         "{:2} periods: error {:.3e} lpm, {:.3e} one passed over, {:.3e} none; lpm / passed "
         "over {:.3f}\n",
         periods, lpm.error, waited.error, not_waited.error, lpm.error / waited.error);
   }
   for (const int periods : {1, 2, 4}) {
-    const Trials lpm = stageid::test::repeat(plant, experiment(periods), kNoise,
-                                             {.method = FrfMethod::lpm}, seeds);
+    const Trials lpm =
+        repeat(plant, experiment(periods), kNoise, {.method = FrfMethod::lpm}, seeds);
     fmt::print(
         "{:2} periods: empirical / stated variance {:.3f}, squared bias / its variance {:.3f}\n",
         periods, lpm.over_stated, lpm.bias);

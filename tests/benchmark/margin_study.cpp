@@ -27,6 +27,7 @@
 
 #include "estimation/loop/loop_view.hpp"
 #include "estimation/request/fit_request.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/plant/plant_frf.hpp"
 #include "hal/simulator/plant_spec.hpp"
 #include "hal/simulator/rigid_body.hpp"
@@ -37,9 +38,11 @@
 
 namespace {
 
+using namespace stageid;
+using namespace stageid::test;
+
 using Complex = std::complex<double>;
 using Eigen::MatrixXcd;
-using stageid::test::JudgementStage;
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
@@ -48,29 +51,30 @@ class TrueLoop {
  public:
   explicit TrueLoop(const JudgementStage& stage)
       : spec_(stage.spec),
-        modes_(stageid::plant_modes(spec_.info, spec_.plant)),
+        modes_(plant_modes(spec_.info, spec_.plant)),
         controller_(spec_.controller) {
     for (std::size_t a = 0; a < spec_.controller.axes.size(); ++a) {
       if (spec_.controller.axes[a].crossover_hz == 0.0) continue;
-      stageid::MotionControllerSpec only = spec_.controller;
+      MotionControllerSpec only = spec_.controller;
       for (std::size_t b = 0; b < only.axes.size(); ++b)
         if (b != a) only.axes[b] = {};
-      names_.emplace_back(stageid::kRigidAxisNames[a]);
+      names_.emplace_back(kRigidAxisNames[a]);
       axes_.emplace_back(only);
     }
   }
   const std::vector<std::string>& names() const { return names_; }
   /// L of every axis with the others closed, then det(I + G C).
   std::vector<Complex> at(double frequency_hz) const {
-    const MatrixXcd G = stageid::sampled_response(modes_, spec_.info.delay_s,
-                                                  spec_.info.sample_rate_hz, frequency_hz);
+    const MatrixXcd G =
+        sampled_response(modes_, spec_.info.delay_s, spec_.info.sample_rate_hz, frequency_hz);
     const MatrixXcd C = -controller_.response(frequency_hz);
     const MatrixXcd one = MatrixXcd::Identity(G.rows(), G.rows());
     std::vector<Complex> out;
-    for (const stageid::MotionController& axis : axes_) {
+    for (const MotionController& axis : axes_) {
       const MatrixXcd own = -axis.response(frequency_hz);
-      const MatrixXcd others = one + G * (C - own);
-      out.push_back((others.inverse() * G * own).trace());  // of rank one
+      const MatrixXcd others = C - own;
+      const MatrixXcd closed = inverse(one + G * others) * G;
+      out.push_back((closed * own).trace());  // of rank one
     }
     out.push_back((one + G * C).determinant());
     return out;
@@ -81,7 +85,7 @@ class TrueLoop {
     std::vector<double> out;
     const double highest = 0.5 * spec_.info.sample_rate_hz;
     for (double f = 1e-4 * highest; f < highest; f *= 1.002) out.push_back(f);
-    for (const stageid::PlantMode& mode : modes_)
+    for (const PlantMode& mode : modes_)
       for (int i = -400; i <= 400; ++i) {
         const double f = mode.natural_frequency_hz * (1.0 + 0.02 * mode.damping_ratio * i);
         if (f > 1e-4 * highest && f < highest) out.push_back(f);
@@ -92,11 +96,11 @@ class TrueLoop {
   }
 
  private:
-  stageid::test::SimulatedSpec spec_;
-  std::vector<stageid::PlantMode> modes_;
-  stageid::MotionController controller_;
+  SimulatedSpec spec_;
+  std::vector<PlantMode> modes_;
+  MotionController controller_;
   std::vector<std::string> names_;
-  std::vector<stageid::MotionController> axes_;
+  std::vector<MotionController> axes_;
 };
 
 /// Margins of one curve, found on a dense grid and refined by bisection; absent ones are infinite.
@@ -195,8 +199,7 @@ struct Study {
   std::map<std::string, Count> counts;
   std::string outside;
 
-  void add(const std::string& kind, const std::string& loop, const stageid::Margin& told,
-           double truth) {
+  void add(const std::string& kind, const std::string& loop, const Margin& told, double truth) {
     const double radius = told.radius_95().value_or(0.0);
     const bool inside = std::abs(told.value - truth) <= radius;
     counts[kind].add(stage, inside);
@@ -207,8 +210,8 @@ struct Study {
                              radius, truth, told.frequency_hz);
   }
   /// Absent ones of both are equal; one of both only is a miss.
-  void add(const std::string& kind, const std::string& loop,
-           const std::optional<stageid::Margin>& told, double truth) {
+  void add(const std::string& kind, const std::string& loop, const std::optional<Margin>& told,
+           double truth) {
     if (told && std::isfinite(truth)) return add(kind, loop, *told, truth);
     if (told.has_value() == std::isfinite(truth)) return;
     counts["margins of one only"].add(stage, false);
@@ -216,21 +219,19 @@ struct Study {
   }
 };
 
-std::string study(const JudgementStage& stage, const stageid::FitRequest& request, Study& study) {
-  const stageid::test::MemoryLog log = stageid::test::measure_with_trouble(stage, {});
-  stageid::FitSetup setup =
-      stageid::make_fit_setup(request, stageid::estimate_plant_frf({&log}, {}));
+std::string study(const JudgementStage& stage, const FitRequest& request, Study& study) {
+  const MemoryLog log = measure_with_trouble(stage, {});
+  FitSetup setup = make_fit_setup(request, estimate_plant_frf({&log}, {}));
   setup.options.covariance = true;
-  const stageid::FitResult fit = stageid::fit_model(setup, setup.options);
+  const FitResult fit = fit_model(setup, setup.options);
   if (!fit.trustworthy() || fit.covariance.sandwich.size() == 0)
     return "left out: " + fit.message();
-  const stageid::LoopController controller = stageid::stage_loop(
-      stageid::StageSpec{stage.spec.info, {}, stage.spec.controller}, fit.model);
+  const LoopController controller =
+      stage_loop(StageSpec{stage.spec.info, {}, stage.spec.controller}, fit.model);
   const auto [low_hz, high_hz] = fit.model.fit.band_hz;
   const Eigen::VectorXd lines =
       Eigen::ArrayXd::LinSpaced(20, std::log(low_hz), std::log(high_hz)).exp();
-  const stageid::LoopView view =
-      stageid::loop_view(fit.model, controller, fit.covariance.sandwich, lines);
+  const LoopView view = loop_view(fit.model, controller, fit.covariance.sandwich, lines);
   if (!view.margins)
     return fmt::format("left out: unstable, |z| = 1 + {:.2g} at {:.3g} Hz",
                        view.poles.largest_pole - 1.0, view.poles.pole_hz);
@@ -247,7 +248,7 @@ std::string study(const JudgementStage& stage, const stageid::FitRequest& reques
   for (std::size_t k = 0; k < truth.names().size(); ++k) {
     const TrueMargins exact =
         margins_of(hz, curves[k], 1.0, [&](double f) { return truth.at(f)[k]; });
-    const stageid::LoopMargins& told = view.margins->loops[k];
+    const LoopMargins& told = view.margins->loops[k];
     const std::string& name = truth.names()[k];
     study.add("gain margin", name, told.gain_db, exact.gain_db);
     study.add("gain reduction", name, told.gain_reduction_db, exact.gain_reduction_db);
@@ -262,8 +263,7 @@ std::string study(const JudgementStage& stage, const stageid::FitRequest& reques
     const std::vector<Complex> exact = truth.at(lines[k]);
     for (Eigen::Index i = 0; i < view.loop.rows(); ++i)
       study.counts["discs of L"].add(
-          stage.seed,
-          std::abs(view.loop(i, k) - exact[static_cast<std::size_t>(i)]) <= view.loop_radius(i, k));
+          stage.seed, std::abs(view.loop(i, k) - exact[i]) <= view.loop_radius(i, k));
     study.counts["discs of det(I + L)"].add(
         stage.seed, std::abs(view.determinant[k] - exact.back()) <= view.determinant_radius[k]);
   }
@@ -275,7 +275,7 @@ void become(const std::string& plant, JudgementStage& stage) {
     for (double& hz : stage.spec.plant.suspension_hz) hz = 0.0;
   if (plant != "beyond") stage.spec.plant.in_plane_modes.resize(stage.modes_in_band);
   if (plant == "coloured") return;
-  stage.noise.colour = stageid::NoiseColour::white;
+  stage.noise.colour = NoiseColour::white;
   stage.noise.density = 0.0;
 }
 
@@ -286,16 +286,16 @@ int main(int argc, char** argv) {
   auto seed = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 770001);
   const std::string plant = argc > 3 ? argv[3] : "contained";
   const auto most = static_cast<std::size_t>(argc > 4 ? std::atoi(argv[4]) : 20);
-  stageid::FitRequest request;
+  FitRequest request;
   request.threads = 2;
   if (plant == "known") {
-    request.rigid_body.kind = stageid::RigidBodyRequest::Kind::suspension;
+    request.rigid_body.kind = RigidBodyRequest::Kind::suspension;
     request.rigid_body.suspension_hz = {0.02};
   }
   Study all;
   for (int done = 0; done < stages; ++seed) {
     try {
-      JudgementStage stage = stageid::test::draw_judgement_stage(seed);
+      JudgementStage stage = draw_judgement_stage(seed);
       if (stage.spec.info.sensors.size() * stage.spec.info.actuators.size() > most) continue;
       become(plant, stage);
       const std::string told = study(stage, request, all);

@@ -17,15 +17,15 @@
 #include <string>
 
 #include "frf/plant/plant_frf.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
 namespace {
 
+using namespace stageid;
+using namespace stageid::test;
+
 using Eigen::Index;
-using stageid::FrfEstimate;
-using stageid::FrfOptions;
-using stageid::test::ComplexNoise;
-using stageid::test::MemoryLog;
 
 constexpr double kRateHz = 8000.0;
 constexpr int kPeriod = 4000;
@@ -164,18 +164,19 @@ struct Errors {
 };
 
 struct Study {
-  std::uint64_t seed = 1;
-  int wanted = 1000;
-  stageid::FrfMethod method = stageid::FrfMethod::periodic;
-  Index channels = 3;
-  int periods = 0;
+  Arguments argument;
+  std::uint64_t seed = argument(1, std::uint64_t{1});
+  int wanted = argument(2, 1000);
+  FrfMethod method = argument(3, 0) == 1 ? FrfMethod::lpm : FrfMethod::periodic;
+  Index channels = argument(4, Index{3});
+  int periods = argument(5, 0);
 };
 
 void study(const Colour& colour, const Study& s) {
   constexpr std::array kPeriods = {3, 4, 6, 10, 20};
   ComplexNoise random(s.seed);
-  stageid::RealDft dft(kPeriod);
-  FrfOptions plain{.method = s.method, .periods = stageid::PeriodChoice::unmarked, .threads = 1};
+  RealDft dft(kPeriod);
+  FrfOptions plain{.method = s.method, .periods = PeriodChoice::unmarked, .threads = 1};
   FrfOptions check{.method = s.method, .threads = 1};
   Errors clean_plain, clean_check, glitch_plain, glitch_detection;
   int done = 0;
@@ -186,17 +187,17 @@ void study(const Colour& colour, const Study& s) {
     MemoryLog log;
     log.log_info.sample_rate_hz = kRateHz;
     log.log_info.period_samples = kPeriod;
-    log.log_info.excitation = stageid::test::channels("a", 1, "N");
-    log.log_info.actuators = stageid::test::channels("a", 1, "N");
-    log.log_info.sensors = stageid::test::channels("z", s.channels, "m");
+    log.log_info.excitation = channels("a", 1, "N");
+    log.log_info.actuators = channels("a", 1, "N");
+    log.log_info.sensors = channels("z", s.channels, "m");
     Eigen::MatrixXcd R(1, kLines);
     std::vector<int> lines;
     for (int k = 0; k < kLines; ++k) {
       R(0, k) = random.phase();
       lines.push_back(k + 1);
     }
-    const Eigen::MatrixXd period = stageid::test::synthesize(R, lines, dft);
-    stageid::LogSamples record;
+    const Eigen::MatrixXd period = synthesize(R, lines, dft);
+    LogSamples record;
     record.actuators = period.replicate(P, 1);
     record.sensors = record.actuators.replicate(1, s.channels);
     Eigen::RowVectorXd deviation(s.channels);
@@ -239,16 +240,8 @@ void study(const Colour& colour, const Study& s) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto number = [&](int at, long otherwise) {
-    return argc > at ? std::strtol(argv[at], nullptr, 10) : otherwise;
-  };
-  Study s;
-  s.seed = static_cast<std::uint64_t>(number(1, 1));
-  s.wanted = static_cast<int>(number(2, 1000));
-  if (number(3, 0) == 1) s.method = stageid::FrfMethod::lpm;
-  s.channels = number(4, 3);
-  s.periods = static_cast<int>(number(5, 0));
-  const std::string only = argc > 6 ? argv[6] : "";
+  const Study s{{argc, argv}};
+  const std::string only = s.argument.word(6, "");
   fmt::print("{:18} {:>7} {:>9} {:>16} {:>8} {:>8} {:>8} {:>17} {:>15}\n", "noise", "periods",
              "dropped,‰", "clean error", "glitches", "dropped", "replaced", "glitched error",
              "undropped");

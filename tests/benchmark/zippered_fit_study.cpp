@@ -9,21 +9,16 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 #include <vector>
 
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/models/zippered_fits.hpp"
 
 namespace {
 
-using stageid::FrfMethod;
-using stageid::FrfOptions;
-using stageid::Weighting;
-using stageid::test::AxisScheme;
-using stageid::test::FitTrials;
-using stageid::test::LoopExperiment;
-using stageid::test::PlantMode;
+using namespace stageid;
+using namespace stageid::test;
 
 constexpr double kSampleRateHz = 200.0;
 constexpr double kLineDistanceHz = 0.5;  // of an axis
@@ -39,7 +34,7 @@ struct Record {
 LoopExperiment experiment(const Record& record, int axes) {
   const int share = record.scheme == AxisScheme::zippered ? axes : 1;
   LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = 800 * share, .axes = axes};
-  x.lines = stageid::test::line_range(36 * share + 1, 160 * share + 1, 2);
+  x.lines = line_range(36 * share + 1, 160 * share + 1, 2);
   x.periods = record.periods;
   x.transient_periods = 0;
   x.scheme = record.scheme;
@@ -61,18 +56,15 @@ void print(const char* what, const char* weighting, const FitTrials& trials, int
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto number = [&](int i, double otherwise) {
-    return argc > i ? std::atof(argv[i]) : otherwise;
-  };
-  const int seeds = static_cast<int>(number(1, 200));
-  const int outputs = static_cast<int>(number(2, 2));
-  const int inputs = static_cast<int>(number(3, 2));
+  const Arguments number(argc, argv);
+  const int seeds = number(1, 200);
+  const int outputs = number(2, 2);
+  const int inputs = number(3, 2);
   const double noise = number(4, 0.1);
   const double decay_s = 1.0 / (std::numbers::pi * kLineDistanceHz * number(5, 6.0));
   const std::vector<PlantMode> modes = {
       {12.3, decay_s}, {24.0, decay_s / 1.25}, {37.0, decay_s / 1.65}};
-  const stageid::test::SampledPlant plant =
-      stageid::test::sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
+  const SampledPlant plant = sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
   fmt::print("{} x {}, {} seeds, noise {}, decay {:.3f} s\n", outputs, inputs, seeds, noise,
              decay_s);
   const Record records[] = {
@@ -84,8 +76,7 @@ int main(int argc, char** argv) {
     const LoopExperiment x = experiment(record, inputs);
     for (const Weighting weighting : {Weighting::noise_variance, Weighting::likelihood})
       print(record.what, to_string(weighting),
-            stageid::test::repeat_fits(plant, modes, x, noise, record.options, weighting, seeds),
-            seeds);
+            repeat_fits(plant, modes, x, noise, record.options, weighting, seeds), seeds);
   }
   return 0;
 }

@@ -19,26 +19,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 #include <string_view>
 #include <vector>
 
 #include "excitation/decompositions/decompositions.hpp"
 #include "frf/health/estimate_check.hpp"
+#include "tests/benchmark/arguments.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
 namespace {
 
-using stageid::FrfEstimate;
-using stageid::FrfMethod;
-using stageid::FrfOptions;
-using stageid::PeriodChoice;
-using stageid::test::AxisScheme;
-using stageid::test::LoopExperiment;
-using stageid::test::MemoryLog;
-using stageid::test::SampledPlant;
-using stageid::test::Trials;
+using namespace stageid;
+using namespace stageid::test;
 
 constexpr double kSampleRateHz = 200.0;
 constexpr double kNoise = 0.1;
@@ -47,7 +40,7 @@ constexpr double kLineDistanceHz = 0.5;  // of an axis
 /// One period in which each axis has lines 0.5 Hz apart, odd ones.
 LoopExperiment zippered(int axes) {
   LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = 800 * axes, .axes = axes};
-  x.lines = stageid::test::line_range(36 * axes + 1, 160 * axes + 1, 2);
+  x.lines = line_range(36 * axes + 1, 160 * axes + 1, 2);
   x.periods = 1;
   x.transient_periods = 0;
   x.scheme = AxisScheme::zippered;
@@ -62,35 +55,32 @@ void print(const char* what, const Trials& trials) {
 }
 
 void study_variance(int seeds, int outputs, int inputs) {
-  const SampledPlant plant = stageid::test::sampled_plant(
-      outputs, inputs, {{12.3, 0.1}, {24.0, 0.08}, {37.0, 0.06}}, kSampleRateHz, 0.1);
+  const SampledPlant plant =
+      sampled_plant(outputs, inputs, {{12.3, 0.1}, {24.0, 0.08}, {37.0, 0.06}}, kSampleRateHz, 0.1);
   LoopExperiment x = zippered(inputs);
   fmt::print("{} x {}, {} lines, half-power widths 6.4, 8.0, 10.6 times an axis' line distance\n",
              outputs, inputs, x.lines.size());
-  print("one period from rest, lpm",
-        stageid::test::repeat(plant, x, kNoise, {.method = FrfMethod::lpm}, seeds));
+  print("one period from rest, lpm", repeat(plant, x, kNoise, {.method = FrfMethod::lpm}, seeds));
   x.periods = 2;
   print("one period after one passed over",
-        stageid::test::repeat(plant, x, kNoise, {.transient_periods = 1}, seeds));
+        repeat(plant, x, kNoise, {.transient_periods = 1}, seeds));
   x.periods = 3;
   print("two periods after one passed over",
-        stageid::test::repeat(plant, x, kNoise, {.transient_periods = 1}, seeds));
+        repeat(plant, x, kNoise, {.transient_periods = 1}, seeds));
 }
 
 /// Three to six modes anywhere in the band, 2 to 12 distances of an axis' lines wide; stable in the loop.
 SampledPlant random_plant(int outputs, int inputs, std::uint64_t seed) {
-  stageid::test::ComplexNoise random(seed);
+  ComplexNoise random(seed);
   for (;;) {
-    std::vector<stageid::test::PlantMode> modes(3 +
-                                                static_cast<std::size_t>(4.0 * random.uniform()));
-    for (stageid::test::PlantMode& mode : modes) {
+    std::vector<PlantMode> modes(3 + static_cast<std::size_t>(4.0 * random.uniform()));
+    for (PlantMode& mode : modes) {
       const double width_hz = kLineDistanceHz * 2.0 * std::pow(6.0, random.uniform());
       mode = {9.0 + 31.0 * random.uniform(), 1.0 / (std::numbers::pi * width_hz)};
     }
-    const SampledPlant plant =
-        stageid::test::sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
+    const SampledPlant plant = sampled_plant(outputs, inputs, modes, kSampleRateHz, 0.1);
     const Eigen::MatrixXd closed = plant.A - plant.B * plant.K * plant.C;
-    if (stageid::eigenvalues(closed).cwiseAbs().maxCoeff() < 0.995) return plant;
+    if (eigenvalues(closed).cwiseAbs().maxCoeff() < 0.995) return plant;
   }
 }
 
@@ -111,8 +101,8 @@ void study_plants(int plants, int seeds, int outputs, int inputs, double noise) 
     double least = 1e9, most = 0.0;
     for (int p = 1; p <= plants; ++p) {
       const Trials trials =
-          stageid::test::repeat(random_plant(outputs, inputs, 1000 + static_cast<std::uint64_t>(p)),
-                                x, noise, record.options, seeds);
+          repeat(random_plant(outputs, inputs, 1000 + static_cast<std::uint64_t>(p)), x, noise,
+                 record.options, seeds);
       over += trials.over_stated / plants;
       bias += (trials.bias - 1.0) / seeds / plants;
       least = std::min(least, 1.0 / trials.over_stated);
@@ -132,7 +122,7 @@ void study_resonance(int seeds) {
   constexpr double kModeHz = 24.3;
   for (const double width : {0.5, 1.0, 1.5, 2.0, 4.0}) {
     const double width_hz = 0.5 * width;
-    const SampledPlant plant = stageid::test::sampled_plant(
+    const SampledPlant plant = sampled_plant(
         2, 2, {{12.3, 0.1}, {kModeHz, 1.0 / (std::numbers::pi * width_hz)}, {37.0, 0.05}},
         kSampleRateHz, 0.05);
     const double reach_hz = std::max(width_hz, 0.5);
@@ -144,10 +134,10 @@ void study_resonance(int seeds) {
     int found = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
       x.seed = static_cast<std::uint64_t>(seed);
-      const MemoryLog log = stageid::test::simulate_sampled_log(plant, x, kNoise);
-      const FrfEstimate frf = stageid::estimate_plant_frf({&log}, {.transient_periods = 2});
-      found += stageid::check_interpolation(frf).empty() ? 0 : 1;
-      const FrfEstimate near = stageid::select_band(frf, kModeHz - reach_hz, kModeHz + reach_hz);
+      const MemoryLog log = simulate_sampled_log(plant, x, kNoise);
+      const FrfEstimate frf = estimate_plant_frf({&log}, {.transient_periods = 2});
+      found += check_interpolation(frf).empty() ? 0 : 1;
+      const FrfEstimate near = select_band(frf, kModeHz - reach_hz, kModeHz + reach_hz);
       if (seed == 1) {
         sum.setZero(4, near.lines());
         squares = stated = Eigen::ArrayXXd::Zero(4, near.lines());
@@ -178,14 +168,14 @@ struct Errors {
   double far = 0.0;
 };
 
-Errors errors(const SampledPlant& plant, const std::vector<stageid::test::PlantMode>& modes,
-              LoopExperiment x, const FrfOptions& options, int seeds) {
+Errors errors(const SampledPlant& plant, const std::vector<PlantMode>& modes, LoopExperiment x,
+              const FrfOptions& options, int seeds) {
   double sums[2] = {0.0, 0.0};
   double counts[2] = {0.0, 0.0};
   for (int seed = 1; seed <= seeds; ++seed) {
     x.seed = static_cast<std::uint64_t>(seed);
-    const MemoryLog log = stageid::test::simulate_sampled_log(plant, x, kNoise);
-    const FrfEstimate frf = stageid::estimate_plant_frf({&log}, options);
+    const MemoryLog log = simulate_sampled_log(plant, x, kNoise);
+    const FrfEstimate frf = estimate_plant_frf({&log}, options);
     for (Eigen::Index k = 0; k < frf.lines(); ++k) {
       const double f = frf.frequency_hz[k];
       const bool near = std::any_of(modes.begin(), modes.end(), [f](const auto& mode) {
@@ -204,9 +194,9 @@ Errors errors(const SampledPlant& plant, const std::vector<stageid::test::PlantM
 void study_time(int seeds) {
   constexpr int kAxes = 4;
   for (const double decay_s : {0.2, 0.5, 2.0}) {
-    const std::vector<stageid::test::PlantMode> modes = {
+    const std::vector<PlantMode> modes = {
         {12.3, decay_s}, {17.0, 0.8 * decay_s}, {37.0, 0.5 * decay_s}};
-    const SampledPlant plant = stageid::test::sampled_plant(4, kAxes, modes, kSampleRateHz, 0.05);
+    const SampledPlant plant = sampled_plant(4, kAxes, modes, kSampleRateHz, 0.05);
     LoopExperiment zipped = zippered(kAxes);
     const double seconds = zipped.period_samples / kSampleRateHz;
     fmt::print("decay {:.1f} s: half-power widths {:.2g} ... {:.2g} times an axis' line distance\n",
@@ -220,7 +210,7 @@ void study_time(int seeds) {
     LoopExperiment all = zipped;
     all.scheme = AxisScheme::orthogonal;
     all.period_samples = 800;
-    all.lines = stageid::test::line_range(37, 161, 2);
+    all.lines = line_range(37, 161, 2);
     tell("orthogonal, one period each, lpm", seconds,
          errors(plant, modes, all, {.method = FrfMethod::lpm}, seeds));
     all.periods = 2;
@@ -232,15 +222,12 @@ void study_time(int seeds) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string_view what = argc > 1 ? argv[1] : "variance";
-  const auto number = [&](int at, int otherwise) {
-    return argc > at ? std::atoi(argv[at]) : otherwise;
-  };
+  const Arguments number(argc, argv);
+  const std::string_view what = number.word(1, "variance");
   if (what == "variance") study_variance(number(2, 30), number(3, 4), number(4, 13));
   if (what == "resonance") study_resonance(number(2, 200));
   if (what == "plants")
-    study_plants(number(2, 12), number(3, 20), number(4, 2), number(5, 2),
-                 argc > 6 ? std::atof(argv[6]) : kNoise);
+    study_plants(number(2, 12), number(3, 20), number(4, 2), number(5, 2), number(6, kNoise));
   if (what == "time") study_time(number(2, 10));
   return 0;
 }
