@@ -7,8 +7,7 @@
 #include <numeric>
 #include <random>
 
-namespace stageid {
-namespace {
+namespace stageid::test_assignment {
 
 using Pairs = std::vector<std::optional<Eigen::Index>>;
 
@@ -63,5 +62,4 @@ TEST(Assignment, PairsNothingAtTheLimit) {
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd(0, 2), 5.0), Pairs{});
 }
 
-}  // namespace
-}  // namespace stageid
+}  // namespace stageid::test_assignment

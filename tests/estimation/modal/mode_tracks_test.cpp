@@ -8,8 +8,7 @@
 #include <numbers>
 #include <random>
 
-namespace stageid {
-namespace {
+namespace stageid::test_mode_tracks {
 
 constexpr Eigen::Index kChannels = 12;  // 4 outputs x 3 inputs
 constexpr int kDays = 365;
@@ -201,5 +200,4 @@ TEST(DeviationsFromPast, AllowForTheDeviationOfTheValueItself) {
   EXPECT_TRUE(deviations_from_past({}, {}).empty());
 }
 
-}  // namespace
-}  // namespace stageid
+}  // namespace stageid::test_mode_tracks

@@ -16,8 +16,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_automatic_fit {
+namespace stageid::test_automatic_fit {
 
 /// The paper's stage on every third of its lines: quick, and the sharpest modes (0.2 % at 100 Hz)
 /// have hardly a line in their half-power width.
@@ -389,5 +388,4 @@ TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("total_variance")));
 }
 
-}  // namespace test_automatic_fit
-}  // namespace stageid
+}  // namespace stageid::test_automatic_fit

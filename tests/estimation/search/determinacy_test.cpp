@@ -9,8 +9,7 @@
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 
-namespace stageid {
-namespace test_determinacy {
+namespace stageid::test_determinacy {
 
 using testing::HasSubstr;
 
@@ -129,5 +128,4 @@ TEST(Determinacy, StartsAtRandomNeverEndUnstable) {
   }
 }
 
-}  // namespace test_determinacy
-}  // namespace stageid
+}  // namespace stageid::test_determinacy

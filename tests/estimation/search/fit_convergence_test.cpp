@@ -15,8 +15,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_fit_convergence {
+namespace stageid::test_fit_convergence {
 
 using test::DenseProblem;
 using test::moved;
@@ -304,5 +303,4 @@ TEST(FitThreads, DoNotChangeABit) {
   }
 }
 
-}  // namespace test_fit_convergence
-}  // namespace stageid
+}  // namespace stageid::test_fit_convergence

@@ -9,8 +9,7 @@
 #include "tests/support/process/heap_use.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_fit_memory {
+namespace stageid::test_fit_memory {
 
 constexpr double kBeyond = 0.2;  // of the data
 
@@ -126,5 +125,4 @@ TEST_F(FitMemory, DoesNotGrowWithADelayPerChannel) {
   EXPECT_LT(static_cast<double>(peak.bytes()), kBeyond * (given() + entry_));
 }
 
-}  // namespace test_fit_memory
-}  // namespace stageid
+}  // namespace stageid::test_fit_memory

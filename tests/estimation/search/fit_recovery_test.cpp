@@ -10,8 +10,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
-namespace stageid {
-namespace test_fit_recovery {
+namespace stageid::test_fit_recovery {
 
 using test::DenseProblem;
 
@@ -284,5 +283,4 @@ TEST(FitRecovery, ConjugatedDataAndRadiansForHertzAreNotFittedByTheTruth) {
   EXPECT_GT(fit_additive_model(radians, problem.model, stay).model.fit.relative_rms_error, 0.1);
 }
 
-}  // namespace test_fit_recovery
-}  // namespace stageid
+}  // namespace stageid::test_fit_recovery

@@ -10,8 +10,7 @@
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_fit_refusal {
+namespace stageid::test_fit_refusal {
 
 using test::DenseProblem;
 using test::moved;
@@ -123,5 +122,4 @@ TEST_F(FitRefusal, WeightsThatAreNotThere) {
   expect_refused("noise_variance");
 }
 
-}  // namespace test_fit_refusal
-}  // namespace stageid
+}  // namespace stageid::test_fit_refusal

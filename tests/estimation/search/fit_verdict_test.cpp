@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace test_late_channels {
+namespace stageid::test_late_channels {
 
 AdditiveModel with_delays(const Eigen::VectorXd& inputs_s, const Eigen::VectorXd& outputs_s) {
   AdditiveModel model;
@@ -58,5 +57,4 @@ TEST(DoubtfulDelay, IsUnknownByMoreThanASample) {
   EXPECT_THAT(findings(DelayModel::fixed, 1.1e-3), testing::IsEmpty());
 }
 
-}  // namespace test_late_channels
-}  // namespace stageid
+}  // namespace stageid::test_late_channels

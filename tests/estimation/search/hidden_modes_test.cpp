@@ -8,8 +8,7 @@
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_hidden_modes {
+namespace stageid::test_hidden_modes {
 
 constexpr double kNoise = 1e-2;
 
@@ -142,5 +141,4 @@ TEST(HiddenModes, WithoutAHiddenModeNothingChanges) {
   EXPECT_TRUE(after.decisions.empty());
 }
 
-}  // namespace test_hidden_modes
-}  // namespace stageid
+}  // namespace stageid::test_hidden_modes

@@ -7,8 +7,7 @@
 #include "estimation/search/structure_moves.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
-namespace stageid {
-namespace test_overlapping_modes {
+namespace stageid::test_overlapping_modes {
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
@@ -62,5 +61,4 @@ TEST(OverlappingModes, ABroadModeIsMergedOnce) {
   EXPECT_EQ(moves[1].flag, "merged 1100 and 1105 Hz");
 }
 
-}  // namespace test_overlapping_modes
-}  // namespace stageid
+}  // namespace stageid::test_overlapping_modes

@@ -15,8 +15,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_ranked_fit {
+namespace stageid::test_ranked_fit {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -208,5 +207,4 @@ TEST_F(CoincidentModes, ToFirstOrderTwoPlacesFollowFromTheNeighbourhoodOfOne) {
   for (const std::size_t i : {1U, 2U}) EXPECT_LT(second_share(apart->model.submodels[i]), 1e-9);
 }
 
-}  // namespace test_ranked_fit
-}  // namespace stageid
+}  // namespace stageid::test_ranked_fit

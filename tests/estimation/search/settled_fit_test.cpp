@@ -16,8 +16,7 @@
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_settled_fit {
+namespace stageid::test_settled_fit {
 
 using testing::HasSubstr;
 
@@ -218,5 +217,4 @@ TEST_F(SettledFit, WhereNothingHelpsTheFirstFitIsReturned) {
   EXPECT_TRUE(fit.decisions.empty());
 }
 
-}  // namespace test_settled_fit
-}  // namespace stageid
+}  // namespace stageid::test_settled_fit

@@ -14,8 +14,7 @@
 
 // Plants of random structure, fitted without any option and with one that is wrong.
 
-namespace stageid {
-namespace {
+namespace stageid::test_structure_search {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -184,5 +183,4 @@ TEST(StructureSearchFixed, PolesFarBelowTheLinesAreHeldWhereTheDataLeaveThemOpen
   EXPECT_GE(sound, 4);
 }
 
-}  // namespace
-}  // namespace stageid
+}  // namespace stageid::test_structure_search

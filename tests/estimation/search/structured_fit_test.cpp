@@ -8,8 +8,7 @@
 
 #include "tests/estimation/submodel_cases.hpp"
 
-namespace stageid {
-namespace test_structured_fit {
+namespace stageid::test_structured_fit {
 
 using test::DenseProblem;
 using test::Part;
@@ -157,5 +156,4 @@ TEST(StructuredFit, DoesNotDependOnTheNumberOfThreads) {
   }
 }
 
-}  // namespace test_structured_fit
-}  // namespace stageid
+}  // namespace stageid::test_structured_fit

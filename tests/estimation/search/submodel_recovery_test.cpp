@@ -8,8 +8,7 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 
-namespace stageid {
-namespace test_submodel_recovery {
+namespace stageid::test_submodel_recovery {
 
 using test::DenseProblem;
 using test::joined;
@@ -110,5 +109,4 @@ TEST_P(SubmodelRecovery, UnderWeightMatrices) {
 INSTANTIATE_TEST_SUITE_P(Of, SubmodelRecovery, testing::ValuesIn(cases()),
                          [](const auto& each) { return each.param.name; });
 
-}  // namespace test_submodel_recovery
-}  // namespace stageid
+}  // namespace stageid::test_submodel_recovery

@@ -7,8 +7,7 @@
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 
-namespace stageid {
-namespace test_suspension {
+namespace stageid::test_suspension {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -126,5 +125,4 @@ TEST(Suspension, OfKnownFrequenciesKeepsThem) {
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-8);
 }
 
-}  // namespace test_suspension
-}  // namespace stageid
+}  // namespace stageid::test_suspension

@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-namespace stageid {
-namespace part_of_data_test {
+namespace stageid::part_of_data_test {
 
 FrfEstimate frf_of(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines) {
   FrfEstimate frf;
@@ -93,5 +92,4 @@ TEST(PartOfData, ManyModesNeedManyLines) {
   EXPECT_EQ(part_of_data(frf, weighed(frf), model).frf.lines(), 2000);
 }
 
-}  // namespace part_of_data_test
-}  // namespace stageid
+}  // namespace stageid::part_of_data_test

@@ -18,8 +18,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
-namespace stageid {
-namespace test_frf_file {
+namespace stageid::test_frf_file {
 
 using test::numbered_frf;
 using testing::AllOf;
@@ -337,5 +336,4 @@ TEST_F(FrfFile, SpoiltDatasetsAreNamed) {
   EXPECT_THROW(write_frf(folder_ / "frf.h5", frf), std::invalid_argument);
 }
 
-}  // namespace test_frf_file
-}  // namespace stageid
+}  // namespace stageid::test_frf_file

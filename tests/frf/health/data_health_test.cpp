@@ -15,8 +15,7 @@
 #include "tests/support/stages/closed_loop.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_data_health {
+namespace stageid::test_data_health {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -340,5 +339,4 @@ TEST(DataHealth, AnUnexcitedActuatorThatMovesMoreThanTheNoiseIsAFault) {
   }
 }
 
-}  // namespace test_data_health
-}  // namespace stageid
+}  // namespace stageid::test_data_health

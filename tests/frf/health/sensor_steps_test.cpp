@@ -5,8 +5,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace {
+namespace stageid::test_sensor_steps {
 
 struct Examined {
   bool nonlinear;
@@ -51,5 +50,4 @@ TEST(SensorSteps, BelowTheNoiseAreNotTold) {
     EXPECT_TRUE(examined({.seed = seed, .noise = 0.01, .step = 0.01}).findings.empty());
 }
 
-}  // namespace
-}  // namespace stageid
+}  // namespace stageid::test_sensor_steps

@@ -9,8 +9,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_settling {
+namespace stageid::test_settling {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -159,5 +158,4 @@ TEST(Settling, AFindingThatExplainsItWithdrawsTheLinearityTest) {
   EXPECT_FALSE(frf.nonlinearity.nonlinear());
 }
 
-}  // namespace test_settling
-}  // namespace stageid
+}  // namespace stageid::test_settling

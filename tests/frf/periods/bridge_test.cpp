@@ -5,8 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace stageid {
-namespace test_bridge {
+namespace stageid::test_bridge {
 
 constexpr Eigen::Index kSamples = 100;
 
@@ -43,5 +42,4 @@ TEST(BridgeSamples, OneSampleBesideTheGapIsEnough) {
   EXPECT_EQ(periods[1], Eigen::MatrixXf::Ones(kSamples, 1));
 }
 
-}  // namespace test_bridge
-}  // namespace stageid
+}  // namespace stageid::test_bridge

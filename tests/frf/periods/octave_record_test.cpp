@@ -7,8 +7,7 @@
 
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_octave_record {
+namespace stageid::test_octave_record {
 
 using Eigen::Index;
 
@@ -102,5 +101,4 @@ TEST(OctaveRecord, IsCutWhereAPeriodIsMissing) {
   }
 }
 
-}  // namespace test_octave_record
-}  // namespace stageid
+}  // namespace stageid::test_octave_record

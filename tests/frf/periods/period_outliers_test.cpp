@@ -12,8 +12,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_period_outliers {
+namespace stageid::test_period_outliers {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -480,5 +479,4 @@ TEST(Outliers, LongRunsAreComparedInGroups) {
   EXPECT_EQ(frf.replaced_samples[1].period, 19);
 }
 
-}  // namespace test_period_outliers
-}  // namespace stageid
+}  // namespace stageid::test_period_outliers

@@ -14,8 +14,7 @@
 #include "tests/support/logs/told_findings.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
-namespace stageid {
-namespace test_sample_slip {
+namespace stageid::test_sample_slip {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -191,5 +190,4 @@ TEST(SampleSlip, IsTheSameForBothMethodsAndForTheRecordAlone) {
   EXPECT_LT(test::error_over_variance(lpm.frf, c.plant), 1.6);
 }
 
-}  // namespace test_sample_slip
-}  // namespace stageid
+}  // namespace stageid::test_sample_slip

@@ -17,8 +17,7 @@
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_start_transient {
+namespace stageid::test_start_transient {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -281,5 +280,4 @@ TEST_P(SettledNoise, IsNotCalledRinging) {
 INSTANTIATE_TEST_SUITE_P(OfAnyColour, SettledNoise,
                          testing::Values(Colour::white, Colour::low, Colour::modal, Colour::mixed));
 
-}  // namespace test_start_transient
-}  // namespace stageid
+}  // namespace stageid::test_start_transient

@@ -8,8 +8,7 @@
 #include "tests/support/logs/memory_log.hpp"
 #include "tests/support/models/certificate.hpp"
 
-namespace stageid {
-namespace test_certified_frf {
+namespace stageid::test_certified_frf {
 
 using nlohmann::json;
 using test::expect_digits;
@@ -48,5 +47,4 @@ TEST(CertifiedFrf, ResponseAndVariances) {
   }
 }
 
-}  // namespace test_certified_frf
-}  // namespace stageid
+}  // namespace stageid::test_certified_frf

@@ -8,8 +8,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_detection {
+namespace stageid::test_detection {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -171,5 +170,4 @@ TEST(Detection, SelectedOutputsKeepTheirRows) {
   EXPECT_EQ(part.nonlinearity.even.p_value.row(1), whole.nonlinearity.even.p_value.row(3));
 }
 
-}  // namespace test_detection
-}  // namespace stageid
+}  // namespace stageid::test_detection

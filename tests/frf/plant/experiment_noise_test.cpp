@@ -11,8 +11,7 @@
 #include "frf/response/covariance_smoothing.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_experiment_noise {
+namespace stageid::test_experiment_noise {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -193,5 +192,4 @@ TEST(ExperimentNoise, IsToldAndNotSmoothed) {
   EXPECT_TRUE(check_experiment_noise(estimate(even)).empty());
 }
 
-}  // namespace test_experiment_noise
-}  // namespace stageid
+}  // namespace stageid::test_experiment_noise

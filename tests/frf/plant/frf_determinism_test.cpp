@@ -5,8 +5,7 @@
 #include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_frf_determinism {
+namespace stageid::test_frf_determinism {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -69,5 +68,4 @@ TEST(FrfDeterminism, ProvenanceNamesFileHashAndOptionsButNoPlaceOrThread) {
   EXPECT_EQ(before, estimate_plant_frf({&log}).provenance_json);
 }
 
-}  // namespace test_frf_determinism
-}  // namespace stageid
+}  // namespace stageid::test_frf_determinism

@@ -8,8 +8,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_frf_uncertainty {
+namespace stageid::test_frf_uncertainty {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -264,5 +263,4 @@ TEST(FrfUncertainty, RunsOfUnequalLengthAreWeightedByTheirPeriods) {
   }
 }
 
-}  // namespace test_frf_uncertainty
-}  // namespace stageid
+}  // namespace stageid::test_frf_uncertainty

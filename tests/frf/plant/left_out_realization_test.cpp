@@ -8,8 +8,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_left_out_realization {
+namespace stageid::test_left_out_realization {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -112,5 +111,4 @@ TEST(LeftOutRealization, OneAtLeastIsNeeded) {
   EXPECT_THAT(test::error_message<FormatError>([&] { read_health_record({&log}, {}); }), wanted);
 }
 
-}  // namespace test_left_out_realization
-}  // namespace stageid
+}  // namespace stageid::test_left_out_realization

@@ -11,8 +11,7 @@
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_line_alignment {
+namespace stageid::test_line_alignment {
 
 using test::MemoryLog;
 using test::record_realizations;
@@ -100,5 +99,4 @@ TEST(PlantChange, OfAFewLinesAcrossOctavesIsFoundAndChanceIsNot) {
   EXPECT_EQ(by_chance, 0);
 }
 
-}  // namespace test_line_alignment
-}  // namespace stageid
+}  // namespace stageid::test_line_alignment

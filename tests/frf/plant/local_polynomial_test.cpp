@@ -8,8 +8,7 @@
 #include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_local_polynomial {
+namespace stageid::test_local_polynomial {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -180,5 +179,4 @@ TEST(LocalPolynomial, TheNumberOfThreadsDoesNotMatter) {
   EXPECT_NE(one.provenance_json.find(R"("method":"lpm")"), std::string::npos);
 }
 
-}  // namespace test_local_polynomial
-}  // namespace stageid
+}  // namespace stageid::test_local_polynomial

@@ -6,8 +6,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_plant_frf_errors {
+namespace stageid::test_plant_frf_errors {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -211,5 +210,4 @@ TEST(PlantFrfErrors, AFullCovarianceNeedsTwoPeriods) {
   expect_refused({&log}, {.covariance = CovarianceKind::full}, {"needs two clean periods"});
 }
 
-}  // namespace test_plant_frf_errors
-}  // namespace stageid
+}  // namespace stageid::test_plant_frf_errors

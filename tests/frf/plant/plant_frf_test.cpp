@@ -8,8 +8,7 @@
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_plant_frf {
+namespace stageid::test_plant_frf {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -360,5 +359,4 @@ TEST(PlantFrf, ProgressReachesTheTotal) {
   EXPECT_EQ(calls, 18);
 }
 
-}  // namespace test_plant_frf
-}  // namespace stageid
+}  // namespace stageid::test_plant_frf

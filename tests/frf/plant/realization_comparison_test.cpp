@@ -15,8 +15,7 @@
 #include "tests/support/logs/told_findings.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_realization_comparison {
+namespace stageid::test_realization_comparison {
 
 using test::MemoryLog;
 using test::record_realizations;
@@ -141,5 +140,4 @@ TEST(RealizationComparison, OfTwoRealizationsEitherMayBeWrong) {
   EXPECT_EQ(findings[0].realizations, (std::vector<int>{0, 1}));
 }
 
-}  // namespace test_realization_comparison
-}  // namespace stageid
+}  // namespace stageid::test_realization_comparison

@@ -10,8 +10,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_response_drift {
+namespace stageid::test_response_drift {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -152,5 +151,4 @@ TEST(ResponseDrift, ADriftThatMisleadsIsAFault) {
       << to_finding(drift).what;
 }
 
-}  // namespace test_response_drift
-}  // namespace stageid
+}  // namespace stageid::test_response_drift

@@ -14,8 +14,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
-namespace stageid {
-namespace test_shared_data {
+namespace stageid::test_shared_data {
 
 namespace fs = std::filesystem;
 
@@ -140,5 +139,4 @@ TEST(SharedData, FrequencyResponsesOfOtherProgramsLoad) {
   EXPECT_GT(files, 0);
 }
 
-}  // namespace test_shared_data
-}  // namespace stageid
+}  // namespace stageid::test_shared_data

@@ -12,8 +12,7 @@
 #include "frf/runs/run_table.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_step_search {
+namespace stageid::test_step_search {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -259,5 +258,4 @@ TEST(StepSearch, TheProvenanceTellsTheSteps) {
                              testing::HasSubstr("rounded towards zero")));
 }
 
-}  // namespace test_step_search
-}  // namespace stageid
+}  // namespace stageid::test_step_search

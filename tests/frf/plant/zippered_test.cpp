@@ -16,8 +16,7 @@
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_zippered {
+namespace stageid::test_zippered {
 
 using test::AxisScheme;
 using test::LoopExperiment;
@@ -338,5 +337,4 @@ TEST(Zippered, WhereTheInterpolationFailsIsSaid) {
   EXPECT_THAT(found[0].figure, HasSubstr("times the noise at 2"));
 }
 
-}  // namespace test_zippered
-}  // namespace stageid
+}  // namespace stageid::test_zippered

@@ -11,8 +11,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_confidence {
+namespace stageid::test_confidence {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -153,5 +152,4 @@ TEST(RelativeVariance, RefusesWhatHasNone) {
   EXPECT_THROW(mean_relative_variance(frf, VarianceKind::noise), std::invalid_argument);
 }
 
-}  // namespace test_confidence
-}  // namespace stageid
+}  // namespace stageid::test_confidence

@@ -11,8 +11,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_covariance_smoothing {
+namespace stageid::test_covariance_smoothing {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -92,5 +91,4 @@ TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
   EXPECT_NEAR((squares - sum.square()).mean() * 7.0, 1.0, 0.15);
 }
 
-}  // namespace test_covariance_smoothing
-}  // namespace stageid
+}  // namespace stageid::test_covariance_smoothing

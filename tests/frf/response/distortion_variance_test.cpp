@@ -7,8 +7,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_distortion_variance {
+namespace stageid::test_distortion_variance {
 
 constexpr Eigen::Index kLines = 400;
 
@@ -151,5 +150,4 @@ TEST(DistortionVariance, OfForcesIsCorrelatedBetweenTheOutputsAsTheResponseIs) {
   EXPECT_TRUE(covariance_with_distortion(frf, variance).isApprox(expected, 1e-12));
 }
 
-}  // namespace test_distortion_variance
-}  // namespace stageid
+}  // namespace stageid::test_distortion_variance

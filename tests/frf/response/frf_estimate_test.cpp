@@ -10,8 +10,7 @@
 #include "tests/support/models/numbered_frf.hpp"
 #include "tests/support/process/error_message.hpp"
 
-namespace stageid {
-namespace test_frf_estimate {
+namespace stageid::test_frf_estimate {
 
 using test::numbered_frf;
 using testing::AllOf;
@@ -180,5 +179,4 @@ INSTANTIATE_TEST_SUITE_P(
               "excluded_power: 2 values for 1 channels"}),
     [](const auto& fault) { return fault.param.name; });
 
-}  // namespace test_frf_estimate
-}  // namespace stageid
+}  // namespace stageid::test_frf_estimate

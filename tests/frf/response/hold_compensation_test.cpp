@@ -6,8 +6,7 @@
 #include <complex>
 #include <numbers>
 
-namespace stageid {
-namespace test_hold_compensation {
+namespace stageid::test_hold_compensation {
 
 using Complex = std::complex<double>;
 constexpr double kRate = 10000.0;
@@ -163,5 +162,4 @@ TEST(HoldCompensation, Errors) {
   EXPECT_THROW(compensate(frf, Compensation::hold, std::nan("")), std::invalid_argument);
 }
 
-}  // namespace test_hold_compensation
-}  // namespace stageid
+}  // namespace stageid::test_hold_compensation

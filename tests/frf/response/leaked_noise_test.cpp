@@ -7,8 +7,7 @@
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
-namespace stageid {
-namespace test_leaked_noise {
+namespace stageid::test_leaked_noise {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -140,5 +139,4 @@ TEST(LeakedNoise, TheErrorsOfALoopWithASlowForceHaveTheirVariance) {
   EXPECT_LT(mean, 1.2);
 }
 
-}  // namespace test_leaked_noise
-}  // namespace stageid
+}  // namespace stageid::test_leaked_noise

@@ -7,8 +7,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_neighbour_scatter {
+namespace stageid::test_neighbour_scatter {
 
 constexpr Eigen::Index kLines = 400;
 constexpr double kNoise = 1e-4;         // variance of the first channel
@@ -80,5 +79,4 @@ TEST(LineScatter, OfTooFewLinesNothingIsSaid) {
   EXPECT_EQ(scatter.over_noise, 0.0);
 }
 
-}  // namespace test_neighbour_scatter
-}  // namespace stageid
+}  // namespace stageid::test_neighbour_scatter

@@ -10,8 +10,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_nonlinearity {
+namespace stageid::test_nonlinearity {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -113,5 +112,4 @@ TEST(Nonlinearity, WithoutNoiseEveryBandThatIsDistortedIsNonlinear) {
   }
 }
 
-}  // namespace test_nonlinearity
-}  // namespace stageid
+}  // namespace stageid::test_nonlinearity

@@ -6,8 +6,7 @@
 #include <complex>
 #include <random>
 
-namespace stageid {
-namespace test_responding_channels {
+namespace stageid::test_responding_channels {
 
 /// Two channels of one input: responses of `first` and `second` standard deviations, in noise of one.
 FrfEstimate two_channels(double first, double second, std::uint64_t seed) {
@@ -55,5 +54,4 @@ TEST(RespondingChannels, ErrorsAreOverWhatIsFlaggedAndNotZero) {
   EXPECT_DOUBLE_EQ(relative_channel_error(error, power)[1], std::sqrt(1.25 / 2.0));
 }
 
-}  // namespace test_responding_channels
-}  // namespace stageid
+}  // namespace stageid::test_responding_channels

@@ -9,8 +9,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_channel_scan {
+namespace stageid::test_channel_scan {
 
 Eigen::VectorXd normal_samples(Eigen::Index n, std::uint64_t seed) {
   test::RandomNumbers random(seed);
@@ -111,5 +110,4 @@ TEST(ChannelScan, ClippedSamplesPileUpAndOthersDoNot) {
   }
 }
 
-}  // namespace test_channel_scan
-}  // namespace stageid
+}  // namespace stageid::test_channel_scan

@@ -9,8 +9,7 @@
 #include "tests/support/process/error_message.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_constant_channel {
+namespace stageid::test_constant_channel {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -69,5 +68,4 @@ TEST(ConstantActuator, IsNamed) {
                 named);
 }
 
-}  // namespace test_constant_channel
-}  // namespace stageid
+}  // namespace stageid::test_constant_channel

@@ -8,8 +8,7 @@
 
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_excitation_spectrum {
+namespace stageid::test_excitation_spectrum {
 
 constexpr int kPeriod = 4000;
 
@@ -104,5 +103,4 @@ TEST(ExcitationSpectrum, ZeroIsNothing) {
   EXPECT_TRUE(found.channels.empty());
 }
 
-}  // namespace test_excitation_spectrum
-}  // namespace stageid
+}  // namespace stageid::test_excitation_spectrum

@@ -8,8 +8,7 @@
 #include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_health_record {
+namespace stageid::test_health_record {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -143,5 +142,4 @@ TEST(HealthRecord, TheEvidenceOfTheStartStaysIfItsTransientCostsTheFirstPeriod) 
   EXPECT_EQ(both.health.start.runs.size(), before);
 }
 
-}  // namespace test_health_record
-}  // namespace stageid
+}  // namespace stageid::test_health_record

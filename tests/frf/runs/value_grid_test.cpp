@@ -4,8 +4,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace {
+namespace stageid::test_value_grid {
 
 Eigen::VectorXd gaussian(int count, std::uint64_t seed) {
   test::RandomNumbers random(seed);
@@ -51,5 +50,4 @@ TEST(ValueGrid, OfPartsIsThatOfTheWhole) {
   EXPECT_EQ(whole.step(), 0.0);
 }
 
-}  // namespace
-}  // namespace stageid
+}  // namespace stageid::test_value_grid

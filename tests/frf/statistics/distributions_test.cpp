@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace stageid {
-namespace test_distributions {
+namespace stageid::test_distributions {
 
 // scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows without intermediate scaling.
 TEST(Distributions, LogTailOfFIsThatOfScipy) {
@@ -83,5 +82,4 @@ TEST(Distributions, StaysANumberHoweverCleanTheDataAre) {
   EXPECT_EQ(tail_of_evidence(1e300, 5), 0.0);
 }
 
-}  // namespace test_distributions
-}  // namespace stageid
+}  // namespace stageid::test_distributions

@@ -6,8 +6,7 @@
 
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_local_fit {
+namespace stageid::test_local_fit {
 
 using test::ComplexNoise;
 
@@ -152,5 +151,4 @@ TEST(LocalFit, VariancesOfAMeanOverPolesScatterAsTheirDegreesOfFreedomSay) {
   }
 }
 
-}  // namespace test_local_fit
-}  // namespace stageid
+}  // namespace stageid::test_local_fit

@@ -7,8 +7,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_order_statistic {
+namespace stageid::test_order_statistic {
 
 TEST(OrderStatistic, IsWhereSortingPutsIt) {
   test::RandomNumbers random(5);
@@ -28,5 +27,4 @@ TEST(OrderStatistic, IsWhereSortingPutsIt) {
   EXPECT_EQ(median(three), 2.0);
 }
 
-}  // namespace test_order_statistic
-}  // namespace stageid
+}  // namespace stageid::test_order_statistic

@@ -11,8 +11,7 @@
 #include "frf/wiring/skew_check.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_connected_blocks {
+namespace stageid::test_connected_blocks {
 
 using Index = Eigen::Index;
 
@@ -126,5 +125,4 @@ TEST(SkewOfBlocks, ABlockOfTwoSaysWhatItNeeds) {
   EXPECT_NE(one.unchecked.find("decoupled"), std::string::npos);
 }
 
-}  // namespace test_connected_blocks
-}  // namespace stageid
+}  // namespace stageid::test_connected_blocks

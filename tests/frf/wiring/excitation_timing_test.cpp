@@ -10,8 +10,7 @@
 #include "tests/support/logs/told_findings.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
-namespace stageid {
-namespace test_excitation_timing {
+namespace stageid::test_excitation_timing {
 
 using Eigen::Index;
 using test::MemoryLog;
@@ -103,5 +102,4 @@ TEST(ExcitationTiming, ActuatorsThatAreLateAreNotTakenForIt) {
   }
 }
 
-}  // namespace test_excitation_timing
-}  // namespace stageid
+}  // namespace stageid::test_excitation_timing

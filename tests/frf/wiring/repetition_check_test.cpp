@@ -6,8 +6,7 @@
 #include "frf/health/data_health.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
-namespace stageid {
-namespace test_repetition_check {
+namespace stageid::test_repetition_check {
 
 using test::LoopExperiment;
 using test::MemoryLog;
@@ -81,5 +80,4 @@ TEST(Repetition, TheExcitationNeedNotBeAtTheActuators) {
   EXPECT_EQ(check_log(log).size(), 1U);
 }
 
-}  // namespace test_repetition_check
-}  // namespace stageid
+}  // namespace stageid::test_repetition_check

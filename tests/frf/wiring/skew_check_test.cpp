@@ -9,8 +9,7 @@
 #include "frf/runs/channel_choice.hpp"
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_skew_check {
+namespace stageid::test_skew_check {
 
 using Index = Eigen::Index;
 
@@ -148,5 +147,4 @@ TEST(SkewCheck, TooMuchNoiseIsNotCheckedRatherThanFine) {
   EXPECT_NE(check.unchecked.find("above the noise"), std::string::npos) << check.unchecked;
 }
 
-}  // namespace test_skew_check
-}  // namespace stageid
+}  // namespace stageid::test_skew_check

@@ -7,8 +7,7 @@
 
 #include "tests/support/process/random_numbers.hpp"
 
-namespace stageid {
-namespace test_stage_wiring_check {
+namespace stageid::test_stage_wiring_check {
 
 using Index = Eigen::Index;
 
@@ -95,5 +94,4 @@ TEST(StageWiring, ASuspensionThatTheMotionStiffensIsNotAFactor) {
   EXPECT_EQ(told, 0);
 }
 
-}  // namespace test_stage_wiring_check
-}  // namespace stageid
+}  // namespace stageid::test_stage_wiring_check
