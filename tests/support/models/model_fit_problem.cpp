@@ -1,5 +1,7 @@
 #include "tests/support/models/model_fit_problem.hpp"
 
+#include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "tests/support/logs/memory_log.hpp"
@@ -22,6 +24,15 @@ Submodel empty_submodel(const AdditiveModel& model, int integrators, std::vector
   s.denominator.insert(s.denominator.end(), a.begin(), a.end());
   s.numerator.assign(matrices, Eigen::MatrixXd::Zero(model.n_outputs(), model.n_inputs()));
   return s;
+}
+
+Submodel empty_mode(const AdditiveModel& model, double frequency_hz, double damping_ratio,
+                    int matrices) {
+  return empty_submodel(model, 0, mode_coefficients(frequency_hz, damping_ratio), matrices);
+}
+
+void measure(DenseProblem& problem) {
+  problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
 }
 
 FitProblem fit_problem(const DenseProblem& problem, DelayModel delay) {
@@ -73,6 +84,25 @@ FrfEstimate frf_of(const DenseProblem& problem) {
   frf.sample_rate_hz = problem.model.sample_rate_hz;
   frf.hold = problem.hold == HoldModel::none ? Hold::none : Hold::zoh;
   return frf;
+}
+
+void add_noise(FrfEstimate& frf, RandomNumbers& random) {
+  for (Eigen::Index i = 0; i < frf.response.size(); ++i)
+    frf.response(i) += std::sqrt(frf.noise_variance(i)) * random.circular();
+}
+
+void add_relative_noise(Eigen::MatrixXcd& response, double relative, RandomNumbers& random) {
+  for (std::complex<double>& value : response.reshaped())
+    value *= 1.0 + relative * random.circular();
+}
+
+FitOptions fit_options(Weighting weighting, HoldModel hold, DelayModel delay, double delay_s) {
+  FitOptions options;
+  options.weighting = weighting;
+  options.hold = hold;
+  options.delay = delay;
+  options.delay_s = delay_s;
+  return options;
 }
 
 }  // namespace stageid::test

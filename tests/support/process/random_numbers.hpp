@@ -69,4 +69,23 @@ inline Eigen::MatrixXd random_matrix(RandomNumbers& random, Eigen::Index rows,
   return out;
 }
 
+inline Eigen::MatrixXcd circular_matrix(RandomNumbers& random, Eigen::Index rows,
+                                        Eigen::Index columns) {
+  Eigen::MatrixXcd out(rows, columns);
+  for (std::complex<double>& value : out.reshaped()) value = random.circular();
+  return out;
+}
+
+/// L with C = L L^H; Eigen's takes seconds to compile.
+inline Eigen::MatrixXcd cholesky(const Eigen::MatrixXcd& C) {
+  Eigen::MatrixXcd L = Eigen::MatrixXcd::Zero(C.rows(), C.cols());
+  for (Eigen::Index j = 0; j < C.cols(); ++j)
+    for (Eigen::Index i = j; i < C.rows(); ++i) {
+      std::complex<double> rest = C(i, j);
+      for (Eigen::Index k = 0; k < j; ++k) rest -= L(i, k) * std::conj(L(j, k));
+      L(i, j) = i == j ? std::sqrt(rest.real()) : rest / L(j, j).real();
+    }
+  return L;
+}
+
 }  // namespace stageid::test
