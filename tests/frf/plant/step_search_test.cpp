@@ -10,7 +10,7 @@
 
 #include "frf/plant/plant_frf.hpp"
 #include "frf/runs/run_table.hpp"
-#include "tests/support/stages/sampled_loop.hpp"
+#include "tests/support/models/estimate_trials.hpp"
 
 namespace stageid::test_step_search {
 
@@ -57,15 +57,7 @@ MemoryLog stepped_log(double first, double second, std::uint64_t seed, double no
 
 /// Mean of |G - truth|^2 / total variance.
 double misfit(const FrfEstimate& frf, const SampledPlant& plant) {
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd truth =
-        plant.response(2.0 * std::numbers::pi * frf.frequency_hz[k], frf.sample_rate_hz);
-    sum += ((frf.response.col(k) - truth.reshaped()).array().abs2() /
-            frf.total_variance.col(k).array())
-               .mean();
-  }
-  return sum / static_cast<double>(frf.lines());
+  return test::error_over(frf.total_variance, frf, plant);
 }
 
 std::vector<ActuatorStep> steps_in(const MemoryLog& log) {
@@ -230,10 +222,12 @@ TEST(StepSearch, AGlitchCostsItsPeriod) {
             0.1 * by_mark.total_variance.sum());
 }
 
-TEST(StepSearch, NumberOfThreadsDoesNotMatter) {
+TEST(StepSearch, NumberOfThreadsDoesNotMatterAndTheProvenanceTellsTheSteps) {
   const MemoryLog log = stepped_log(0.2, 0.3, 2, 1e-3);
-  EXPECT_EQ(estimate_plant_frf({&log}, {.threads = 1}).response,
-            estimate_plant_frf({&log}, {.threads = 4}).response);
+  const FrfEstimate frf = estimate_plant_frf({&log}, {.threads = 1});
+  EXPECT_EQ(frf.response, estimate_plant_frf({&log}, {.threads = 4}).response);
+  EXPECT_THAT(frf.provenance_json, testing::AllOf(testing::HasSubstr("actuator_steps"),
+                                                  testing::HasSubstr("rounded towards zero")));
 }
 
 // An interrupt comes as an exception of the progress function.
@@ -248,14 +242,6 @@ TEST(StepSearch, TheSearchTellsItsProgressAndCanBeInterrupted) {
   EXPECT_EQ(last, 1.0);
   options.progress = [](double, double) { throw std::runtime_error("interrupted"); };
   EXPECT_THROW(find_actuator_steps(realizations, frf, options), std::runtime_error);
-}
-
-// The provenance lists step and rounding of each actuator.
-TEST(StepSearch, TheProvenanceTellsTheSteps) {
-  const MemoryLog log = stepped_log(0.2, 0.3, 2);
-  EXPECT_THAT(estimate_plant_frf({&log}).provenance_json,
-              testing::AllOf(testing::HasSubstr("actuator_steps"),
-                             testing::HasSubstr("rounded towards zero")));
 }
 
 }  // namespace stageid::test_step_search

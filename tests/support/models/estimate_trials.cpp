@@ -1,6 +1,6 @@
 #include "tests/support/models/estimate_trials.hpp"
 
-#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 namespace stageid::test {
@@ -37,13 +37,27 @@ Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_std,
   return trials;
 }
 
-double error_over_variance(const FrfEstimate& frf, const SampledPlant& plant) {
+double error_over(const Eigen::MatrixXd& variance, const FrfEstimate& frf,
+                  const SampledPlant& plant) {
   double sum = 0.0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const Eigen::MatrixXcd G = plant.response(frf.omega_rad_s()[k], frf.sample_rate_hz);
-    sum += ((frf.at(k) - G).reshaped().array().abs2() / frf.noise_variance.col(k).array()).mean();
+    sum += ((frf.at(k) - G).reshaped().array().abs2() / variance.col(k).array()).mean();
   }
   return sum / static_cast<double>(frf.lines());
+}
+
+double error_over_variance(const FrfEstimate& frf, const SampledPlant& plant) {
+  return error_over(frf.noise_variance, frf, plant);
+}
+
+double largest_error(const FrfEstimate& frf, const SampledPlant& plant) {
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    const Eigen::MatrixXcd G = plant.response(frf.omega_rad_s()[k], frf.sample_rate_hz);
+    largest = std::max(largest, (frf.at(k) - G).norm() / G.norm());
+  }
+  return largest;
 }
 
 }  // namespace stageid::test

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+
 #include "frf/plant/plant_frf.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
@@ -18,5 +20,10 @@ Trials repeat(const SampledPlant& plant, LoopExperiment x, double noise_std,
 
 /// Mean over lines and entries of |G - truth|^2 over the stated variance; 1 if the variance is right.
 double error_over_variance(const FrfEstimate& frf, const SampledPlant& plant);
+double error_over(const Eigen::MatrixXd& variance, const FrfEstimate& frf,
+                  const SampledPlant& plant);
+
+/// Over the lines, of |G - truth| / |truth|.
+double largest_error(const FrfEstimate& frf, const SampledPlant& plant);
 
 }  // namespace stageid::test
