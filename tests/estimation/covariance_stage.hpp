@@ -15,7 +15,7 @@ inline DenseProblem covariance_stage() {
       stage_2x3(HoldModel::exact, random, {{310.0, 0.02}, {900.0, 0.015}, {936.0, 0.015}});
   problem.model.hold = HoldModel::exact;
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(180, 40.0, 1500.0);
-  problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
+  measure(problem);
   const double floor = 1e-3 * problem.G.cwiseAbs().mean();
   problem.W = (problem.G.cwiseAbs2() * 1e-4).array() + floor * floor;
   problem.W = problem.W.cwiseInverse().eval();

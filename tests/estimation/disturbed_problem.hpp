@@ -5,8 +5,6 @@
 #include <vector>
 
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test {
 
@@ -20,7 +18,7 @@ inline void measure_and_disturb(RandomNumbers& random, DenseProblem& problem, do
       size *= time_scale_s;
     }
   }
-  problem.G = reference_response(problem.model, problem.frequency_hz, problem.hold);
+  measure(problem);
   const double scale = problem.G.cwiseAbs().mean();
   problem.W.resize(problem.G.rows(), problem.G.cols());
   for (Eigen::Index k = 0; k < problem.G.cols(); ++k)

@@ -1,14 +1,12 @@
 #pragma once
 
-#include <cmath>
 #include <complex>
 #include <numbers>
 #include <vector>
 
 #include "estimation/model/poles.hpp"
+#include "estimation/search/structured_fit.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/stages/random_stage.hpp"
 
 // Plants of any submodels, two inputs and two outputs, 400 lines from 5 to 999 Hz.
 
@@ -35,61 +33,16 @@ struct Part {  ///< its poles, and the degree of its numerator
 };
 
 /// Numerators at random, all powers of s of like weight in the middle of the band.
-inline DenseProblem measured(const std::vector<Part>& parts, HoldModel hold, double delay_s) {
-  RandomNumbers random(17);
-  DenseProblem problem;
-  problem.model = named_model(2, 2);
-  problem.hold = hold;
-  if (hold != HoldModel::none) problem.model.sample_rate_hz = 4000.0;
-  problem.frequency_hz = Eigen::VectorXd::LinSpaced(400, 5.0, 999.0);
-  for (const Part& part : parts) {
-    const Eigen::VectorXd a = denominator_of(part.poles);
-    Submodel s =
-        empty_submodel(problem.model, part.integrators, {a.begin(), a.end()}, part.degree + 1);
-    double size = std::pow(kMiddleRad, part.integrators);
-    for (Eigen::MatrixXd& B : s.numerator) {
-      for (double& value : B.reshaped()) value = size * random.normal();
-      size /= kMiddleRad;
-    }
-    problem.model.submodels.push_back(std::move(s));
-  }
-  problem.model.input_delay_s.setConstant(2, delay_s);
-  problem.model.output_delay_s.setZero(2);
-  problem.G = reference_response(problem.model, problem.frequency_hz, hold);
-  return problem;
-}
+DenseProblem measured(const std::vector<Part>& parts, HoldModel hold, double delay_s);
 
 /// Every pole moved by 2 % and a third less damped, numerators zero.
-inline AdditiveModel start_of(const std::vector<Part>& parts, const DenseProblem& problem) {
-  AdditiveModel start;
-  double move = 1.02;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    Poles poles = parts[i].poles;
-    for (std::complex<double>& pole : poles) {
-      pole = {pole.real() * (pole.imag() == 0.0 ? move : 0.7), pole.imag() * move};
-      if (pole.imag() <= 0.0) move = 1.0 / move;  // the second of a pair, or a real one
-    }
-    Submodel s = problem.model.submodels[i];
-    const Eigen::VectorXd a = denominator_of(poles);
-    s.denominator.assign(1, 1.0);
-    s.denominator.insert(s.denominator.end(), a.begin(), a.end());
-    for (Eigen::MatrixXd& B : s.numerator) B.setZero();
-    s.role = SubmodelRole::given;
-    start.submodels.push_back(std::move(s));
-  }
-  return start;
-}
+AdditiveModel start_of(const std::vector<Part>& parts, const DenseProblem& problem);
 
 /// With circular noise of the given part of the mean magnitude, and its variance.
-inline FrfEstimate noisy(const DenseProblem& problem, double part, std::uint64_t seed) {
-  FrfEstimate frf = frf_of(problem);
-  const double deviation = part * frf.response.cwiseAbs().mean();
-  RandomNumbers random(seed);
-  for (std::complex<double>& value : frf.response.reshaped())
-    value += deviation * random.circular();
-  frf.noise_variance =
-      Eigen::MatrixXd::Constant(frf.response.rows(), frf.response.cols(), deviation * deviation);
-  return frf;
-}
+FrfEstimate noisy(const DenseProblem& problem, double part, std::uint64_t seed);
+
+/// A fit of these submodels, without a rigid body, and of these modes only.
+FitResult fit_submodels(const FrfEstimate& frf, std::vector<SubmodelRequest> submodels,
+                        const FitOptions& options = {}, std::vector<ModeCandidate> modes = {});
 
 }  // namespace stageid::test

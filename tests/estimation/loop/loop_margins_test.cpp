@@ -7,7 +7,6 @@
 
 #include "estimation/loop/loop_view.hpp"
 #include "tests/estimation/loop_cases.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_loop_margins {
 
@@ -142,8 +141,7 @@ TEST(LoopMargins, HaveTheScatterOfModelsWithThisCovariance) {
   constexpr int kTrials = 300;
   Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(std::ssize(told));
   for (int trial = 0; trial < kTrials; ++trial) {
-    Eigen::VectorXd noise(x.size());
-    for (double& value : noise) value = random.normal();
+    const Eigen::VectorXd noise = test::random_vector(random, x.size());
     const std::vector<Margin> other = list_of(
         loop_margins(test::with_parameters(model, delays, x + R * noise), controller, kUnknown));
     ASSERT_EQ(other.size(), told.size());
@@ -173,8 +171,7 @@ TEST(LoopView, DiscsContainTheCurvesOfModelsWithThisCovariance) {
   int inside = 0;
   int all = 0;
   for (int trial = 0; trial < 200; ++trial) {
-    Eigen::VectorXd noise(x.size());
-    for (double& value : noise) value = random.normal();
+    const Eigen::VectorXd noise = test::random_vector(random, x.size());
     const AdditiveModel other = test::with_parameters(model, 0, x + deviation.asDiagonal() * noise);
     const auto points = loop_points(other, controller, lines, false);
     for (Eigen::Index k = 0; k < lines.size(); ++k) {

@@ -2,12 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/loop_cases.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_response_gradient {
 
@@ -39,46 +38,35 @@ void expect_differences(const AdditiveModel& model, Eigen::Index delays) {
 }
 
 TEST(ResponseGradient, IsTheDerivativeOfTheSampledResponse) {
-  const AdditiveModel model = test::model_of({});
+  AdditiveModel model = test::model_of({});
   expect_differences(model, 0);
   expect_differences(model, 1);
-}
-
-TEST(ResponseGradient, HasADelayPerChannel) {
-  AdditiveModel model = test::model_of({});
+  const Eigen::Index n = parameters_of(model, 0).size();
+  for (const Eigen::Index other : {n + 2, n - 1})
+    EXPECT_THROW(ResponseGradient(model, other, Eigen::VectorXd{{20.0}}), std::invalid_argument);
   model.input_delay_s = Eigen::VectorXd{{1.1e-4, 1.3e-4, 0.2e-4}};
   model.output_delay_s = Eigen::VectorXd{{2.9e-4, 2.1e-4}};
   expect_differences(model, 4);
 }
 
-TEST(ResponseGradient, RefusesACovarianceOfAnotherModel) {
-  const AdditiveModel model = test::model_of({});
-  const Eigen::Index n = parameters_of(model, 0).size();
-  EXPECT_THROW(ResponseGradient(model, n + 2, Eigen::VectorXd{{20.0}}), std::invalid_argument);
-  EXPECT_THROW(ResponseGradient(model, n - 1, Eigen::VectorXd{{20.0}}), std::invalid_argument);
-}
-
 TEST(LoopPoint, IsALoopOpenedAloneAndItsDerivative) {
   test::RandomNumbers random(8);
-  const auto matrix = [&](Eigen::Index rows, Eigen::Index columns) {
-    Eigen::MatrixXcd out(rows, columns);
-    for (std::complex<double>& entry : out.reshaped()) entry = random.circular();
-    return out;
-  };
-  const Eigen::MatrixXcd K = matrix(3, 2);
-  const Eigen::MatrixXcd P = matrix(2, 4);
+  const Eigen::MatrixXcd K = test::circular_matrix(random, 3, 2);
+  const Eigen::MatrixXcd P = test::circular_matrix(random, 2, 4);
   LoopController controller;
-  controller.actuators = matrix(4, 3).real();
+  controller.actuators = test::circular_matrix(random, 4, 3).real();
   const Eigen::MatrixXcd T = controller.actuators.cast<std::complex<double>>();
   const LoopPoint point = loop_point(controller, K, P, true);
+  const Eigen::MatrixXcd PT = P * T;
   const Eigen::MatrixXcd one = Eigen::MatrixXcd::Identity(2, 2);
   for (Eigen::Index k = 0; k < 3; ++k) {
     Eigen::MatrixXcd others = K;
     others.row(k).setZero();
-    const Eigen::MatrixXcd closed = (one + P * T * others).inverse() * P;
+    const Eigen::MatrixXcd closed = solve(one + PT * others, P);
     EXPECT_LT(std::abs(point.loop[k] - (K.row(k) * closed * T.col(k)).value()), 1e-12);
   }
-  EXPECT_LT(std::abs(point.determinant - (one + P * T * K).determinant()), 1e-12);
+  const Eigen::MatrixXcd L = one + PT * K;
+  EXPECT_LT(std::abs(point.determinant - (L(0, 0) * L(1, 1) - L(0, 1) * L(1, 0))), 1e-12);
   for (Eigen::Index c = 0; c < P.size(); ++c) {
     const double step = 1e-6;
     Eigen::MatrixXcd moved = P;

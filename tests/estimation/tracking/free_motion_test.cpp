@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
-
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/tracked_stage.hpp"
 
 namespace stageid::test_free_motion {
@@ -20,7 +19,7 @@ double left(const Eigen::MatrixXcd& spectrum, const Eigen::MatrixXcd& motions) {
   columns << motions.real(), motions.imag();
   Eigen::VectorXd y(columns.rows());
   y << spectrum.reshaped().real(), spectrum.reshaped().imag();
-  return (y - columns * columns.colPivHouseholderQr().solve(y)).norm() / y.norm();
+  return (y - columns * least_squares(pivoted_qr(columns), y)).norm() / y.norm();
 }
 
 // Against sums over the samples of decaying oscillations.

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -13,7 +12,9 @@
 #include <vector>
 
 #include "estimation/tracking/tracked_response.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/tracked_stage.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_model_tracker {
 
@@ -110,7 +111,7 @@ TEST(ModelTracker, TheResponseHasTheTrackedChangesAndTheirCovariance) {
   const Eigen::MatrixXcd P = w.tracker.response();
   EXPECT_EQ(P, response.at(x));
   // By differences, along the principal directions of the covariance.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(w.tracker.covariance());
+  const auto axes = symmetric_eigen(w.tracker.covariance());
   Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(P.rows(), P.cols());
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const Eigen::VectorXd step =
@@ -308,8 +309,9 @@ TEST(ModelTracker, AnExcitationThatShowsAModeCorrectsOneThatDoesNot) {
 TEST(ModelTracker, RefusesWhatItCannotTrack) {
   const auto refused = [](TrackerOptions options, const AdditiveModel& model,
                           const Eigen::VectorXd& lines_hz, const char* message) {
-    EXPECT_THAT([&] { ModelTracker(model, lines_hz, options); },
-                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(message)));
+    EXPECT_THAT(
+        test::error_message<std::invalid_argument>([&] { ModelTracker(model, lines_hz, options); }),
+        testing::HasSubstr(message));
   };
   const AdditiveModel model = model_of({});
   const Eigen::VectorXd lines_hz = tracked_lines_hz();

@@ -106,7 +106,7 @@ void expect_derivatives(const AdditiveModel& model, const std::string& what) {
   const TrackedResponse response = response_of(model);
   const Eigen::VectorXd x = changes(response);
   test::RandomNumbers random(5);
-  const Eigen::MatrixXcd U = test::random_spectra(random, 3, tracked_lines_hz().size());
+  const Eigen::MatrixXcd U = test::circular_matrix(random, 3, tracked_lines_hz().size());
   const Eigen::MatrixXcd derivatives = response.derivatives(x, U);
   ASSERT_EQ(derivatives.cols(), x.size());
   for (Eigen::Index p = 0; p < x.size(); ++p) {

@@ -2,72 +2,39 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
-#include "tests/estimation/delayed_fit_options.hpp"
+#include "tests/estimation/repeated_fits.hpp"
 
 namespace stageid::test_covariance_monte_carlo {
 
 using test::covariance_stage;
 using test::DenseProblem;
 using test::kRuns;
-using test::noisy;
 using test::options_with;
 
-/// Fits kRuns noisy measurements. Checks the scatter relative to the reported deviations, also of the response.
+/// Fits noisy measurements. Checks the scatter relative to the reported deviations, also of the response.
 void expect_honest(Weighting weighting, const Eigen::MatrixXd& variance, bool tell_variance) {
   const DenseProblem problem = covariance_stage();
   test::RandomNumbers random(77);
-  FitOptions options = options_with(weighting);
-  options.threads = 1;
-  constexpr Eigen::Index kQuantities = 6;  // f and zeta of three modes
-  Eigen::MatrixXd values(kQuantities, kRuns);
-  Eigen::VectorXd reported = Eigen::VectorXd::Zero(kQuantities);
-  Eigen::VectorXd response_ratio(kRuns);
-  Eigen::VectorXd channel_ratio = Eigen::VectorXd::Zero(problem.channels());
-  const auto n_numerators = 4 * problem.channels();
-  Eigen::MatrixXd numerators(n_numerators, kRuns);
-  Eigen::VectorXd numerators_reported = Eigen::VectorXd::Zero(n_numerators);
-  for (int run = 0; run < kRuns; ++run) {
-    FrfEstimate frf = test::frf_of(problem);
-    frf.response = noisy(random, problem, variance);
-    if (tell_variance) frf.noise_variance = variance;
-    const FitResult fit = fit_additive_model(frf, problem.model, options);
-    ASSERT_TRUE(fit.trustworthy()) << fit.message();
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      const Submodel& s = fit.model.submodels[i + 1];
-      values(2 * i, run) = s.natural_frequency_hz();
-      values(2 * i + 1, run) = s.damping_ratio();
-      reported[2 * i] += std::pow(*s.natural_frequency_std_hz, 2) / kRuns;
-      reported[2 * i + 1] += std::pow(*s.damping_ratio_std, 2) / kRuns;
-    }
-    for (Eigen::Index i = 0; i < 4; ++i) {
-      const Submodel& s = fit.model.submodels[i];
-      const auto rows = Eigen::seqN(i * problem.channels(), problem.channels());
-      numerators(rows, run) = s.numerator[0].reshaped();
-      numerators_reported(rows) += s.numerator_std[0].reshaped().cwiseAbs2() / kRuns;
-    }
-    const Eigen::MatrixXd ratio =
-        (test::reference_response(fit.model, problem.frequency_hz, problem.hold) - problem.G)
-            .cwiseAbs2()
-            .cwiseQuotient(fit.response_variance);
-    response_ratio[run] = ratio.mean();
-    channel_ratio += ratio.rowwise().mean() / kRuns;
-  }
-  test::expect_honest(test::scatter_of(values), reported);
-  for (Eigen::Index q = 0; q < kQuantities; ++q) {
+  const test::RepeatedFits fits =
+      test::repeat_fits(problem, options_with(weighting), [&](std::uint64_t) {
+        FrfEstimate frf = test::noisy_frf(random, problem, variance);
+        if (!tell_variance) frf.noise_variance.resize(0, 0);
+        return frf;
+      });
+  test::expect_honest(fits.scatter, fits.reported);
+  for (Eigen::Index q = 0; q < 6; ++q) {
     // Unbiased within the scatter of the mean.
     const Submodel& truth = problem.model.submodels[q / 2 + 1];
-    EXPECT_NEAR(values.row(q).mean(),
-                q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
-                4.0 * std::sqrt(reported[q] / kRuns));
+    EXPECT_NEAR(fits.mean[q], q % 2 == 0 ? truth.natural_frequency_hz() : truth.damping_ratio(),
+                4.0 * std::sqrt(fits.reported[q] / kRuns));
   }
-  test::expect_honest(test::scatter_of(numerators), numerators_reported);
-  const double error = std::sqrt(test::scatter_of(response_ratio.transpose())[0] / kRuns);
-  EXPECT_NEAR(response_ratio.mean(), 1.0, 4.0 * error);
+  EXPECT_NEAR(fits.mean_response_ratio(), 1.0, 4.0 * fits.response_ratio_error());
   // A channel has 4 numerators and a share of the poles: about 8 real degrees a run.
-  for (const double ratio : channel_ratio)
+  for (const double ratio : fits.response_ratio.rowwise().mean())
     EXPECT_NEAR(ratio, 1.0, 4.0 * std::sqrt(2.0 / (8.0 * kRuns)) * 1.5);
 }
 
@@ -108,8 +75,8 @@ TEST(CovarianceMonteCarlo, DistortionOfFewRealizations) {
     std::vector<Eigen::MatrixXcd> responses(kRealizations, problem.G);
     for (Eigen::MatrixXcd& G : responses)
       for (Eigen::Index k = 0; k < G.cols(); ++k) {
-        const Eigen::MatrixXcd force = Eigen::MatrixXcd::NullaryExpr(
-            kInputs, kInputs, [&] { return kDistortion * random.circular(); });
+        const Eigen::MatrixXcd force =
+            kDistortion * test::circular_matrix(random, kInputs, kInputs);
         const Eigen::MatrixXcd exact = problem.G.col(k).reshaped(kOutputs, kInputs);
         G.col(k) += (exact * force).reshaped();
       }

@@ -4,6 +4,7 @@
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/cramer_rao_bound.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test_cramer_rao {
@@ -17,11 +18,8 @@ TEST(CramerRao, IsWhatMaximumLikelihoodReportsAtTheTruth) {
   stage.frf.response = stage.exact;
   stage.frf.noise_variance = stage.variance;
   stage.frf.noise_dof = 0.0;
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  options.hold = HoldModel::exact;
-  options.delay = DelayModel::estimate;
-  options.delay_s = stage.delay_s;
+  FitOptions options = test::fit_options(Weighting::noise_variance, HoldModel::exact,
+                                         DelayModel::estimate, stage.delay_s);
   const FitResult fit = fit_additive_model(stage.frf, stage.truth, options);
   const test::CramerRaoBound bound =
       test::cramer_rao_bound(stage.truth, stage.frf.frequency_hz, HoldModel::exact, stage.variance);

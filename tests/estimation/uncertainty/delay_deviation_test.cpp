@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
-#include "tests/estimation/delayed_fit_options.hpp"
+#include "tests/estimation/repeated_fits.hpp"
 
 namespace stageid::test_delay_deviation {
 
@@ -23,26 +22,21 @@ void expect_honest(DelayModel delay) {
   test::RandomNumbers random(78);
   FitOptions options = test::options_with(Weighting::noise_variance);
   options.delay = delay;
-  options.threads = 1;
-  Eigen::MatrixXd values(5, kRuns);
-  Eigen::ArrayXd reported = Eigen::ArrayXd::Zero(5);
-  for (int run = 0; run < kRuns; ++run) {
-    const FrfEstimate frf = test::noisy_frf(random, problem, problem.W.cwiseInverse());
-    const FitResult fit = fit_additive_model(frf, problem.model, options);
-    ASSERT_TRUE(fit.trustworthy()) << fit.message();
-    ASSERT_EQ(fit.model.input_delay_std_s.size(), 3);
-    ASSERT_EQ(fit.model.output_delay_std_s.size(), 2);
-    values.col(run) = joined(fit.model.input_delay_s, fit.model.output_delay_s);
-    reported +=
-        joined(fit.model.input_delay_std_s, fit.model.output_delay_std_s).array().square() / kRuns;
-  }
+  const test::RepeatedFits fits = test::repeat_fits(
+      problem, options,
+      [&](std::uint64_t) { return test::noisy_frf(random, problem, problem.W.cwiseInverse()); },
+      [](const FrfEstimate&, const FitResult& fit) -> test::Observed {
+        return {joined(fit.model.input_delay_s, fit.model.output_delay_s),
+                joined(fit.model.input_delay_std_s, fit.model.output_delay_std_s)};
+      });
+  ASSERT_EQ(fits.reported.size(), 5);
   const Eigen::Index estimated = delay == DelayModel::estimate ? 3 : 4;
-  test::expect_honest(test::scatter_of(values).head(estimated), reported.head(estimated));
+  test::expect_honest(fits.scatter.head(estimated), fits.reported.head(estimated));
   const Eigen::VectorXd truth =
       joined(problem.model.input_delays_s(), problem.model.output_delays_s());
   for (Eigen::Index d = 0; d < estimated; ++d)
-    EXPECT_NEAR(values.row(d).mean(), truth[d], 4.0 * std::sqrt(reported[d] / kRuns)) << d;
-  for (Eigen::Index d = estimated; d < 5; ++d) EXPECT_EQ(reported[d], 0.0) << "the reference";
+    EXPECT_NEAR(fits.mean[d], truth[d], 4.0 * std::sqrt(fits.reported[d] / kRuns)) << d;
+  for (Eigen::Index d = estimated; d < 5; ++d) EXPECT_EQ(fits.reported[d], 0.0) << "the reference";
 }
 
 TEST(DelayDeviation, OfOneDelay) { expect_honest(DelayModel::estimate); }

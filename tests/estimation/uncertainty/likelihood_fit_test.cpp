@@ -3,15 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
 
 #include "estimation/equations/joint_equations.hpp"
 #include "estimation/search/automatic_fit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/correlated_stage.hpp"
-#include "tests/estimation/delayed_fit_options.hpp"
+#include "tests/support/models/expect_same_fit.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_likelihood_fit {
 
@@ -29,7 +30,7 @@ double dense_cost(const AdditiveModel& model, const FrfEstimate& frf,
       frf.response - test::reference_response(model, frf.frequency_hz, model.hold);
   double sum = 0.0;
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const Eigen::MatrixXcd W = noise.covariance(static_cast<std::size_t>(k)).inverse();
+    const Eigen::MatrixXcd W = inverse(noise.covariance(static_cast<std::size_t>(k)));
     sum += (E.col(k).adjoint() * W * E.col(k))(0, 0).real();
   }
   return sum / (2.0 * static_cast<double>(frf.lines()));
@@ -38,7 +39,7 @@ double dense_cost(const AdditiveModel& model, const FrfEstimate& frf,
 DenseEquations dense_equations(const DenseProblem& at, const FrfEstimate& frf,
                                const CorrelatedNoise& noise, DelayModel delay) {
   return test::dense_equations(at, frf.response, delay, [&](std::size_t k) -> Eigen::MatrixXcd {
-    return noise.covariance(k).inverse();
+    return inverse(noise.covariance(k));
   });
 }
 
@@ -101,9 +102,7 @@ TEST(LikelihoodFit, OperatorIsTheDenseMatrixWithEveryKindOfDelay) {
     const double size = dense.e.cwiseQuotient(scale).norm();
     EXPECT_LT((equations.gradient() - dense.e).cwiseQuotient(scale).norm(), 1e-8 * size);
     RandomNumbers random(17);
-    Eigen::VectorXd v(dense.e.size());
-    for (double& value : v) value = random.normal();
-    v = v.cwiseQuotient(scale).eval();
+    const Eigen::VectorXd v = test::random_vector(random, dense.e.size()).cwiseQuotient(scale);
     const Eigen::VectorXd expected = dense.M * v;
     EXPECT_LT((equations.product(v) - expected).cwiseQuotient(scale).norm(),
               1e-8 * expected.cwiseQuotient(scale).norm());
@@ -192,7 +191,7 @@ TEST(LikelihoodFit, WholeMatricesOfAUserGiveTheSameModel) {
   options.user_weight_matrices.resize(36, m.frf.lines());
   for (Eigen::Index k = 0; k < m.frf.lines(); ++k)
     options.user_weight_matrices.col(k) =
-        m.noise.covariance(static_cast<std::size_t>(k)).inverse().reshaped();
+        inverse(m.noise.covariance(static_cast<std::size_t>(k))).reshaped();
   const FitResult whole = fit_additive_model(m.frf, m.start(), options);
   const FitResult factors =
       fit_additive_model(m.frf, m.start(), options_with(Weighting::likelihood));
@@ -222,15 +221,7 @@ TEST(LikelihoodFit, DoesNotDependOnTheNumberOfThreads) {
   const FitResult one = fit_additive_model(m.frf, m.start(), options);
   for (const int threads : {2, 5}) {
     options.threads = threads;
-    const FitResult many = fit_additive_model(m.frf, m.start(), options);
-    EXPECT_EQ(one.cost, many.cost);
-    EXPECT_EQ(one.response_variance, many.response_variance);
-    for (std::size_t i = 0; i < one.model.submodels.size(); ++i) {
-      EXPECT_EQ(one.model.submodels[i].denominator, many.model.submodels[i].denominator);
-      EXPECT_EQ(one.model.submodels[i].numerator[0], many.model.submodels[i].numerator[0]);
-      EXPECT_EQ(one.model.submodels[i].natural_frequency_std_hz,
-                many.model.submodels[i].natural_frequency_std_hz);
-    }
+    test::expect_same(one, fit_additive_model(m.frf, m.start(), options));
   }
 }
 
@@ -253,8 +244,7 @@ TEST(LikelihoodFit, ModesAtABoundAreHeld) {
   const Measurement m;
   AdditiveModel start = m.start();
   // A mode far below the lines that the data do not require.
-  start.submodels.push_back(
-      test::empty_submodel(m.problem.model, 0, test::mode_coefficients(4.0, 0.3), 1));
+  start.submodels.push_back(test::empty_mode(m.problem.model, 4.0, 0.3));
   const FitResult fit = fit_additive_model(m.frf, start, options_with(Weighting::likelihood));
   EXPECT_TRUE(std::isfinite(fit.model.fit.cost)) << fit.message();
   for (std::size_t i = 1; i < fit.cost.size(); ++i) EXPECT_LT(fit.cost[i], fit.cost[i - 1]);
@@ -268,8 +258,9 @@ TEST(LikelihoodFit, RefusesAMethodWithoutAMinimum) {
   const Measurement m;
   FitOptions options = options_with(Weighting::likelihood);
   options.method = FitMethod::sk;
-  EXPECT_THAT([&] { (void)fit_additive_model(m.frf, m.start(), options); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("riv or gn")));
+  EXPECT_THAT(test::error_message<std::invalid_argument>(
+                  [&] { fit_additive_model(m.frf, m.start(), options); }),
+              testing::HasSubstr("riv or gn"));
 }
 
 }  // namespace stageid::test_likelihood_fit

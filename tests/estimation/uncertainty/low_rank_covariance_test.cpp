@@ -6,83 +6,44 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/correlated_stage.hpp"
-#include "tests/estimation/delayed_fit_options.hpp"
+#include "tests/estimation/repeated_fits.hpp"
 
 namespace stageid::test_low_rank_covariance {
 
-using test::kRuns;
 using test::RankOneStage;
 
-/// Frequencies, damping ratios, then all numerators.
-Eigen::VectorXd quantities(const AdditiveModel& model, bool deviations) {
-  std::vector<double> out;
-  for (const Submodel& s : model.submodels)
-    if (s.is_mode()) {
-      out.push_back(deviations ? s.natural_frequency_std_hz.value() : s.natural_frequency_hz());
-      out.push_back(deviations ? s.damping_ratio_std.value() : s.damping_ratio());
-    }
-  for (const Submodel& s : model.submodels) {
-    const Eigen::MatrixXd& B = deviations ? s.numerator_std.at(0) : s.numerator[0];
-    out.insert(out.end(), B.reshaped().begin(), B.reshaped().end());
-  }
-  return Eigen::Map<const Eigen::VectorXd>(out.data(), std::ssize(out));
+/// The reported deviations of all quantities.
+Eigen::ArrayXd deviations(const FitResult& fit) { return test::model_quantities(fit).deviation; }
+
+test::RepeatedFits repeat(const RankOneStage& stage, const FitOptions& options) {
+  return test::repeat_fits(stage.problem, options,
+                           [&](std::uint64_t run) { return stage.measured_with(3000 + run); });
 }
 
-struct Repeated {
-  Eigen::ArrayXd scatter;             ///< variances
-  Eigen::ArrayXd reported;            ///< mean of the reported ones
-  Eigen::ArrayXd without;             ///< of a file without the correlation
-  double response_ratio = 0.0;        ///< |error|^2 over its reported mean
-  double response_ratio_error = 0.0;  ///< standard error of it
-};
-
-Repeated repeat(Weighting weighting, int residue_rank = 1) {
-  const RankOneStage stage;
+FitOptions low_rank(Weighting weighting, int residue_rank = 1) {
   FitOptions options = test::options_with(weighting);
-  options.threads = 1;
   options.residue_rank = residue_rank;
-  Repeated out;
-  Eigen::MatrixXd values;
-  Eigen::ArrayXd response_ratio(kRuns);
-  for (int run = 0; run < kRuns; ++run) {
-    FrfEstimate frf = stage.measured_with(static_cast<std::uint64_t>(3000 + run));
-    const FitResult fit = fit_additive_model(frf, stage.problem.model, options);
-    EXPECT_TRUE(fit.trustworthy()) << fit.message();
-    const Eigen::VectorXd value = quantities(fit.model, false);
-    if (run == 0) {
-      values.resize(value.size(), kRuns);
-      out.reported.setZero(value.size());
-      frf.residual_covariance.resize(0, 0);
-      out.without =
-          quantities(fit_additive_model(frf, fit.model, options).model, true).array().square();
-    }
-    values.col(run) = value;
-    out.reported += quantities(fit.model, true).array().square() / kRuns;
-    const Eigen::MatrixXcd error =
-        test::reference_response(fit.model, stage.problem.frequency_hz, stage.problem.hold) -
-        stage.problem.G;
-    response_ratio[run] = error.cwiseAbs2().cwiseQuotient(fit.response_variance).mean();
-  }
-  out.scatter = test::scatter_of(values);
-  out.response_ratio = response_ratio.mean();
-  out.response_ratio_error =
-      std::sqrt((response_ratio - response_ratio.mean()).square().sum() / (kRuns - 1) / kRuns);
-  return out;
+  return options;
 }
 
-void expect_honest(const Repeated& repeated) {
-  test::expect_honest(repeated.scatter, repeated.reported);
-  EXPECT_NEAR(repeated.response_ratio, 1.0, 4.0 * repeated.response_ratio_error);
+void expect_honest(const test::RepeatedFits& fits) {
+  test::expect_honest(fits.scatter, fits.reported);
+  EXPECT_NEAR(fits.mean_response_ratio(), 1.0, 4.0 * fits.response_ratio_error());
 }
 
 TEST(LowRankCovarianceMonteCarlo, CountsTheCorrelationOfOutputsAndInputs) {
+  const RankOneStage stage;
   for (const int rank : {1, 0}) {
     SCOPED_TRACE(rank);
-    const Repeated repeated = repeat(Weighting::noise_variance, rank);
-    expect_honest(repeated);
-    const Eigen::ArrayXd ratio = (repeated.scatter / repeated.without).head(6);
+    const FitOptions options = low_rank(Weighting::noise_variance, rank);
+    const test::RepeatedFits fits = repeat(stage, options);
+    expect_honest(fits);
+    FrfEstimate frf = stage.measured_with(3000);
+    frf.residual_covariance.resize(0, 0);
+    const Eigen::ArrayXd without =
+        deviations(fit_additive_model(frf, stage.problem.model, options));
+    const Eigen::ArrayXd ratio = (fits.scatter / without.square()).head(6);
     EXPECT_TRUE(ratio.minCoeff() < test::kLowestRatio || ratio.maxCoeff() > test::kHighestRatio)
         << "a correlation that changes nothing tests nothing";
   }
@@ -91,20 +52,18 @@ TEST(LowRankCovarianceMonteCarlo, CountsTheCorrelationOfOutputsAndInputs) {
 // Outputs with different noise, which is in the variances but not in unit weights. (Relative weights would follow the
 // noise where the response is below it.)
 TEST(LowRankCovarianceMonteCarlo, OtherWeightsWithKnownVarianceAreSandwiched) {
-  expect_honest(repeat(Weighting::unit));
+  expect_honest(repeat(RankOneStage(), low_rank(Weighting::unit)));
 }
 
 TEST(LowRankCovariance, OfOtherWeightsWithoutCorrelationUsesTheKnownVariance) {
   const RankOneStage stage;
   FrfEstimate frf = stage.measured_with(9);
   frf.residual_covariance.resize(0, 0);
-  FitOptions options = test::options_with(Weighting::relative);
-  options.residue_rank = 1;
+  const FitOptions options = low_rank(Weighting::relative);
   const FitResult once = fit_additive_model(frf, stage.problem.model, options);
   frf.noise_variance *= 4.0;  // the weights and with them the estimate stay
   const FitResult four = fit_additive_model(frf, stage.problem.model, options);
-  const Eigen::ArrayXd ratio =
-      quantities(four.model, true).array() / quantities(once.model, true).array();
+  const Eigen::ArrayXd ratio = deviations(four) / deviations(once);
   EXPECT_NEAR(ratio.minCoeff(), 2.0, 1e-9);
   EXPECT_NEAR(ratio.maxCoeff(), 2.0, 1e-9);
 }
@@ -123,9 +82,8 @@ TEST(LowRankCovariance, OfTheResponseIsRightWhereModesImitateEachOther) {
     spring.held = HeldPole::pole;
     model.submodels.push_back(spring);
   }
-  stage.problem.G = test::reference_response(model, stage.problem.frequency_hz, stage.problem.hold);
-  FitOptions options = test::options_with(Weighting::noise_variance);
-  options.residue_rank = 1;
+  test::measure(stage.problem);
+  const FitOptions options = low_rank(Weighting::noise_variance);
   constexpr int kFits = 100;
   double ratio = 0.0;
   for (int run = 0; run < kFits; ++run) {

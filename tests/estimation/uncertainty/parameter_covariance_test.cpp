@@ -11,7 +11,6 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/covariance_stage.hpp"
-#include "tests/estimation/delayed_fit_options.hpp"
 
 namespace stageid::test_parameter_covariance {
 
