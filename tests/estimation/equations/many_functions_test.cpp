@@ -8,7 +8,6 @@
 #include "estimation/equations/numerators.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
 #include "tests/estimation/disturbed_problem.hpp"
-#include "tests/support/models/model_fit_problem.hpp"
 
 namespace stageid::test_many_functions {
 
@@ -21,11 +20,8 @@ DenseProblem many_functions() {
   problem.hold = HoldModel::none;
   problem.model = test::named_model(2, 3);
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(600, 5.0, 1500.0);
-  for (int i = 0; i < 36; ++i) {
-    const double hz = 40.0 * (i + 1);
-    problem.model.submodels.push_back(
-        test::empty_submodel(problem.model, 0, test::mode_coefficients(hz, 0.03), 2));
-  }
+  for (int i = 1; i <= 36; ++i)
+    problem.model.submodels.push_back(test::empty_mode(problem.model, 40.0 * i, 0.03, 2));
   test::measure_and_disturb(random, problem, 1e-3);
   return problem;
 }
@@ -48,7 +44,7 @@ TEST(ManyFunctions, AreSummedAsFractionsToEightDigits) {
 // With exact poles, the residual is only rounding.
 TEST(ManyFunctions, ExactPolesLeaveRoundingOnly) {
   DenseProblem problem = many_functions();
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  test::measure(problem);
   problem.W = problem.G.cwiseAbs2().cwiseInverse();
   const FitProblem fit = test::fit_problem(problem, DelayModel::fixed);
   FitParameters beta = test::fit_parameters(problem);

@@ -16,8 +16,7 @@ test::DenseProblem many_delays() {
   problem.model.output_delay_s = Eigen::VectorXd::LinSpaced(5, 1.7e-5, 0.0);
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(40, 5.0, 1500.0);
   for (const double hz : {40.0, 90.0, 91.0})
-    problem.model.submodels.push_back(
-        test::empty_submodel(problem.model, 0, test::mode_coefficients(hz, 0.03), 2));
+    problem.model.submodels.push_back(test::empty_mode(problem.model, hz, 0.03, 2));
   test::measure_and_disturb(random, problem, 1e-3);
   return problem;
 }

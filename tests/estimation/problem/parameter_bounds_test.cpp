@@ -6,8 +6,6 @@
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
-#include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
 
 namespace stageid::test_parameter_bounds {
 
@@ -18,13 +16,12 @@ FrfEstimate response_of(double first_hz, double first_damping) {
   test::DenseProblem problem;
   problem.model = test::named_model(1, 1);
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(241, kLowestLineHz, 500.0);
-  problem.model.submodels = {
-      test::empty_submodel(problem.model, 2, {}, 1),
-      test::empty_submodel(problem.model, 0, test::mode_coefficients(first_hz, first_damping), 1),
-      test::empty_submodel(problem.model, 0, test::mode_coefficients(301.0, 0.01), 1)};
+  problem.model.submodels = {test::empty_submodel(problem.model, 2, {}, 1),
+                             test::empty_mode(problem.model, first_hz, first_damping),
+                             test::empty_mode(problem.model, 301.0, 0.01)};
   for (Submodel& s : problem.model.submodels)
     s.numerator[0](0, 0) = s.is_mode() ? s.denominator[2] : 1.0;
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+  test::measure(problem);
   return test::frf_of(problem);
 }
 
@@ -32,7 +29,7 @@ FitResult fit_from(const FrfEstimate& frf, double first_hz) {
   AdditiveModel start = test::named_model(1, 1);
   start.submodels.push_back(test::empty_submodel(start, 2, {}, 1));
   for (const double f : {first_hz, 300.0})
-    start.submodels.push_back(test::empty_submodel(start, 0, test::mode_coefficients(f, 0.01), 1));
+    start.submodels.push_back(test::empty_mode(start, f, 0.01));
   return fit_additive_model(frf, start, {});
 }
 
@@ -69,7 +66,7 @@ int found_from(double delay_s, const FitOptions& given) {
       test::reference_response(problem.model, problem.frequency_hz, problem.hold).cwiseAbs().mean();
   for (double& value : problem.model.submodels.back().numerator[0].reshaped())
     value = size * random.normal();
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  test::measure(problem);
   const Eigen::MatrixXd variance =
       Eigen::MatrixXd::Constant(problem.channels(), 180, 1e-4 * size * size);
   FitOptions options = given;
@@ -89,9 +86,7 @@ int found_from(double delay_s, const FitOptions& given) {
 
 // A direct term answers one sample later as soon as the delay exceeds a whole number of samples.
 TEST(ParameterBounds, ADelayOfWholeSamplesIsFoundFromBothSides) {
-  FitOptions options;
-  options.hold = HoldModel::exact;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance, HoldModel::exact);
   options.threads = 1;
   for (const double delay_s : {1.9e-4, 1.999e-4, 2.001e-4, 2.1e-4})
     EXPECT_EQ(found_from(delay_s, options), 20) << delay_s;

@@ -26,17 +26,15 @@ FrfEstimate measured(std::uint64_t seed, const Change& change) {
       test::stage_2x3(HoldModel::none, random, {{120.0, 0.01}, {390.0, 0.012}, {640.0, 0.008}});
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(400, 20.0, 1000.0);
   change(problem);
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+  test::measure(problem);
   FrfEstimate frf = test::frf_of(problem);
   frf.noise_variance = kNoise * kNoise * problem.G.cwiseAbs2();
-  for (std::complex<double>& value : frf.response.reshaped())
-    value *= 1.0 + kNoise * random.circular();
+  test::add_relative_noise(frf.response, kNoise, random);
   return frf;
 }
 
 FitOptions weighed() {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   return options;
 }
 

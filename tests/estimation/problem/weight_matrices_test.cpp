@@ -9,7 +9,9 @@
 #include <stdexcept>
 
 #include "estimation/problem/fit_problem.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/correlated_stage.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_weight_matrices {
 
@@ -17,6 +19,8 @@ using test::correlated_noise;
 using test::CorrelatedNoise;
 using test::DenseProblem;
 using test::RandomNumbers;
+using testing::AllOf;
+using testing::HasSubstr;
 
 DenseProblem stage() { return test::noisy_stage(HoldModel::none, 0.0); }
 
@@ -52,12 +56,11 @@ TEST(WeightMatrices, OfAUserAreTakenAsTheyAre) {
   const DenseProblem problem = stage();
   const CorrelatedNoise noise = correlated_noise(problem, 0.01, 0.9);
   const FrfEstimate frf = test::frf_of(problem);
-  FitOptions options;
-  options.weighting = Weighting::user;
+  FitOptions options = test::fit_options(Weighting::user);
   options.user_weight_matrices.resize(36, frf.lines());
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
     options.user_weight_matrices.col(k) =
-        noise.covariance(static_cast<std::size_t>(k)).inverse().reshaped();
+        inverse(noise.covariance(static_cast<std::size_t>(k))).reshaped();
   // Singular ones are allowed: a line that does not count, a channel, a difference of two.
   options.user_weight_matrices.col(3).setZero();
   const Eigen::VectorXcd difference{{1.0, -1.0, 0.0, 0.0, 0.0, 0.0}};
@@ -97,10 +100,9 @@ TEST(WeightMatrices, FromFewDegreesOfFreedomAreUnbiased) {
     frf.input_factor.setOnes(1, kLines);
     frf.noise_dof = dof;
     frf.residual_covariance.resize(9, kLines);
-    const Eigen::MatrixXcd L = C.llt().matrixL();
+    const Eigen::MatrixXcd L = test::cholesky(C);
     for (Eigen::Index k = 0; k < kLines; ++k) {
-      Eigen::MatrixXcd samples(kOutputs, dof);
-      for (std::complex<double>& value : samples.reshaped()) value = random.circular();
+      const Eigen::MatrixXcd samples = test::circular_matrix(random, kOutputs, dof);
       // The level drifts: 1 over the band, little over a window.
       const Eigen::MatrixXcd scaled = std::exp(0.00025 * static_cast<double>(k)) * L * samples;
       const Eigen::MatrixXcd estimate = scaled * scaled.adjoint() / static_cast<double>(dof);
@@ -130,9 +132,9 @@ struct WeightMatrixRefusal : testing::Test {
     options_.weighting = Weighting::likelihood;
   }
   void expect_refused(const std::string& part, const std::string& other = "") {
-    EXPECT_THAT([this] { (void)make_weight_matrices(frf_, options_); },
-                testing::ThrowsMessage<std::invalid_argument>(
-                    testing::AllOf(testing::HasSubstr(part), testing::HasSubstr(other))));
+    EXPECT_THAT(test::error_message<std::invalid_argument>(
+                    [this] { make_weight_matrices(frf_, options_); }),
+                AllOf(HasSubstr(part), HasSubstr(other)));
   }
   void ask_for_matrices() {
     options_.weighting = Weighting::user;
@@ -144,75 +146,62 @@ struct WeightMatrixRefusal : testing::Test {
   FitOptions options_;
 };
 
-TEST_F(WeightMatrixRefusal, NothingIsWrongWithTheFixture) {
-  EXPECT_TRUE(make_weight_matrices(frf_, options_).has_value());
-  ask_for_matrices();
-  EXPECT_TRUE(make_weight_matrices(frf_, options_).has_value());
-}
-TEST_F(WeightMatrixRefusal, AnFrfWithoutTheInputsFactor) {
+TEST_F(WeightMatrixRefusal, AnFrfWithoutOneOfTheFactors) {
+  const FrfEstimate whole = frf_;
   frf_.input_factor.resize(0, 0);
   expect_refused("needs /input_factor in the FRF", "stageid frf");
-}
-TEST_F(WeightMatrixRefusal, AnFrfWithoutTheResidualCovariance) {
+  frf_ = whole;
   frf_.residual_covariance.resize(0, 0);
   expect_refused("needs /residual_covariance in the FRF", "two periods");
 }
-TEST_F(WeightMatrixRefusal, AnOutputWithoutNoise) {
+
+TEST_F(WeightMatrixRefusal, FactorsThatAreNotOfFullRankOrNotHermitian) {
+  const FrfEstimate whole = frf_;
   frf_.residual_covariance(3, 7) = 0.0;
   expect_refused("residual_covariance of z2 on line 7");
-}
-TEST_F(WeightMatrixRefusal, OutputsThatDependOnEachOther) {
+  frf_ = whole;
   frf_.residual_covariance.col(9).setOnes();
   expect_refused("residual_covariance of line 9", "exclude one of them");
-}
-TEST_F(WeightMatrixRefusal, InputsThatDependOnEachOtherOrAFactorThatIsNotHermitian) {
-  const Eigen::MatrixXcd before = frf_.input_factor;
+  frf_ = whole;
   frf_.input_factor.col(11).setOnes();
   expect_refused("input_factor of line 11", "exclude one of them");
-  frf_.input_factor = before;
+  frf_ = whole;
   frf_.input_factor(1, 12) *= 2.0;
   expect_refused("input_factor of line 12", "Hermitian");
 }
+
 TEST_F(WeightMatrixRefusal, TooFewDegreesOfFreedomInAll) {
   frf_.noise_dof = 1.0;
   frf_ = select_band(frf_, frf_.frequency_hz[0], frf_.frequency_hz[2]);
   expect_refused("3 degrees of freedom", "needs 4");
 }
-TEST_F(WeightMatrixRefusal, UsersOfAnotherShape) {
+
+TEST_F(WeightMatrixRefusal, OfAUser) {
+  Eigen::MatrixXcd& given = options_.user_weight_matrices;
   ask_for_matrices();
-  options_.user_weight_matrices.conservativeResize(36, frf_.lines() - 1);
-  expect_refused("shape");
-}
-TEST_F(WeightMatrixRefusal, UsersThatAreNotFinite) {
-  ask_for_matrices();
-  options_.user_weight_matrices(5, 20) = std::nan("");
+  given(5, 20) = std::nan("");
   expect_refused("line 20", "not finite");
-}
-TEST_F(WeightMatrixRefusal, UsersThatAreNotHermitian) {
   ask_for_matrices();
-  options_.user_weight_matrices(5, 21) = std::complex<double>(0.0, 1e-6);
+  given(5, 21) = std::complex<double>(0.0, 1e-6);
   expect_refused("line 21", "not Hermitian");
-}
-TEST_F(WeightMatrixRefusal, UsersThatAreNotPositive) {
   ask_for_matrices();
-  options_.user_weight_matrices(0, 22) = -1e-6;
+  given(0, 22) = -1e-6;
   expect_refused("line 22", "not positive semidefinite");
   ask_for_matrices();
   // Positive diagonal, but 1 - 1.1 along the difference of two channels.
-  options_.user_weight_matrices(1, 23) = 1.1;
-  options_.user_weight_matrices(6, 23) = 1.1;
+  given(1, 23) = given(6, 23) = 1.1;
   expect_refused("line 23", "not positive semidefinite");
-}
-TEST_F(WeightMatrixRefusal, UsersThatAreAllZero) {
-  ask_for_matrices();
-  options_.user_weight_matrices.setZero();
+  given.setZero();
   expect_refused("all are zero");
+  given.conservativeResize(36, frf_.lines() - 1);
+  expect_refused("shape");
 }
-TEST_F(WeightMatrixRefusal, UsersThatWouldNotFitInMemory) {
+
+TEST(WeightMatrices, OfAUserMustFitInMemory) {
   EXPECT_NO_THROW(require_memory_for_weight_matrices(52, 4000));
-  EXPECT_THAT([] { require_memory_for_weight_matrices(221, 4000); },
-              testing::ThrowsMessage<std::invalid_argument>(
-                  testing::AllOf(testing::HasSubstr("2.9 GiB"), testing::HasSubstr("likelihood"))));
+  EXPECT_THAT(test::error_message<std::invalid_argument>(
+                  [] { require_memory_for_weight_matrices(221, 4000); }),
+              AllOf(HasSubstr("2.9 GiB"), HasSubstr("likelihood")));
 }
 
 }  // namespace stageid::test_weight_matrices

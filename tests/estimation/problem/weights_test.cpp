@@ -6,7 +6,7 @@
 
 #include "estimation/problem/fit_problem.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/stages/random_stage.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_weights {
 
@@ -23,16 +23,11 @@ FrfEstimate small_frf() {
 }
 
 Eigen::MatrixXd weights(const FrfEstimate& frf, Weighting weighting) {
-  FitOptions options;
-  options.weighting = weighting;
+  FitOptions options = test::fit_options(weighting);
   return make_weights(frf, options);
 }
 
-TEST(Weights, UnitWeighsEverythingAlike) {
-  EXPECT_EQ(weights(small_frf(), Weighting::unit), Eigen::MatrixXd::Ones(4, 3));
-}
-
-TEST(Weights, InverseMagnitudeIsThePapersAndRelativeItsSquare) {
+TEST(Weights, AreOneOrOfTheMagnitudeAsThePapersOrItsSquare) {
   const FrfEstimate frf = small_frf();
   const Eigen::MatrixXd inverse = weights(frf, Weighting::inverse_magnitude);
   const Eigen::MatrixXd relative = weights(frf, Weighting::relative);
@@ -41,6 +36,7 @@ TEST(Weights, InverseMagnitudeIsThePapersAndRelativeItsSquare) {
   EXPECT_NEAR(inverse(3, 0), 1.0 / 10.0, 1e-16);
   EXPECT_NEAR(relative(2, 0), 1e18, 1e4);
   EXPECT_NEAR(relative(3, 2), 64.0, 1e-13);
+  EXPECT_EQ(weights(small_frf(), Weighting::unit), Eigen::MatrixXd::Ones(4, 3));
 }
 
 TEST(Weights, VariancesThatAreExactOrUnknownInOriginAreInverted) {
@@ -65,8 +61,7 @@ TEST(Weights, ManyDegreesOfFreedomAreNotSmoothed) {
 }
 
 TEST(Weights, UsersAreTakenAsTheyAre) {
-  FitOptions options;
-  options.weighting = Weighting::user;
+  FitOptions options = test::fit_options(Weighting::user);
   Eigen::MatrixXd given = Eigen::MatrixXd::Constant(4, 3, 0.5);
   given(2, 1) = 0.0;  // leaves a point out
   options.user_weights = given;
@@ -141,8 +136,9 @@ TEST(Weights, OnlyTheRandomFactorIsSmoothed) {
 
 struct WeightRefusal : testing::Test {
   void expect_refused(const std::string& part) {
-    EXPECT_THAT([this] { (void)make_weights(frf_, options_); },
-                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(part)));
+    EXPECT_THAT(
+        test::error_message<std::invalid_argument>([this] { make_weights(frf_, options_); }),
+        testing::HasSubstr(part));
   }
   FrfEstimate frf_ = small_frf();
   FitOptions options_;

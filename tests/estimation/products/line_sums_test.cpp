@@ -28,10 +28,9 @@ DenseProblem wide_problem(HoldModel hold) {
   problem.model = test::named_model(4, 5);
   if (hold != HoldModel::none) problem.model.sample_rate_hz = 1e4;
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(300, 30.0, 1500.0);
-  problem.model.submodels = {
-      test::empty_submodel(problem.model, 2, {}, 1),
-      test::empty_submodel(problem.model, 0, test::mode_coefficients(240.0, 0.03), 1),
-      test::empty_submodel(problem.model, 0, test::mode_coefficients(800.0, 0.02), 2)};
+  problem.model.submodels = {test::empty_submodel(problem.model, 2, {}, 1),
+                             test::empty_mode(problem.model, 240.0, 0.03),
+                             test::empty_mode(problem.model, 800.0, 0.02, 2)};
   measure_and_disturb(random, problem, 1e-3);
   return problem;
 }

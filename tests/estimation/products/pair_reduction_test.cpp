@@ -29,8 +29,7 @@ test::DenseProblem mixed_problem(HoldModel hold) {
   problem.model.input_delay_s.setConstant(1.37e-4);
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(300, 30.0, 1500.0);
   const auto mode = [&](double hz, double damping_ratio, int powers) {
-    return test::empty_submodel(problem.model, 0, test::mode_coefficients(hz, damping_ratio),
-                                powers);
+    return test::empty_mode(problem.model, hz, damping_ratio, powers);
   };
   problem.model.submodels = {test::empty_submodel(problem.model, 2, {}, 1),
                              mode(240.0, 0.03, 1),
