@@ -48,12 +48,9 @@ TEST(Assignment, CostsTheLeastOfAllPermutations) {
       }
 }
 
-TEST(Assignment, GivesUpTheBestPairWhereTheSumRequiresIt) {
+TEST(Assignment, GivesUpTheBestPairWhereTheSumRequiresItAndPairsNothingAtTheLimit) {
   const Eigen::MatrixXd cost{{1.0, 2.0}, {2.0, 9.0}};
   EXPECT_EQ(least_cost_pairs(cost, 100.0), (Pairs{1, 0}));
-}
-
-TEST(Assignment, PairsNothingAtTheLimit) {
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd{{5.0}, {4.9}}, 5.0), (Pairs{std::nullopt, 0}));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(least_cost_pairs(Eigen::MatrixXd{{nan, 1.0}, {nan, nan}}, 5.0),

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_line_correlation {
 
@@ -17,8 +16,7 @@ FrfEstimate noise(Eigen::Index together, std::uint64_t seed) {
   frf.inputs = model.inputs;
   frf.outputs = model.outputs;
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(2000, 1.0, 2000.0);
-  const Eigen::MatrixXcd more =
-      Eigen::MatrixXcd::NullaryExpr(6, 2000 + together, [&] { return random.circular(); });
+  const Eigen::MatrixXcd more = test::circular_matrix(random, 6, 2000 + together);
   frf.response.setZero(6, 2000);
   for (Eigen::Index i = 0; i < together; ++i)
     frf.response += more.middleCols(i, 2000) / std::sqrt(static_cast<double>(together));

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tests/support/stages/random_stage.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_modal_assurance {
 
@@ -24,26 +24,21 @@ TEST(ModalAssurance, IsTheSquaredCosineOfShapes) {
   EXPECT_EQ(mac(0, 2), 0.0);  // nothing
 }
 
-TEST(ModalAssurance, TellsAComplexShapeFromItsConjugate) {
+TEST(ModalAssurance, TellsAComplexShapeFromItsConjugateOfTheSameChannels) {
   const Eigen::MatrixXcd a{{1.0}, {Complex(0.0, 1.0)}};
   EXPECT_NEAR(modal_assurance(a, a)(0, 0), 1.0, 1e-15);
   EXPECT_EQ(modal_assurance(a, a.conjugate())(0, 0), 0.0);
+  EXPECT_THROW(modal_assurance(Eigen::MatrixXcd::Ones(2, 1), Eigen::MatrixXcd::Ones(3, 1)),
+               std::invalid_argument);
 }
 
 TEST(ModalAssurance, OfRandomShapesIsOneOverTheChannels) {
   constexpr Eigen::Index kShapes = 60;
   test::RandomNumbers random(9);
-  Eigen::MatrixXcd a(4, kShapes);
-  Eigen::MatrixXcd b(4, kShapes);
-  for (Complex& value : a.reshaped()) value = random.normal();
-  for (Complex& value : b.reshaped()) value = random.normal();
+  const Eigen::MatrixXcd a = test::random_matrix(random, 4, kShapes).cast<Complex>();
+  const Eigen::MatrixXcd b = test::random_matrix(random, 4, kShapes).cast<Complex>();
   // Of one pair: variance of Beta(1/2, 3/2) = 1/16; the 3600 products have at least 60 independent.
   EXPECT_NEAR(modal_assurance(a, b).mean(), 0.25, 4.0 * 0.25 / std::sqrt(60.0));
-}
-
-TEST(ModalAssurance, NeedsTheSameChannels) {
-  EXPECT_THROW(modal_assurance(Eigen::MatrixXcd::Ones(2, 1), Eigen::MatrixXcd::Ones(3, 1)),
-               std::invalid_argument);
 }
 
 ModeShape mode(double frequency_hz, const Eigen::VectorXcd& output, const Eigen::VectorXcd& input) {
@@ -82,18 +77,14 @@ TEST(PairModes, TellsAlikeShapesApartByTheirFrequencies) {
   EXPECT_EQ(pairs[1].second, 0U);
 }
 
-TEST(PairModes, LeavesOutWhatIsFarOrUnlike) {
+TEST(PairModes, LeavesOutWhatIsFarOrUnlikeAndRefusesOtherChannels) {
   const std::vector<ModeShape> first = {mode(100.0, kX, kX), mode(200.0, kX, kX)};
   const std::vector<ModeShape> second = {mode(106.0, kX, kX), mode(200.0, kX, kY)};
   EXPECT_TRUE(pair_modes(first, second).empty());
   EXPECT_EQ(pair_modes(first, {mode(104.0, kX, kX), second[1]}).size(), 1U);
   EXPECT_TRUE(pair_modes(first, {}).empty());
   EXPECT_TRUE(pair_modes({}, second).empty());
-}
-
-TEST(PairModes, RefusesOtherChannels) {
-  const std::vector<ModeShape> modes = {mode(100.0, kX, kX)};
-  EXPECT_THROW(pair_modes(modes, {mode(100.0, Eigen::VectorXcd::Ones(3), kX)}),
+  EXPECT_THROW(pair_modes(first, {mode(100.0, Eigen::VectorXcd::Ones(3), kX)}),
                std::invalid_argument);
 }
 

@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_residual_verdict {
 
@@ -25,15 +24,11 @@ FrfEstimate noise(std::uint64_t seed, Eigen::Index lines, int dof) {
   frf.inputs = model.inputs;
   frf.outputs = model.outputs;
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(lines, 1.0, static_cast<double>(lines));
-  frf.response.resize(kOutputs * kInputs, lines);
-  for (std::complex<double>& value : frf.response.reshaped()) value = random.circular();
+  frf.response = test::circular_matrix(random, kOutputs * kInputs, lines);
   frf.noise_variance.setOnes(kOutputs * kInputs, lines);
   frf.noise_dof = dof;
-  for (double& variance : frf.noise_variance.reshaped()) {
-    if (dof == 0) break;
-    variance = 0.0;
-    for (int i = 0; i < dof; ++i) variance += std::norm(random.circular()) / dof;
-  }
+  for (double& variance : frf.noise_variance.reshaped())
+    if (dof > 0) variance = random.chi_square_mean(dof);
   return frf;
 }
 

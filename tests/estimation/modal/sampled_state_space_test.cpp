@@ -13,7 +13,6 @@
 
 #include "tests/estimation/basis_cases.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/state_space_response.hpp"
@@ -35,7 +34,7 @@ AdditiveModel delayed_model(const Eigen::VectorXd& input_samples,
   model.output_delay_s = output_samples * kPeriod;
   model.submodels = {test::empty_submodel(model, 2, {}, 1),
                      test::empty_submodel(model, 0, {1e-3}, 1),
-                     test::empty_submodel(model, 0, test::mode_coefficients(700.0, 0.01), 2)};
+                     test::empty_mode(model, 700.0, 0.01, 2)};
   if (direct) model.submodels.push_back(test::empty_submodel(model, 0, {}, 1));
   for (Submodel& s : model.submodels)
     for (std::size_t m = 0; m < s.numerator.size(); ++m)
@@ -197,8 +196,7 @@ TEST(SampledStateSpace, RunsAsWritten) {
 
   constexpr int kSamples = 60;
   test::RandomNumbers random(1);
-  std::vector<double> u;
-  for (int n = 0; n < kSamples; ++n) u.push_back(random.normal());
+  const Eigen::VectorXd u = test::random_vector(random, kSamples);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(sampled.system.order());
   for (int n = 0; n < kSamples; ++n) {
     const long long at = n - sampled.input_delay_samples[0];
@@ -214,15 +212,12 @@ TEST(SampledStateSpace, RunsAsWritten) {
   }
 }
 
-TEST(SampledStateSpace, NeedsASampleRate) {
-  AdditiveModel model = delayed_model(Eigen::VectorXd{{0.0}}, Eigen::VectorXd{{0.0}});
-  model.sample_rate_hz = 0.0;
-  EXPECT_THROW(sampled_state_space(model), std::invalid_argument);
-}
-
-TEST(SampledStateSpace, RefusesWhatHasNoStateSpace) {
+TEST(SampledStateSpace, NeedsASampleRateAndAModelThatHasAStateSpace) {
   AdditiveModel model = delayed_model(Eigen::VectorXd{{0.0}}, Eigen::VectorXd{{0.0}});
   model.submodels.push_back(test::empty_submodel(model, 0, {2.0, 1.0}, 1));
+  EXPECT_THROW(sampled_state_space(model), std::invalid_argument);
+  model.submodels.pop_back();
+  model.sample_rate_hz = 0.0;
   EXPECT_THROW(sampled_state_space(model), std::invalid_argument);
 }
 

@@ -2,28 +2,26 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/stages/random_stage.hpp"
+#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_singular_shapes {
+
+template <typename Matrix>
+void expect_sum(const Matrix& M) {
+  const auto shapes = singular_shapes(M);
+  const Matrix scaled = shapes.output * shapes.singular_value.asDiagonal();
+  const Matrix sum = scaled * shapes.input.transpose();
+  EXPECT_LT((sum - M).norm(), 1e-14 * M.norm());
+  EXPECT_NEAR(shapes.output.col(0).norm(), 1.0, 1e-14);
+  EXPECT_NEAR(shapes.input.col(0).norm(), 1.0, 1e-14);
+}
 
 TEST(SingularShapes, SumUpToTheMatrix) {
   test::RandomNumbers random(3);
   for (const auto& [rows, cols] : {std::pair{4, 13}, {5, 2}, {1, 3}, {3, 1}}) {
-    Eigen::MatrixXcd M(rows, cols);
-    for (auto& value : M.reshaped()) value = random.circular();
-    const auto shapes = singular_shapes(M);
-    const Eigen::MatrixXcd sum =
-        shapes.output * shapes.singular_value.asDiagonal() * shapes.input.transpose();
-    EXPECT_LT((sum - M).norm(), 1e-14 * M.norm());
-    EXPECT_NEAR(shapes.output.col(0).norm(), 1.0, 1e-14);
-    EXPECT_NEAR(shapes.input.col(0).norm(), 1.0, 1e-14);
-    const Eigen::MatrixXd real = M.real();
-    const auto real_shapes = singular_shapes(real);
-    EXPECT_LT((real_shapes.output * real_shapes.singular_value.asDiagonal() *
-                   real_shapes.input.transpose() -
-               real)
-                  .norm(),
-              1e-14 * real.norm());
+    const Eigen::MatrixXcd M = test::circular_matrix(random, rows, cols);
+    expect_sum(M);
+    expect_sum(Eigen::MatrixXd(M.real()));
   }
 }
 

@@ -8,7 +8,6 @@
 
 #include "tests/estimation/basis_cases.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/state_space_response.hpp"
 
@@ -130,10 +129,9 @@ TEST(StateSpace, BlocksTellPolesAndSubmodels) {
 TEST(StateSpace, SubmodelsMayShareAPole) {
   test::RandomNumbers random(2);
   AdditiveModel model = test::named_model(2, 3);
-  Submodel mode = test::empty_submodel(model, 0, test::mode_coefficients(100.0, 0.01), 1);
-  mode.numerator[0] = random_matrix(random, 2, 1) * random_matrix(random, 1, 3);
-  model.submodels = {mode, mode};
-  model.submodels[1].numerator[0] = random_matrix(random, 2, 1) * random_matrix(random, 1, 3);
+  model.submodels.assign(2, test::empty_mode(model, 100.0, 0.01));
+  for (Submodel& mode : model.submodels)
+    mode.numerator[0] = random_matrix(random, 2, 1) * random_matrix(random, 1, 3);
   const StateSpace system = state_space(model);
   EXPECT_EQ(system.order(), 4);
   const Eigen::VectorXd lines{{50.0, 100.0, 400.0}};
@@ -146,7 +144,7 @@ TEST(StateSpace, HeldRankCutsRoundingOff) {
   // As a program that stores numbers in single precision would pass a rank-one residue on.
   test::RandomNumbers random(2);
   AdditiveModel model = test::named_model(3, 3);
-  Submodel mode = test::empty_submodel(model, 0, test::mode_coefficients(100.0, 0.01), 1);
+  Submodel mode = test::empty_mode(model, 100.0, 0.01);
   mode.numerator[0] = random_matrix(random, 3, 1) * random_matrix(random, 1, 3);
   mode.numerator[0] = mode.numerator[0].cast<float>().cast<double>().eval();
   model.submodels = {mode};

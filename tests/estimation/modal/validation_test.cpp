@@ -7,35 +7,24 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/stages/random_stage.hpp"
+#include "tests/estimation/noisy_stage.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_validation {
 
-constexpr double kDelay = 1.37e-4;
+using testing::HasSubstr;
 
 AdditiveModel stage_model(HoldModel hold) {
   test::RandomNumbers random(6);
-  AdditiveModel model = test::named_model(2, 3);
+  AdditiveModel model =
+      test::stage_2x3(HoldModel::exact, random, {{300.0, 0.02}, {950.0, 0.01}}).model;
   model.hold = hold;
-  model.sample_rate_hz = 1e4;
-  model.input_delay_s.setConstant(kDelay);
-  model.submodels = {test::empty_submodel(model, 2, {}, 1),
-                     test::empty_submodel(model, 0, test::mode_coefficients(300.0, 0.02), 1),
-                     test::empty_submodel(model, 0, test::mode_coefficients(950.0, 0.01), 1)};
-  for (Submodel& s : model.submodels)
-    for (double& value : s.numerator[0].reshaped())
-      value = (s.is_mode() ? s.denominator[2] : 1.0) * random.normal();
   return model;
 }
 
 FrfEstimate measured(const AdditiveModel& model, HoldModel hold) {
-  test::DenseProblem problem;
-  problem.model = model;
-  problem.hold = hold;
-  problem.frequency_hz = Eigen::VectorXd::LinSpaced(1500, 20.0, 2000.0);
-  problem.G = test::reference_response(model, problem.frequency_hz, hold);
+  test::DenseProblem problem{model, Eigen::VectorXd::LinSpaced(1500, 20.0, 2000.0), hold, {}, {}};
+  test::measure(problem);
   return test::frf_of(problem);
 }
 
@@ -49,20 +38,15 @@ using ResponseLike = ValidationOfAStage;
 /// Adds noise of the variance in the FRF, or of `factor` times it.
 void add_noise(FrfEstimate& frf, std::uint64_t seed, double factor = 1.0) {
   test::RandomNumbers random(seed);
-  frf.noise_variance = 1e-4 * frf.response.cwiseAbs2();
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    for (Eigen::Index c = 0; c < frf.response.rows(); ++c)
-      frf.response(c, k) += std::sqrt(factor * frf.noise_variance(c, k)) * random.circular();
+  frf.noise_variance = factor * 1e-4 * frf.response.cwiseAbs2();
+  test::add_noise(frf, random);
+  frf.noise_variance /= factor;
 }
 
 /// Makes the variances those of so many degrees of freedom.
 void scatter_variances(FrfEstimate& frf, std::uint64_t seed, int dof) {
   test::RandomNumbers random(seed);
-  for (double& variance : frf.noise_variance.reshaped()) {
-    double sum = 0.0;
-    for (int i = 0; i < dof; ++i) sum += std::norm(random.circular());
-    variance *= sum / dof;
-  }
+  for (double& variance : frf.noise_variance.reshaped()) variance *= random.chi_square_mean(dof);
   frf.noise_dof = dof;
 }
 
@@ -95,23 +79,29 @@ TEST_F(ValidationOfAStage, CountsWhatVariancesFromFewDegreesOfFreedomExceed) {
   EXPECT_GT(validate(model, frf).whitened_above_95, 0.09);
 }
 
+/// A gain per output.
+AdditiveModel constant_model(const Eigen::VectorXd& gain) {
+  AdditiveModel model = test::named_model(static_cast<int>(gain.size()), 1);
+  model.submodels = {test::empty_submodel(model, 0, {}, 1)};
+  model.submodels[0].numerator[0] = gain;
+  return model;
+}
+
 // The limit is 99 %, not 99.9999 %: of many white residuals some are above it.
 TEST(Validation, TheWhitenessLimitIsTheOneItSays) {
-  AdditiveModel model = test::named_model(1, 1);
-  Submodel constant = test::empty_submodel(model, 0, {}, 1);
-  constant.numerator[0].setConstant(1.0);
-  model.submodels = {constant};
+  const AdditiveModel model = constant_model(Eigen::VectorXd::Ones(1));
+  FrfEstimate frf = test::frf_of({model,
+                                  Eigen::VectorXd::LinSpaced(200, 1.0, 200.0),
+                                  HoldModel::none,
+                                  Eigen::MatrixXcd::Ones(1, 200),
+                                  {}});
+  frf.noise_variance = Eigen::MatrixXd::Constant(1, 200, 0.01);
   int above = 0;
   constexpr int kRuns = 2000;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
-    test::DenseProblem problem;
-    problem.model = model;
-    problem.frequency_hz = Eigen::VectorXd::LinSpaced(200, 1.0, 200.0);
-    problem.G = Eigen::MatrixXcd::Ones(1, 200);
-    FrfEstimate frf = test::frf_of(problem);
     test::RandomNumbers random(seed);
-    for (std::complex<double>& value : frf.response.reshaped()) value += 0.1 * random.circular();
-    frf.noise_variance = Eigen::MatrixXd::Constant(1, 200, 0.01);
+    frf.response.setOnes();
+    test::add_noise(frf, random);
     const Validation result = validate(model, frf);
     if (result.whiteness > result.whiteness_limit) ++above;
   }
@@ -153,17 +143,11 @@ TEST_F(ValidationOfAStage, NoiseThatIsLargerThanToldShowsInChiSquare) {
 }
 
 TEST(Validation, ErrorsAreThoseOfTheirDefinitions) {
-  AdditiveModel model = test::named_model(2, 1);
-  Submodel constant = test::empty_submodel(model, 0, {}, 1);
-  constant.numerator[0] << 1.0, 2.0;
-  model.submodels = {constant};
-  test::DenseProblem problem;
-  problem.model = model;
-  problem.frequency_hz = Eigen::VectorXd{{1.0, 2.0}};
-  problem.G.resize(2, 2);
-  problem.G << 2.0, std::complex<double>(1.0, 1.0),  //
-      4.0, 0.0;                                      // a zero has no relative error
-  const Validation result = validate(model, test::frf_of(problem));
+  const AdditiveModel model = constant_model(Eigen::VectorXd{{1.0, 2.0}});
+  const Eigen::MatrixXcd G{{2.0, std::complex<double>(1.0, 1.0)},
+                           {4.0, 0.0}};  // a zero has no relative error
+  const Validation result =
+      validate(model, test::frf_of({model, Eigen::VectorXd{{1.0, 2.0}}, HoldModel::none, G, {}}));
   // |E|^2 = 1, 1; 4, 4.  |G|^2 = 4, 2; 16, 0.
   EXPECT_NEAR(result.relative_rms_error, std::sqrt((0.25 + 0.5 + 0.25) / 3.0), 1e-15);
   EXPECT_NEAR(result.normalized_error, std::sqrt(10.0 / 22.0), 1e-15);
@@ -190,7 +174,7 @@ TEST_F(ValidationOfAStage, AModelThatIsWorseThanNoneIsNotExplained) {
   const Validation result = validate(model, frf);
   EXPECT_NEAR(result.normalized_error, 1.3, 1e-9);
   EXPECT_FALSE(result.explained);
-  EXPECT_THAT(result.reason, testing::HasSubstr("worse than none"));
+  EXPECT_THAT(result.reason, HasSubstr("worse than none"));
 }
 
 // A variance that is itself the mean of nu squares: the ratio is F(2, 2 nu).
@@ -214,30 +198,36 @@ TEST_F(ValidationOfAStage, FewPeriodsRaiseTheChiSquareOfNoiseAlone) {
   EXPECT_EQ(validate(model, frf).expected_chi_square, 0.0) << "no mean";
 }
 
-TEST_F(ValidationOfAStage, ChannelsMustMatchByName) {
-  const auto message =
-      testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("different channels"));
+TEST_F(ValidationOfAStage, ChannelsMustMatchByNameAndUnit) {
+  const auto refusal = [this] {
+    return test::error_message<std::invalid_argument>([this] { validate(model, frf); });
+  };
+  model.outputs.units = {"m", "m"};
+  frf.outputs.units = {"m", ""};  // unknown: nothing is said against it
+  EXPECT_EQ(refusal(), "no error");
+  frf.outputs.units = {"m", "mm"};
+  EXPECT_THAT(refusal(), HasSubstr(model.outputs.names[1] + " is in m in the model"));
   frf.inputs.names[1] = "other";
-  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+  EXPECT_THAT(refusal(), HasSubstr("different channels"));
   frf.inputs.names[1] = model.inputs.names[1];
   std::swap(frf.outputs.names[0], frf.outputs.names[1]);
-  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+  EXPECT_THAT(refusal(), HasSubstr("different channels"));
   std::swap(frf.outputs.names[0], frf.outputs.names[1]);
   frf = select_channels(frf, {"a1", "a2"}, {"z1", "z2"});
-  EXPECT_THAT([&] { (void)validate(model, frf); }, message);
+  EXPECT_THAT(refusal(), HasSubstr("different channels"));
 }
-
-// The data's history -----------------------------------------------------------------------------
 
 /// Largest relative difference of two responses.
 double distance(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b) {
   return ((a - b).cwiseAbs().array() / b.cwiseAbs().array()).maxCoeff();
 }
 
-TEST_F(ResponseLike, SampledDataAreComparedThroughHoldAndDelay) {
+TEST_F(ResponseLike, SampledDataAreComparedThroughHoldAndDelayOfTheSampleRate) {
   EXPECT_LT(distance(response_like(model, frf),
                      test::reference_response(model, frf.frequency_hz, HoldModel::exact)),
             1e-9);
+  model.sample_rate_hz = 0.0;
+  EXPECT_THROW((void)response_like(model, frf), std::invalid_argument);
 }
 
 TEST_F(ResponseLike, ContinuousDataAreComparedWithoutThem) {
@@ -280,21 +270,6 @@ TEST_F(ResponseLike, AContinuousModelOfCompensatedDataIsTakenAsItIs) {
   frf.hold = Hold::zoh;
   frf.compensated = Compensation::hold;
   EXPECT_LT(distance(response_like(model, frf), frf.response), 1e-12);
-}
-
-TEST_F(ResponseLike, NeedsASampleRateForSampledData) {
-  model.sample_rate_hz = 0.0;
-  EXPECT_THROW((void)response_like(model, frf), std::invalid_argument);
-}
-
-TEST_F(ValidationOfAStage, OtherUnitsAreAnotherResponse) {
-  model.outputs.units = {"m", "m"};
-  frf.outputs.units = {"m", ""};  // unknown: nothing is said against it
-  EXPECT_NO_THROW(validate(model, frf));
-  frf.outputs.units = {"m", "mm"};
-  EXPECT_THAT([&] { validate(model, frf); },
-              testing::ThrowsMessage<std::invalid_argument>(
-                  testing::HasSubstr(model.outputs.names[1] + " is in m in the model")));
 }
 
 TEST_F(ValidationOfAStage, AChannelOfNoiseDoesNotDecideTheRelativeError) {

@@ -127,8 +127,7 @@ FrfEstimate frf_of(const json& problem, const AdditiveModel& model) {
 }
 
 FitOptions options_of(const json& problem) {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   if (problem.contains("weights")) {
     options.weighting = Weighting::user;
     options.user_weights = test::columns<double>(problem["weights"]);

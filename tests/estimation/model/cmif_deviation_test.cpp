@@ -53,15 +53,9 @@ void expect_the_scatter_of_draws(CmifKind kind, int outputs, int inputs) {
     EXPECT_NEAR(predicted(i) / scatter(i), 1.0, 0.025) << "entry " << i;
 }
 
-TEST(CmifDeviation, IsTheScatterOfDrawsOfTheResponse) {
+TEST(CmifDeviation, IsTheScatterOfDraws) {
   expect_the_scatter_of_draws(CmifKind::response, 2, 3);
-}
-
-TEST(CmifDeviation, IsTheScatterOfDrawsWithMoreOutputsThanInputs) {
   expect_the_scatter_of_draws(CmifKind::accelerance, 3, 2);
-}
-
-TEST(CmifDeviation, IsTheScatterOfDrawsWhitened) {
   expect_the_scatter_of_draws(CmifKind::whitened, 2, 2);
 }
 

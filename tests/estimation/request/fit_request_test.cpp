@@ -11,6 +11,7 @@
 #include "estimation/problem/weight_matrices.hpp"
 #include "estimation/request/submodel_text.hpp"
 #include "frf/response/hold_compensation.hpp"
+#include "tests/support/process/error_message.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_fit_request {
@@ -38,14 +39,9 @@ FrfEstimate without_variances() {
   return frf;
 }
 
-/// The message of a refusal; empty if there is none.
+/// The message of a refusal.
 std::string error_of(const FitRequest& request, const FrfEstimate& frf = measured()) {
-  try {
-    make_fit_setup(request, frf);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_message<std::invalid_argument>([&] { make_fit_setup(request, frf); });
 }
 
 TEST(FitRequest, AMeasuredResponseIsFittedExactlyWithEstimatedDelay) {
@@ -131,7 +127,7 @@ TEST(FitRequest, RefusesADelayThatTheLinesCannotTellFromItsAlias) {
   FitRequest request;
   for (const double delay_s : {0.05, -0.05}) {  // 1/(2 df) of lines 10 Hz apart
     request.delay = {DelayModel::fixed, delay_s};
-    EXPECT_EQ(error_of(request), "") << delay_s;
+    EXPECT_EQ(error_of(request), "no error") << delay_s;
   }
   for (const double delay_s : {0.051, -0.051, 1e9}) {
     request.delay = {DelayModel::fixed, delay_s};
@@ -168,13 +164,13 @@ TEST(FitRequest, ModesThatTheLinesCannotTellAreRefused) {
   EXPECT_EQ(error_of(request),
             "modes: 2 is too many; 4 lines support at most 1; use fewer or a wider band");
   request.modes = {ModesRequest::Kind::given, 0, {{499.9}}};
-  EXPECT_EQ(error_of(request), "");
+  EXPECT_EQ(error_of(request), "no error");
   request.modes = {ModesRequest::Kind::given, 0, {{12.0}, {500.0}}};
   EXPECT_EQ(error_of(request),
             "modes: 500 Hz is not below half the sample rate, 500 Hz; use lower frequencies");
   FrfEstimate continuous = measured();
   continuous.hold = Hold::none;
-  EXPECT_EQ(error_of(request, continuous), "");
+  EXPECT_EQ(error_of(request, continuous), "no error");
 }
 
 TEST(FitRequest, WeightsComeFromAFileInTheOrderOfTheResponse) {
@@ -258,7 +254,7 @@ TEST(FitRequest, ContradictingStructuresAreRefusedByName) {
   EXPECT_THAT(error_of(request), HasSubstr("modes: got none"));
   request = {};
   request.submodels = {parse_submodel("l=1,n=0")};
-  EXPECT_EQ(error_of(request), "");
+  EXPECT_EQ(error_of(request), "no error");
   request.rigid_body.kind = RigidBodyRequest::Kind::free;
   EXPECT_THAT(error_of(request), HasSubstr("submodel: 2 terms with integrators"));
   request = {};
@@ -272,7 +268,7 @@ TEST(FitRequest, ContradictingStructuresAreRefusedByName) {
   request.residue_rank = 1;
   EXPECT_THAT(error_of(request), HasSubstr("not to submodel l=0,n=4,m=3"));
   request.submodels = {parse_submodel("n=2,m=1"), parse_submodel("n=0")};
-  EXPECT_EQ(error_of(request), "");
+  EXPECT_EQ(error_of(request), "no error");
 }
 
 TEST(FitRequest, TheRequestIsNamedWhole) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/process/error_message.hpp"
+
 namespace stageid::test_submodel_text {
 
 using testing::HasSubstr;
@@ -14,17 +16,11 @@ TEST(SubmodelText, SaysEverythingInOneLine) {
   EXPECT_EQ(r.shape.integrators, 0);
   EXPECT_EQ(r.frequency_hz, (std::vector<double>{120.0, 180.5}));
   EXPECT_EQ(r.damping_ratio, (std::vector<double>{0.01, 0.02}));
-}
-
-TEST(SubmodelText, TheNumeratorIsStrictlyProperUnlessSaid) {
   EXPECT_EQ(parse_submodel("n=4").shape.numerator_degree, 3);
   EXPECT_EQ(parse_submodel("l=2").shape.numerator_degree, 1);
   EXPECT_EQ(parse_submodel("n=2,l=1").shape.numerator_degree, 2);
   EXPECT_EQ(parse_submodel("n=0").shape.numerator_degree, 0);
   EXPECT_TRUE(parse_submodel("n=auto").order_by_search);
-}
-
-TEST(SubmodelText, ComesBackFromItsText) {
   for (const char* text :
        {"l=0,n=4,m=3,f=120:180,zeta=0.01", "l=2,n=0,m=1", "n=auto", "l=1,n=3,m=3,f=10:20"})
     EXPECT_EQ(submodel_text(parse_submodel(text)), text);
@@ -32,9 +28,8 @@ TEST(SubmodelText, ComesBackFromItsText) {
 
 TEST(SubmodelText, WhatIsWrongIsNamed) {
   const auto wrong = [](const char* text, const char* part) {
-    EXPECT_THAT([text] { (void)parse_submodel(text); },
-                testing::ThrowsMessage<std::invalid_argument>(
-                    testing::AllOf(HasSubstr("--submodel: '"), HasSubstr(part))))
+    EXPECT_THAT(test::error_message<std::invalid_argument>([text] { parse_submodel(text); }),
+                testing::AllOf(HasSubstr("--submodel: '"), HasSubstr(part)))
         << text;
   };
   wrong("", "expected key=value");

@@ -67,12 +67,13 @@ TEST(PoleRelocationShares, DoNotDependOnTheThreads) {
 }
 
 // The conjugate of a stable plant's response is that of one with its poles on the other side.
-TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModes) {
+TEST(PoleRelocationShares, DataOfAnUnstablePlantGiveStableModesAndNoRequestNone) {
   DenseProblem problem = test::noisy_stage(HoldModel::none, 1e-4);
   problem.G = problem.G.conjugate().eval();
   const std::vector<ModeCandidate> modes = relocate(problem, 3);
   ASSERT_FALSE(modes.empty());
   for (const ModeCandidate& mode : modes) EXPECT_GT(mode.damping_ratio, 0.0);
+  EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }
 
 /// A mode at 900 Hz whose width is a tenth of the line spacing: one line determines its frequency, none its damping.
@@ -103,10 +104,6 @@ TEST(PoleRelocationShares, WithoutNoiseAModeNarrowerThanTheLinesIsFoundExactly) 
   ASSERT_EQ(modes.size(), 2U);
   EXPECT_NEAR(modes[1].frequency_hz, 900.0, 1e-9 * 900.0);
   EXPECT_NEAR(modes[1].damping_ratio, 2.5e-4, 1e-6 * 2.5e-4);
-}
-
-TEST(PoleRelocationShares, NothingAskedForNothingFound) {
-  EXPECT_TRUE(relocate(test::noisy_stage(HoldModel::none, 0.0), 0).empty());
 }
 
 }  // namespace stageid::test_pole_relocation
