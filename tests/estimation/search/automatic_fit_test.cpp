@@ -11,12 +11,17 @@
 #include <stdexcept>
 
 #include "estimation/request/fit_request.hpp"
+#include "tests/support/models/expect_same_fit.hpp"
 #include "tests/support/models/model_blind_fit.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/process/random_numbers.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_automatic_fit {
+
+using testing::Contains;
+using testing::DoubleNear;
+using testing::HasSubstr;
+using testing::StartsWith;
 
 /// The paper's stage on every third of its lines: quick, and the sharpest modes (0.2 % at 100 Hz)
 /// have hardly a line in their half-power width.
@@ -49,18 +54,14 @@ TEST(AutomaticFit, FindsWhatIsThereBlind) {
 // The measure itself must be able to fail: a fit with two modes too few is not a success.
 TEST(AutomaticFit, TheMeasureOfSuccessSeesAMissingMode) {
   const test::RandomStage stage = test::draw_random_stage(101, quick_stage());
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  options.hold = HoldModel::exact;
-  options.delay_s = stage.delay_s;
+  FitOptions options = test::fit_options(Weighting::noise_variance, HoldModel::exact,
+                                         DelayModel::fixed, stage.delay_s);
   options.uncertainty = false;
   AdditiveModel less = stage.truth;
   less.submodels.pop_back();
   const double all = fit_additive_model(stage.frf, stage.truth, options).model.fit.cost;
   EXPECT_GT(fit_additive_model(stage.frf, less, options).model.fit.cost, 1.005 * all);
 }
-
-// Structures --------------------------------------------------------------------------------------
 
 /// A 2 x 2 stage with three well separated modes and 0.5 % relative noise; no sample rate.
 class SmallStage : public testing::Test {
@@ -71,16 +72,14 @@ class SmallStage : public testing::Test {
     problem_.frequency_hz = Eigen::VectorXd::LinSpaced(500, 10.0, 1000.0);
     problem_.model.submodels.push_back(test::empty_submodel(problem_.model, 2, {}, 1));
     for (const double f : {120.0, 390.0, 640.0})
-      problem_.model.submodels.push_back(
-          test::empty_submodel(problem_.model, 0, test::mode_coefficients(f, 0.01), 1));
+      problem_.model.submodels.push_back(test::empty_mode(problem_.model, f, 0.01));
     for (Submodel& s : problem_.model.submodels)
       for (double& value : s.numerator[0].reshaped())
         value = (s.is_mode() ? s.denominator[2] : 1.0) * (random.uniform() < 0.5 ? -1.0 : 1.0) *
                 random.uniform(0.5, 2.0);
-    problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+    test::measure(problem_);
     frf_ = test::frf_of(problem_);
-    for (std::complex<double>& value : frf_.response.reshaped())
-      value *= 1.0 + 0.005 * random.circular();
+    test::add_relative_noise(frf_.response, 0.005, random);
   }
 
   static std::vector<double> frequencies(const AdditiveModel& model) {
@@ -96,7 +95,7 @@ class SmallStage : public testing::Test {
 
 testing::Matcher<std::vector<double>> near_hz(std::initializer_list<double> expected) {
   std::vector<testing::Matcher<double>> each;
-  for (const double f : expected) each.push_back(testing::DoubleNear(f, 1e-4 * f));
+  for (const double f : expected) each.push_back(DoubleNear(f, 1e-4 * f));
   return testing::ElementsAreArray(each);
 }
 
@@ -107,15 +106,15 @@ TEST_F(SmallStage, FindsItsModesAndSaysWhatItDid) {
   EXPECT_EQ(fit.model.submodels.size(), 4U);
   EXPECT_EQ(fit.model.submodels[0].integrators, 2);
   ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), testing::HasSubstr("peaks of the CMIF"));
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::HasSubstr("no further mode")));
+  EXPECT_THAT(fit.decisions.front(), HasSubstr("peaks of the CMIF"));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("no further mode")));
 }
 
 TEST_F(SmallStage, CompletesAStartThatLacksAMode) {
   const FitResult fit =
       automatic_fit(frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}}, {});
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("added 39")));
+  EXPECT_THAT(fit.decisions, Contains(StartsWith("added 39")));
 }
 
 TEST_F(SmallStage, DropsModesThatAreNotThereAndMergesTwoOnOnePeak) {
@@ -123,7 +122,7 @@ TEST_F(SmallStage, DropsModesThatAreNotThereAndMergesTwoOnOnePeak) {
       {119.5, 0.01, 1}, {120.5, 0.01, 1}, {250.0, 0.01, 1}, {391.0, 0.01, 1}, {639.0, 0.01, 1}};
   const FitResult fit = automatic_fit(frf_, {}, {.modes = modes}, {});
   EXPECT_THAT(frequencies(fit.model), near_hz({120.0, 390.0, 640.0}));
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("dropped")));
+  EXPECT_THAT(fit.decisions, Contains(StartsWith("dropped")));
 }
 
 TEST_F(SmallStage, FitsSoManyModesAsAsked) {
@@ -137,7 +136,7 @@ TEST_F(SmallStage, FitsSoManyModesAsAsked) {
 // worthy are dropped, finds it.
 TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
   const FitResult fit = automatic_fit(frf_, {}, {.modes = {}, .exactly = 2}, {});
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::StartsWith("2 modes, reached by way of ")));
+  EXPECT_THAT(fit.decisions, Contains(StartsWith("2 modes, reached by way of ")));
   double best = HUGE_VAL;  // of every pair of the three true modes
   for (const auto& pair : {std::pair{120.0, 390.0}, {120.0, 640.0}, {390.0, 640.0}}) {
     const FitResult two = automatic_fit(
@@ -146,12 +145,6 @@ TEST_F(SmallStage, TriesMoreThanOneWayToTheNumberAsked) {
     best = std::min(best, two.model.fit.cost);
   }
   EXPECT_LE(fit.model.fit.cost, best * (1.0 + 1e-9));
-}
-
-TEST_F(SmallStage, KeepsTheModesThatItIsToldToKeep) {
-  const FitResult fit = automatic_fit(
-      frf_, {}, {.modes = {{121.0, 0.01, 1}, {638.0, 0.01, 1}}, .keep_modes = true}, {});
-  EXPECT_EQ(frequencies(fit.model).size(), 2U);
 }
 
 // The noise decides where it ends, so its standard deviation is small.
@@ -207,8 +200,7 @@ FrfEstimate comb_of(int modes) {
   test::RandomNumbers random(1);
   frf.noise_variance = 1e-6 * frf.response.cwiseAbs2();
   frf.noise_dof = 1000.0;
-  for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    frf.response(0, k) += std::sqrt(frf.noise_variance(0, k)) * random.circular();
+  test::add_noise(frf, random);
   return frf;
 }
 
@@ -229,7 +221,7 @@ TEST(AutomaticFit, ModesHiddenByNoiseAreHeldAndToldWhateverTheirNumber) {
     request.modes = {ModesRequest::Kind::count, modes + 2, {}};
     const FitResult fit = fit_model(comb_of(modes), request);
     EXPECT_EQ(fit.status(), FitStatus::undetermined);
-    EXPECT_THAT(fit.message(), testing::HasSubstr("the data do not support the modes at"));
+    EXPECT_THAT(fit.message(), HasSubstr("the data do not support the modes at"));
     held += std::ranges::count(fit.model.submodels, HeldPole::pole, &Submodel::held);
     int determined = 0;
     for (const Submodel& s : fit.model.submodels) {
@@ -288,8 +280,6 @@ TEST_F(SmallStage, WithoutRigidBodyThereIsNone) {
   EXPECT_EQ(fit.model.submodels.size(), 3U);
 }
 
-// Searches that add modes which are not modes -----------------------------------------------------
-
 TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
   constexpr double kDelay_s = 1e-4;
   for (Eigen::Index k = 0; k < frf_.lines(); ++k)
@@ -302,7 +292,7 @@ TEST_F(SmallStage, ADelayThatIsDeniedEndsTheSearchAndIsNamed) {
     EXPECT_THAT(fit.findings,
                 testing::ElementsAre(testing::AllOf(
                     testing::ContainsRegex("a delay of (9\\.99|0\\.0001).* s instead of"),
-                    testing::HasSubstr("use --delay estimate"))));
+                    HasSubstr("use --delay estimate"))));
     EXPECT_LE(frequencies(fit.model).size(), 6U);
     if (denied_s != 0.0) continue;  // such a fit need not converge
     EXPECT_EQ(fit.status(), FitStatus::unexplained) << fit.message();
@@ -321,8 +311,7 @@ TEST(AutomaticFit, ModesCloserThanTheirWidthsAreAllFound) {
   for (int i = 0; i < 14; ++i) frequency_hz.push_back(26.0 + 0.5 * i);
   FrfEstimate frf = response_of(frequency_hz, 0.01, Eigen::VectorXd::LinSpaced(2000, 5.0, 60.0));
   test::RandomNumbers random(4);
-  for (std::complex<double>& value : frf.response.reshaped())
-    value *= 1.0 + 1e-3 * random.circular();
+  test::add_relative_noise(frf.response, 1e-3, random);
   const FitResult fit = automatic_fit(frf, {.rigid_body = false}, {}, {});
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), frequency_hz.size());
@@ -339,9 +328,9 @@ TEST_F(SmallStage, OutliersAreNotModes) {
   for (const Submodel& s : fit.model.submodels)
     if (s.is_mode() && s.verdict == ModeVerdict::determined) {
       EXPECT_THAT((std::vector{120.0, 390.0, 640.0}),
-                  testing::Contains(testing::DoubleNear(s.natural_frequency_hz(), 0.1)));
+                  Contains(DoubleNear(s.natural_frequency_hz(), 0.1)));
     }
-  EXPECT_THAT(fit.decisions, testing::Contains(testing::HasSubstr("as an outlier does")));
+  EXPECT_THAT(fit.decisions, Contains(HasSubstr("as an outlier does")));
 }
 
 TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
@@ -349,43 +338,26 @@ TEST_F(SmallStage, TheNumberOfThreadsDoesNotChangeABit) {
   options.threads = 1;
   const FitResult one = automatic_fit(frf_, {}, {}, options);
   options.threads = 2;
-  const FitResult two = automatic_fit(frf_, {}, {}, options);
-  ASSERT_EQ(one.model.submodels.size(), two.model.submodels.size());
-  EXPECT_EQ(one.cost, two.cost);
-  EXPECT_EQ(one.decisions, two.decisions);
-  for (std::size_t i = 0; i < one.model.submodels.size(); ++i) {
-    EXPECT_EQ(one.model.submodels[i].denominator, two.model.submodels[i].denominator);
-    EXPECT_EQ(one.model.submodels[i].numerator, two.model.submodels[i].numerator);
-  }
+  test::expect_same(one, automatic_fit(frf_, {}, {}, options));
 }
 
 TEST_F(SmallStage, FewLinesAreNotOverfitted) {
   const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 20 lines, one mode
   const FitResult fit = automatic_fit(few, {}, {}, {});
   EXPECT_LE(frequencies(fit.model).size(), 3U);
-  EXPECT_THAT(frequencies(fit.model), testing::Contains(testing::DoubleNear(120.0, 0.1)));
+  EXPECT_THAT(frequencies(fit.model), Contains(DoubleNear(120.0, 0.1)));
 }
 
-TEST_F(SmallStage, RefusesNumbersOfModesThatAreNone) {
-  const auto message = testing::ThrowsMessage<std::invalid_argument>(
-      testing::HasSubstr("number of modes must be positive"));
-  EXPECT_THAT([this] { (void)automatic_fit(frf_, {}, {.modes = {}, .exactly = -1}, {}); }, message);
-}
-
-TEST_F(SmallStage, RefusesMoreModesThanTheLinesCarryBeforeItTries) {
+TEST_F(SmallStage, RefusesNumbersOfModesThatAreNoneOrMoreThanTheLinesCarry) {
   const FrfEstimate few = select_band(frf_, 100.0, 140.0);  // 21 lines
-  const auto message = testing::ThrowsMessage<std::invalid_argument>(
-      testing::HasSubstr("too few for 60 modes; request at most"));
-  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = {}, .exactly = 60}, {}); }, message);
-  const std::vector<ModeCandidate> modes(60, {120.0, 0.01, 1});
-  EXPECT_THAT([&] { (void)automatic_fit(few, {}, {.modes = modes}, {}); }, message);
-}
-
-TEST_F(SmallStage, RefusesWeightsThatAreNotThere) {
-  FitOptions options;
-  options.weighting = Weighting::total_variance;
-  EXPECT_THAT([&] { (void)automatic_fit(frf_, {}, {}, options); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("total_variance")));
+  const auto refusal = [&few](const ModeSelection& modes) {
+    return test::error_message<std::invalid_argument>([&] { automatic_fit(few, {}, modes, {}); });
+  };
+  EXPECT_THAT(refusal({.modes = {}, .exactly = -1}), HasSubstr("number of modes must be positive"));
+  for (const ModeSelection& modes :
+       {ModeSelection{.modes = {}, .exactly = 60},
+        ModeSelection{.modes = std::vector<ModeCandidate>(60, {120.0, 0.01, 1})}})
+    EXPECT_THAT(refusal(modes), HasSubstr("too few for 60 modes; request at most"));
 }
 
 }  // namespace stageid::test_automatic_fit

@@ -18,16 +18,6 @@ const std::vector<test::Part>& one_mode() {
   return parts;
 }
 
-FitResult fit_submodels(const FrfEstimate& frf, std::vector<SubmodelRequest> submodels,
-                        const FitOptions& options = {}) {
-  RequestedStructure structure;
-  structure.common.rigid_body = false;
-  structure.submodels = std::move(submodels);
-  ModeSelection none;
-  none.keep_modes = true;
-  return structured_fit(frf, structure, none, options);
-}
-
 void expect_stable_and_finite(const FitResult& fit) {
   for (const Submodel& s : fit.model.submodels) {
     EXPECT_TRUE(std::isfinite(s.natural_frequency_std_hz.value_or(0.0)));
@@ -44,7 +34,7 @@ void expect_stable_and_finite(const FitResult& fit) {
 
 TEST(Determinacy, TwoSubmodelsOnOnePoleAreNamed) {
   const FrfEstimate frf = test::frf_of(test::measured(one_mode(), HoldModel::none, 0.0));
-  const FitResult fit = fit_submodels(
+  const FitResult fit = test::fit_submodels(
       frf, {{{0, 2, 1}, false, {199.0}, {0.02}}, {{0, 2, 1}, false, {199.0}, {0.02}}});
   EXPECT_FALSE(fit.trustworthy());
   // They remain together, or one of them takes the mode and the other is left with rounding.
@@ -56,7 +46,7 @@ TEST(Determinacy, TwoSubmodelsOnOnePoleAreNamed) {
 
 TEST(Determinacy, AnOrderThatNoiseFreeDataDoNotHave) {
   const FrfEstimate frf = test::frf_of(test::measured(one_mode(), HoldModel::none, 0.0));
-  const FitResult fit = fit_submodels(frf, {{{0, 6, 5}, false, {50.0, 201.0, 700.0}, {}}});
+  const FitResult fit = test::fit_submodels(frf, {{{0, 6, 5}, false, {50.0, 201.0, 700.0}, {}}});
   EXPECT_EQ(fit.status(), FitStatus::undetermined) << fit.message();
   EXPECT_THAT(fit.message(), HasSubstr("submodel 1 (l=0, n=6, m=5"));
   expect_stable_and_finite(fit);
@@ -64,9 +54,8 @@ TEST(Determinacy, AnOrderThatNoiseFreeDataDoNotHave) {
 
 TEST(Determinacy, ARealPoleThatIsOnlyNoiseIsNotTrusted) {
   const FrfEstimate frf = test::noisy(test::measured(one_mode(), HoldModel::none, 0.0), 0.05, 2);
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  const FitResult fit = fit_submodels(
+  FitOptions options = test::fit_options(Weighting::noise_variance);
+  const FitResult fit = test::fit_submodels(
       frf, {{{0, 2, 1}, false, {201.0}, {}}, {{0, 1, 0}, false, {80.0}, {}}}, options);
   EXPECT_FALSE(fit.trustworthy());
   EXPECT_THAT(fit.message(), HasSubstr("submodel 2 (l=0, n=1, m=0"));
@@ -78,7 +67,7 @@ TEST(Determinacy, ARealPoleFarAboveTheLinesStandsAtItsBound) {
   const FrfEstimate frf =
       test::frf_of(test::measured({{0, {}, 0}, one_mode()[0]}, HoldModel::none, 0.0));
   const FitResult fit =
-      fit_submodels(frf, {{{0, 2, 1}, false, {201.0}, {}}, {{0, 1, 0}, false, {900.0}, {}}});
+      test::fit_submodels(frf, {{{0, 2, 1}, false, {201.0}, {}}, {{0, 1, 0}, false, {900.0}, {}}});
   EXPECT_FALSE(fit.trustworthy());
   EXPECT_THAT(fit.message(), HasSubstr("submodel 2 (l=0, n=1, m=0, pole at 9990 Hz)"));
   EXPECT_THAT(fit.held, testing::Contains(1U));
@@ -91,7 +80,7 @@ TEST(Determinacy, DataOfAnUnstablePlantAreNotFittedByAnUnstableModel) {
   test::Poles poles = mode_poles(200.0, 0.02);
   for (const std::complex<double> pole : mode_poles(400.0, 0.01)) poles.push_back(-std::conj(pole));
   const FrfEstimate frf = test::frf_of(test::measured({{0, poles, 3}}, HoldModel::none, 0.0));
-  const FitResult fit = fit_submodels(frf, {{{0, 4, 3}, false, {201.0, 399.0}, {}}});
+  const FitResult fit = test::fit_submodels(frf, {{{0, 4, 3}, false, {201.0, 399.0}, {}}});
   EXPECT_FALSE(fit.trustworthy()) << fit.message();
   expect_stable_and_finite(fit);
 }
@@ -124,7 +113,7 @@ TEST(Determinacy, StartsAtRandomNeverEndUnstable) {
     if (submodels[0].biproper() && submodels[1].biproper()) submodels.pop_back();
     SCOPED_TRACE(testing::Message()
                  << "start " << i << ", n " << n << ", " << to_string(options.method));
-    expect_stable_and_finite(fit_submodels(frf, submodels, options));
+    expect_stable_and_finite(test::fit_submodels(frf, submodels, options));
   }
 }
 

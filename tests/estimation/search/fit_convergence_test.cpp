@@ -4,15 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
 #include <cmath>
 #include <numbers>
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"
-#include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
+#include "tests/support/models/expect_same_fit.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test_fit_convergence {
@@ -20,8 +18,6 @@ namespace stageid::test_fit_convergence {
 using test::DenseProblem;
 using test::moved;
 using test::noisy_stage;
-
-// First-order condition ---------------------------------------------------------------------------
 
 /// A fit and the first-order condition at its end, by separate code.
 std::pair<FitResult, double> fit_and_condition(FitMethod method, HoldModel hold,
@@ -65,8 +61,6 @@ TEST(FitConvergence, ThePapersFirstOrderConditionHolds) {
     }
 }
 
-// Trials ------------------------------------------------------------------------------------------
-
 TEST(FitConvergence, ATrialThatCannotReachItsCostIsGivenUp) {
   const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
   const FrfEstimate frf = test::frf_of(problem);
@@ -86,8 +80,6 @@ TEST(FitConvergence, ATrialThatCannotReachItsCostIsGivenUp) {
   EXPECT_EQ(given_up.status(), FitStatus::iteration_limit);
   EXPECT_LT(given_up.cost.size(), whole.cost.size());
 }
-
-// Convex start --------------------------------------------------------------------------------------
 
 TEST(FitConvergence, TheConvexStartIsTheWeightedLeastSquaresSolution) {
   for (const double apart : {1.1, 1.003}) {  // the second pair is inside its half-power width
@@ -142,8 +134,6 @@ TEST(FitConvergence, TheConvexStartIsTheWeightedLeastSquaresSolution) {
   }
 }
 
-// Methods --------------------------------------------------------------------------------------------
-
 TEST(FitConvergence, RivAndGaussNewtonReachOneMinimumAndSkAnotherPoint) {
   const DenseProblem problem = noisy_stage(HoldModel::none, 0.2, 3);
   const auto fit_by = [&](FitMethod method) {
@@ -174,9 +164,8 @@ TEST(FitConvergence, TheCostNeverRises) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed)
     for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
       const DenseProblem problem = noisy_stage(HoldModel::exact, 0.1, seed);
-      FitOptions options;
-      options.hold = HoldModel::exact;
-      options.delay = DelayModel::estimate;
+      FitOptions options =
+          test::fit_options(Weighting::relative, HoldModel::exact, DelayModel::estimate);
       options.method = method;
       std::vector<double> seen;
       options.progress = [&](int iteration, double cost) {
@@ -196,48 +185,40 @@ TEST(FitConvergence, TheCostNeverRises) {
     }
 }
 
-// Statuses -------------------------------------------------------------------------------------------
-
-TEST(FitStatus, IterationLimit) {
+TEST(FitStatus, IsWhatEndedTheFit) {
   const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
-  FitOptions options;
-  options.max_iterations = 1;
-  const FitResult fit =
-      fit_additive_model(test::frf_of(problem), moved(problem.model, 1.01, 3.0), options);
-  EXPECT_EQ(fit.status(), FitStatus::iteration_limit);
-  EXPECT_FALSE(fit.trustworthy());
-  EXPECT_EQ(fit.model.fit.iterations, 1);
-  EXPECT_THAT(fit.message(), testing::HasSubstr("1 iterations"));
+  struct End {
+    void (*set)(FitOptions&);
+    AdditiveModel start;
+    FitStatus status;
+  };
+  const AdditiveModel near = moved(problem.model, 1.002, 1.5);
+  for (const End& end :
+       {End{[](FitOptions& o) { o.max_iterations = 1; }, moved(problem.model, 1.01, 3.0),
+            FitStatus::iteration_limit},
+        {[](FitOptions& o) { o.gradient_tolerance = 1e-5; }, near, FitStatus::gradient_small},
+        {[](FitOptions& o) { o.gradient_tolerance = o.deviation_tolerance = 0.0; }, near,
+         FitStatus::step_small}}) {
+    FitOptions options;
+    end.set(options);
+    const FitResult fit = fit_additive_model(test::frf_of(problem), end.start, options);
+    EXPECT_EQ(fit.status(), end.status) << fit.message();
+    EXPECT_EQ(fit.trustworthy(), end.status != FitStatus::iteration_limit);
+    if (fit.trustworthy()) continue;
+    EXPECT_EQ(fit.model.fit.iterations, 1);
+    EXPECT_THAT(fit.message(), testing::HasSubstr("1 iterations"));
+  }
 }
 
-TEST(FitStatus, GradientSmall) {
-  const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
-  FitOptions options;
-  options.gradient_tolerance = 1e-5;
-  const FitResult fit =
-      fit_additive_model(test::frf_of(problem), moved(problem.model, 1.002, 1.5), options);
-  EXPECT_EQ(fit.status(), FitStatus::gradient_small) << fit.message();
-  EXPECT_TRUE(fit.trustworthy());
-}
-
-TEST(FitStatus, StepSmall) {
-  const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
-  FitOptions options;
-  options.gradient_tolerance = 0.0;
-  options.deviation_tolerance = 0.0;
-  const FitResult fit =
-      fit_additive_model(test::frf_of(problem), moved(problem.model, 1.002, 1.5), options);
-  EXPECT_EQ(fit.status(), FitStatus::step_small) << fit.message();
-  EXPECT_TRUE(fit.trustworthy());
-}
-
-TEST(FitStatus, LinearProblemsAreSolvedAtOnce) {
+TEST(FitStatus, LinearProblemsAreSolvedAtOnceAndNoFitIsNotTrusted) {
   const DenseProblem problem = noisy_stage(HoldModel::none, 0.03);
   AdditiveModel start;
   start.submodels = {problem.model.submodels[0]};
   const FitResult fit = fit_additive_model(test::frf_of(problem), start, {});
   EXPECT_EQ(fit.status(), FitStatus::gradient_small);
   EXPECT_EQ(fit.model.fit.iterations, 0);
+  EXPECT_FALSE(FitResult{}.trustworthy());
+  EXPECT_TRUE(AdditiveModel{}.fit.trustworthy());  // the model of another program
 }
 
 TEST(FitStatus, TwoModesInOnePlaceAreNotReportedAsConverged) {
@@ -259,27 +240,6 @@ TEST(FitStatus, TwoModesInOnePlaceAreNotReportedAsConverged) {
   for (const Submodel& s : fit.model.submodels) EXPECT_TRUE(s.numerator[0].allFinite());
 }
 
-TEST(FitStatus, WithoutAFitThereIsNothingToTrust) {
-  EXPECT_FALSE(FitResult{}.trustworthy());
-  EXPECT_TRUE(AdditiveModel{}.fit.trustworthy());  // the model of another program
-}
-
-// Threads and determinism ----------------------------------------------------------------------------
-
-void expect_same_bits(const FitResult& a, const FitResult& b) {
-  EXPECT_EQ(a.cost, b.cost);
-  EXPECT_EQ(a.model.input_delay_s, b.model.input_delay_s);
-  EXPECT_EQ(a.model.output_delay_s, b.model.output_delay_s);
-  ASSERT_EQ(a.model.submodels.size(), b.model.submodels.size());
-  for (std::size_t i = 0; i < a.model.submodels.size(); ++i) {
-    EXPECT_EQ(a.model.submodels[i].denominator, b.model.submodels[i].denominator);
-    EXPECT_EQ(a.model.submodels[i].numerator, b.model.submodels[i].numerator);
-    EXPECT_EQ(a.model.submodels[i].natural_frequency_std_hz,
-              b.model.submodels[i].natural_frequency_std_hz);
-  }
-  EXPECT_EQ(a.response_variance, b.response_variance);
-}
-
 TEST(FitThreads, DoNotChangeABit) {
   test::RandomStageSpec spec;
   spec.outputs = 3;
@@ -287,18 +247,15 @@ TEST(FitThreads, DoNotChangeABit) {
   spec.line_spacing_hz = 2.0;
   const test::RandomStage stage = test::draw_random_stage(17, spec);
   for (const DelayModel delay : {DelayModel::estimate, DelayModel::per_channel}) {
-    FitOptions options;
-    options.weighting = Weighting::noise_variance;
-    options.hold = HoldModel::exact;
-    options.delay = delay;
-    options.delay_s = 1e-4;
+    FitOptions options =
+        test::fit_options(Weighting::noise_variance, HoldModel::exact, delay, 1e-4);
     options.max_iterations = 6;
     options.threads = 1;
     const FitResult one = fit_additive_model(stage.frf, moved(stage.truth, 1.0004, 1.2), options);
     for (const int threads : {2, 3, 0}) {
       options.threads = threads;
-      expect_same_bits(one,
-                       fit_additive_model(stage.frf, moved(stage.truth, 1.0004, 1.2), options));
+      test::expect_same(one,
+                        fit_additive_model(stage.frf, moved(stage.truth, 1.0004, 1.2), options));
     }
   }
 }

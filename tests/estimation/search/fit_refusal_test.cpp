@@ -9,117 +9,90 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/noisy_stage.hpp"
+#include "tests/support/process/error_message.hpp"
 
 namespace stageid::test_fit_refusal {
 
 using test::DenseProblem;
 using test::moved;
 using test::noisy_stage;
+using testing::HasSubstr;
 
-class FitRefusal : public testing::Test {
- protected:
-  void expect_refused(const std::string& part) {
-    EXPECT_THAT([this] { (void)fit_additive_model(frf_, start_, options_); },
-                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(part)));
-  }
-  DenseProblem problem_ = noisy_stage(HoldModel::exact, 0.01);
-  FrfEstimate frf_ = test::frf_of(problem_);
-  AdditiveModel start_ = moved(problem_.model, 1.0, 1.0);
-  FitOptions options_;
+struct Request {
+  DenseProblem problem = noisy_stage(HoldModel::exact, 0.01);
+  FrfEstimate frf = test::frf_of(problem);
+  AdditiveModel start = moved(problem.model, 1.0, 1.0);
+  FitOptions options;
 };
 
-TEST_F(FitRefusal, NothingIsWrongWithTheFixture) {
-  options_.max_iterations = 0;
-  EXPECT_NO_THROW((void)fit_additive_model(frf_, start_, options_));
+struct Refusal {
+  void (*spoil)(Request&);
+  const char* message;
+};
+
+const Eigen::MatrixXd kZero = Eigen::MatrixXd::Zero(2, 3);
+
+const Refusal kRefusals[] = {
+    {[](Request& r) { r.start.submodels.clear(); }, "no submodel"},
+    {[](Request& r) { r.frf.response *= 1e-170; }, "out of range for double precision"},
+    {[](Request& r) { r.frf.response *= 1e170; }, "out of range for double precision"},
+    {[](Request& r) { r.options.max_iterations = -1; }, "max_iterations"},
+    {[](Request& r) { r.options.delay_s = std::nan(""); }, "delay must be finite"},
+    {[](Request& r) {
+       r.frf.hold = Hold::none;
+       r.frf.sample_rate_hz = 3600.0;
+       r.options.hold = HoldModel::exact;
+     },
+     "half the sample rate"},
+    {[](Request& r) { r.start.submodels[1].denominator[0] = 2.0; }, "must start with 1"},
+    {[](Request& r) { r.start.submodels[1].denominator.clear(); }, "must start with 1"},
+    {[](Request& r) { r.start.submodels[1].denominator.back() = 0.0; }, "not end with 0"},
+    {[](Request& r) { r.start.submodels[1].denominator.back() = std::nan(""); }, "must be finite"},
+    {[](Request& r) { r.start.submodels[0].integrators = 3; }, "0, 1 or 2 integrators"},
+    {[](Request& r) { r.start.submodels[0].integrators = -1; }, "0, 1 or 2 integrators"},
+    {[](Request& r) { r.start.submodels[1].numerator.clear(); }, "proper and have a numerator"},
+    {[](Request& r) { r.start.submodels[1].numerator.assign(4, kZero); },
+     "proper and have a numerator"},
+    {[](Request& r) { r.start.submodels[1].numerator[0].resize(3, 2); }, "outputs x inputs"},
+    {[](Request& r) {
+       for (const int i : {1, 2}) r.start.submodels[i].numerator.assign(3, kZero);
+     },
+     "biproper"},
+    {[](Request& r) { r.start.submodels[1].integrators = 1; }, "may have integrators"},
+    {[](Request& r) { r.frf = select_band(r.frf, 20.0, 21.0); }, "too few for"},
+    {[](Request& r) { r.frf.response(3, 7) = std::nan(""); }, "response[line 7"},
+};
+
+std::string refusal(const Request& r) {
+  return test::error_message<std::invalid_argument>(
+      [&] { fit_additive_model(r.frf, r.start, r.options); });
 }
 
-TEST_F(FitRefusal, NoSubmodel) {
-  start_.submodels.clear();
-  expect_refused("no submodel");
-}
-TEST_F(FitRefusal, AResponseOfZerosHasNoModel) {
-  frf_.response.setZero();
-  for (const int modes : {0, 2})
-    EXPECT_THAT([&] { (void)structured_fit(frf_, {}, {.modes = {}, .exactly = modes}, options_); },
-                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("is zero")));
-}
-TEST_F(FitRefusal, AResponseWhoseWeightsLeaveTheRangeOfNumbers) {
-  options_.weighting = Weighting::relative;
-  const Eigen::MatrixXcd response = frf_.response;
-  for (const double scale : {1e-170, 1e170}) {
-    frf_.response = scale * response;
-    expect_refused("out of range for double precision");
+TEST(FitRefusal, NamesWhatIsWrong) {
+  const Request right;
+  for (const auto& [spoil, message] : kRefusals) {
+    Request wrong = right;
+    spoil(wrong);
+    EXPECT_THAT(refusal(wrong), HasSubstr(message));
   }
 }
-TEST_F(FitRefusal, NegativeIterations) {
-  options_.max_iterations = -1;
-  expect_refused("max_iterations");
-}
-TEST_F(FitRefusal, ADelayThatIsNotANumber) {
-  options_.delay_s = std::nan("");
-  expect_refused("delay must be finite");
-}
-TEST_F(FitRefusal, AHoldWithoutSampleRate) {
-  frf_.sample_rate_hz = 0.0;
+
+TEST(FitRefusal, AHoldWithoutSampleRate) {
+  Request request;
+  request.frf.sample_rate_hz = 0.0;
   for (const HoldModel hold : {HoldModel::phase, HoldModel::sinc, HoldModel::exact}) {
-    options_.hold = hold;
-    expect_refused("needs a sample rate");
+    request.options.hold = hold;
+    EXPECT_THAT(refusal(request), HasSubstr("needs a sample rate"));
   }
 }
-TEST_F(FitRefusal, LinesAtHalfTheSampleRate) {
-  frf_.hold = Hold::none;
-  frf_.sample_rate_hz = 3600.0;
-  options_.hold = HoldModel::exact;
-  expect_refused("half the sample rate");
-}
-TEST_F(FitRefusal, ADenominatorThatDoesNotStartWithOne) {
-  start_.submodels[1].denominator[0] = 2.0;
-  expect_refused("must start with 1");
-  start_.submodels[1].denominator.clear();
-  expect_refused("must start with 1");
-}
-TEST_F(FitRefusal, ADenominatorThatEndsWithZeroOrIsNotFinite) {
-  start_.submodels[1].denominator.back() = 0.0;
-  expect_refused("not end with 0");
-  start_.submodels[1].denominator.back() = std::nan("");
-  expect_refused("must be finite");
-}
-TEST_F(FitRefusal, ThreeIntegrators) {
-  start_.submodels[0].integrators = 3;
-  expect_refused("0, 1 or 2 integrators");
-  start_.submodels[0].integrators = -1;
-  expect_refused("0, 1 or 2 integrators");
-}
-TEST_F(FitRefusal, ImproperOrWithoutNumerator) {
-  start_.submodels[1].numerator.clear();
-  expect_refused("proper and have a numerator");
-  start_.submodels[1].numerator.assign(4, Eigen::MatrixXd::Zero(2, 3));
-  expect_refused("proper and have a numerator");
-}
-TEST_F(FitRefusal, ANumeratorOfAnotherShape) {
-  start_.submodels[1].numerator[0] = Eigen::MatrixXd::Zero(3, 2);
-  expect_refused("outputs x inputs");
-}
-TEST_F(FitRefusal, TwoBiproperSubmodels) {
-  start_.submodels[1].numerator.assign(3, Eigen::MatrixXd::Zero(2, 3));
-  start_.submodels[2].numerator.assign(3, Eigen::MatrixXd::Zero(2, 3));
-  expect_refused("biproper");
-}
-TEST_F(FitRefusal, TwoSubmodelsWithIntegrators) {
-  start_.submodels[1].integrators = 1;
-  expect_refused("may have integrators");
-}
-TEST_F(FitRefusal, MoreParametersThanData) {
-  frf_ = select_band(frf_, 20.0, 21.0);
-  expect_refused("too few for");
-}
-TEST_F(FitRefusal, AnFrfThatIsNotOne) {
-  frf_.response(3, 7) = std::complex<double>(std::nan(""), 0.0);
-  expect_refused("response[line 7");
-}
-TEST_F(FitRefusal, WeightsThatAreNotThere) {
-  options_.weighting = Weighting::noise_variance;
-  expect_refused("noise_variance");
+
+TEST(FitRefusal, AResponseOfZerosHasNoModel) {
+  FrfEstimate frf = Request().frf;
+  frf.response.setZero();
+  for (const int modes : {0, 2})
+    EXPECT_THAT(test::error_message<std::invalid_argument>(
+                    [&] { structured_fit(frf, {}, {.modes = {}, .exactly = modes}, {}); }),
+                HasSubstr("is zero"));
 }
 
 }  // namespace stageid::test_fit_refusal

@@ -9,8 +9,6 @@
 
 #include "estimation/request/fit_request.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_honest_deviations {
 
@@ -25,8 +23,7 @@ constexpr double kNoise = 3e-3;  // of the median magnitude
 using Noise = std::function<Eigen::MatrixXcd(test::RandomNumbers& random, Eigen::Index lines)>;
 
 Eigen::MatrixXcd white(test::RandomNumbers& random, Eigen::Index lines) {
-  return Eigen::MatrixXcd::NullaryExpr(kOutputs * kInputs, lines,
-                                       [&] { return random.circular(); });
+  return test::circular_matrix(random, kOutputs * kInputs, lines);
 }
 
 /// Six modes; numerators B_0 (1 + general r s / omega) with random r of each entry.
@@ -36,25 +33,21 @@ test::DenseProblem plant(double general) {
   out.model = test::named_model(kOutputs, kInputs);
   out.frequency_hz = Eigen::VectorXd::LinSpaced(750, 30.0, 779.0);
   for (const double f : {95.0, 150.0, 310.0, 335.0, 520.0, 660.0}) {
-    Submodel& s = out.model.submodels.emplace_back(
-        test::empty_submodel(out.model, 0, test::mode_coefficients(f, 0.01), 2));
+    Submodel& s = out.model.submodels.emplace_back(test::empty_mode(out.model, f, 0.01, 2));
     for (Eigen::Index c = 0; c < s.numerator[0].size(); ++c) {
       const double B = s.denominator[2] * random.normal();
       s.numerator[0].reshaped()[c] = B;
       s.numerator[1].reshaped()[c] = B * general * random.normal() * std::sqrt(s.denominator[2]);
     }
   }
-  out.G = test::reference_response(out.model, out.frequency_hz, HoldModel::none);
+  test::measure(out);
   return out;
 }
 
 FrfEstimate measured(const test::DenseProblem& plant, std::uint64_t seed, const Noise& noise) {
   test::RandomNumbers random(seed);
   FrfEstimate frf = test::frf_of(plant);
-  std::vector<double> size(plant.G.size());
-  std::ranges::transform(plant.G.reshaped(), size.begin(), [](auto g) { return std::abs(g); });
-  std::ranges::nth_element(size, size.begin() + std::ssize(size) / 2);
-  const double deviation = kNoise * size[size.size() / 2];
+  const double deviation = kNoise * test::median_of(plant.G.cwiseAbs().reshaped());
   frf.response += deviation * noise(random, frf.lines());
   frf.noise_variance.setConstant(frf.response.rows(), frf.lines(), deviation * deviation);
   return frf;
@@ -97,17 +90,13 @@ TEST(HonestDeviations, WithNoiseThatIsAlikeOnNeighbouringLines) {
     for (Eigen::Index i = 0; i < 5; ++i) out += more.middleCols(i, lines) / std::sqrt(5.0);
     return out;
   };
-  const double errors = errors_in_deviations(plant(0.0), alike);
-  EXPECT_LT(errors, 1.35);
-  EXPECT_GT(errors, 0.65);
+  EXPECT_NEAR(errors_in_deviations(plant(0.0), alike), 1.0, 0.35);
   EXPECT_THAT(fit_model(measured(plant(0.0), 3, alike)).decisions,
               Contains(HasSubstr("alike on neighbouring lines")));
 }
 
 TEST(HonestDeviations, WithoutVariances) {
-  const double errors = errors_in_deviations(plant(0.0), white, false);
-  EXPECT_LT(errors, 1.35);
-  EXPECT_GT(errors, 0.65);
+  EXPECT_NEAR(errors_in_deviations(plant(0.0), white, false), 1.0, 0.35);
 }
 
 // As of a recorder with the other sign of time: no model with stable poles fits, and that is the reason to name.

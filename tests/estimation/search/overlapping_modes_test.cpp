@@ -17,15 +17,12 @@ AdditiveModel with_modes(const std::vector<std::pair<double, double>>& modes) {
 }
 
 // Half-power widths of 20 Hz at 1000 Hz: 15 and 5 Hz are less, 25 Hz is more. Submodel 0 is the rigid body.
-TEST(OverlappingModes, TheNearestFirst) {
+TEST(OverlappingModes, TheNearestFirstAndNoneThatWasAskedFor) {
   EXPECT_EQ(overlapping_modes(with_modes({{1000.0, 0.01}, {1015.0, 0.001}, {1040.0, 0.001}})),
             (Pairs{{1, 2}}));
   EXPECT_EQ(overlapping_modes(with_modes({{1000.0, 0.01}, {1015.0, 0.01}, {1020.0, 0.01}})),
             (Pairs{{2, 3}, {1, 2}}));
   EXPECT_TRUE(overlapping_modes(with_modes({{500.0, 0.01}, {1000.0, 0.01}})).empty());
-}
-
-TEST(OverlappingModes, WhatWasAskedForIsLeftAlone) {
   AdditiveModel model = with_modes({{1000.0, 0.01}, {1001.0, 0.01}});
   model.submodels[1].role = SubmodelRole::given;
   EXPECT_TRUE(overlapping_modes(model).empty());

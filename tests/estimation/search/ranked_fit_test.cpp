@@ -12,8 +12,6 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_ranked_fit {
 
@@ -30,30 +28,22 @@ class CoincidentModes : public testing::Test {
     problem_.model = test::named_model(3, 3);
     problem_.frequency_hz = Eigen::VectorXd::LinSpaced(400, 20.0, 400.0);
     problem_.model.submodels.push_back(test::empty_submodel(problem_.model, 2, {}, 1));
-    problem_.model.submodels[0].numerator[0] = 0.1 * normal(3, 3);
+    problem_.model.submodels[0].numerator[0] = 0.1 * test::random_matrix(random_, 3, 3);
     options_.weighting = Weighting::noise_variance;
   }
 
-  Eigen::MatrixXd normal(Eigen::Index rows, Eigen::Index cols) {
-    Eigen::MatrixXd out(rows, cols);
-    for (double& value : out.reshaped()) value = random_.normal();
-    return out;
-  }
-
   void add_mode(double frequency_hz, int rank) {
-    problem_.model.submodels.push_back(test::empty_submodel(
-        problem_.model, 0, test::mode_coefficients(frequency_hz, kDamping), 1));
+    problem_.model.submodels.push_back(test::empty_mode(problem_.model, frequency_hz, kDamping));
     Submodel& s = problem_.model.submodels.back();
-    s.numerator[0] = s.denominator[2] * normal(3, rank) * normal(rank, 3);
+    s.numerator[0] = s.denominator[2] * test::random_matrix(random_, 3, rank) *
+                     test::random_matrix(random_, rank, 3);
   }
 
   FrfEstimate measured() {
-    problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+    test::measure(problem_);
     FrfEstimate frf = test::frf_of(problem_);
     frf.noise_variance = 1e-4 * frf.response.cwiseAbs2();
-    for (Eigen::Index k = 0; k < frf.lines(); ++k)
-      for (Eigen::Index c = 0; c < 9; ++c)
-        frf.response(c, k) += std::sqrt(frf.noise_variance(c, k)) * random_.circular();
+    test::add_noise(frf, random_);
     return frf;
   }
 
@@ -67,6 +57,13 @@ class CoincidentModes : public testing::Test {
   static double second_share(const Submodel& s) {
     const Eigen::VectorXd values = svd(s.numerator[0], 0).singularValues();
     return values[1] / values[0];
+  }
+
+  static void expect_pair(const Submodel& a, const Submodel& b, double apart_hz, double error_hz) {
+    const double f = a.natural_frequency_hz();
+    const double g = b.natural_frequency_hz();
+    EXPECT_NEAR(std::min(f, g), kPlace_hz, error_hz);
+    EXPECT_NEAR(std::max(f, g), kPlace_hz + apart_hz, error_hz);
   }
 
   /// The cost that noise leaves: channels / 2 with the right variances.
@@ -169,10 +166,7 @@ TEST_F(CoincidentModes, ACloseRankOnePairIsTakenApart) {
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   const auto found = modes(fit);
   ASSERT_EQ(found.size(), 2U);
-  std::vector<double> f = {found[0]->natural_frequency_hz(), found[1]->natural_frequency_hz()};
-  std::sort(f.begin(), f.end());
-  EXPECT_NEAR(f[0], kPlace_hz, 0.03);
-  EXPECT_NEAR(f[1], kPlace_hz + 0.15, 0.03);
+  expect_pair(*found[0], *found[1], 0.15, 0.03);
   EXPECT_THAT(fit.decisions, Contains(HasSubstr("are distinguishable")));
 }
 
@@ -192,18 +186,14 @@ TEST_F(CoincidentModes, AShapeThatIsNotWorthItsParametersIsTakenBack) {
 TEST_F(CoincidentModes, ToFirstOrderTwoPlacesFollowFromTheNeighbourhoodOfOne) {
   add_mode(kPlace_hz, 1);
   add_mode(kPlace_hz + 0.06, 1);
-  problem_.G = test::reference_response(problem_.model, problem_.frequency_hz, HoldModel::none);
+  test::measure(problem_);
   const FrfEstimate frf = test::frf_of(problem_);
   TiedModel tied{problem_.model, {0, 2}};
   tied.model.submodels.pop_back();
   options_.weighting = Weighting::relative;
   const std::optional<TiedModel> apart = with_parted(frf, tied, 1, options_);
   ASSERT_TRUE(apart.has_value());
-  std::vector<double> f = {apart->model.submodels[1].natural_frequency_hz(),
-                           apart->model.submodels[2].natural_frequency_hz()};
-  std::sort(f.begin(), f.end());
-  EXPECT_NEAR(f[0], kPlace_hz, 0.006);
-  EXPECT_NEAR(f[1], kPlace_hz + 0.06, 0.006);
+  expect_pair(apart->model.submodels[1], apart->model.submodels[2], 0.06, 0.006);
   for (const std::size_t i : {1U, 2U}) EXPECT_LT(second_share(apart->model.submodels[i]), 1e-9);
 }
 

@@ -13,8 +13,6 @@
 #include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/mode_worth.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/process/random_numbers.hpp"
 
 namespace stageid::test_settled_fit {
 
@@ -31,16 +29,14 @@ class SettledFit : public testing::Test {
     problem.model = test::named_model(1, 1);
     problem.frequency_hz = Eigen::VectorXd::LinSpaced(150, 50.0, 500.0);
     for (const double f : kTrue_hz) {
-      problem.model.submodels.push_back(
-          test::empty_submodel(problem.model, 0, test::mode_coefficients(f, 0.01), 1));
+      problem.model.submodels.push_back(test::empty_mode(problem.model, f, 0.01));
       problem.model.submodels.back().numerator[0](0, 0) =
           problem.model.submodels.back().denominator[2];
     }
-    problem.G = test::reference_response(problem.model, problem.frequency_hz, HoldModel::none);
+    test::measure(problem);
     frf_ = test::frf_of(problem);
     frf_.noise_variance = 4e-4 * frf_.response.cwiseAbs2();
-    for (Eigen::Index k = 0; k < frf_.lines(); ++k)
-      frf_.response(0, k) += std::sqrt(frf_.noise_variance(0, k)) * random.circular();
+    test::add_noise(frf_, random);
     options_.weighting = Weighting::noise_variance;
     true_ = problem.model;
   }
@@ -48,9 +44,22 @@ class SettledFit : public testing::Test {
   /// With a mode where there is none, narrower than the lines are apart.
   AdditiveModel with_a_ghost() const {
     AdditiveModel model = true_;
-    model.submodels.push_back(
-        test::empty_submodel(true_, 0, test::mode_coefficients(251.2, 1e-4), 1));
+    model.submodels.push_back(test::empty_mode(true_, 251.2, 1e-4));
     return model;
+  }
+
+  /// Expects that the fit does not converge in so many iterations, and what becomes of it.
+  void expect_settled(const AdditiveModel& start, int max_iterations, int modes,
+                      const char* decision) {
+    options_.max_iterations = max_iterations;
+    ASSERT_FALSE(fit_additive_model(frf_, start, options_).trustworthy());
+    const FitResult fit = settled_fit(frf_, start, options_);
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
+    ASSERT_EQ(count_modes(fit.model), modes);
+    ASSERT_FALSE(fit.decisions.empty());
+    EXPECT_THAT(fit.decisions.front(), HasSubstr(decision));
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
   }
 
   FrfEstimate frf_;
@@ -59,15 +68,7 @@ class SettledFit : public testing::Test {
 };
 
 TEST_F(SettledFit, AModeThatTheDataLeaveOpenIsLeftOut) {
-  options_.max_iterations = 3;  // enough for the two modes, which begin where they are
-  ASSERT_FALSE(fit_additive_model(frf_, with_a_ghost(), options_).trustworthy());
-  const FitResult fit = settled_fit(frf_, with_a_ghost(), options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message();
-  ASSERT_EQ(count_modes(fit.model), 2);
-  for (std::size_t i = 0; i < 2; ++i)
-    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
-  ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("removed 25"));
+  expect_settled(with_a_ghost(), 3, 2, "removed 25");  // the two modes begin where they are
 }
 
 // The flank of a mode above the highest line: its residue is needed, its pole is not determined.
@@ -77,17 +78,8 @@ TEST_F(SettledFit, AModeBesideTheLinesThatIsNeededKeepsItsPlace) {
   for (Eigen::Index k = 0; k < frf_.lines(); ++k)
     frf_.response(0, k) += compliance / (1.0 - std::pow(frf_.frequency_hz[k] / kBeside_hz, 2));
   AdditiveModel start = true_;
-  start.submodels.push_back(
-      test::empty_submodel(true_, 0, test::mode_coefficients(kBeside_hz, 1e-4), 1));
-  options_.max_iterations = 3;
-  ASSERT_FALSE(fit_additive_model(frf_, start, options_).trustworthy());
-  const FitResult fit = settled_fit(frf_, start, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message();
-  ASSERT_EQ(count_modes(fit.model), 3);
-  for (std::size_t i = 0; i < 2; ++i)
-    EXPECT_NEAR(fit.model.submodels[i].natural_frequency_hz(), kTrue_hz[i], 1e-3 * kTrue_hz[i]);
-  ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("held the pole at"));
+  start.submodels.push_back(test::empty_mode(true_, kBeside_hz, 1e-4));
+  expect_settled(start, 3, 3, "held the pole at");
 }
 
 // The data have a double pole: nothing that two modes with numerators B_0 reach, though the nearer they come the better
@@ -104,19 +96,13 @@ TEST_F(SettledFit, TwoModesThatRunIntoEachOtherBecomeOne) {
     frf_.response(0, k) += a[1] * (0.1 / A + 8e-4 / (A * A));
   }
   twice.submodels[2].denominator = {1.0, 1.02 * a[0], a[1]};
-  options_.max_iterations = 16;
-  ASSERT_FALSE(fit_additive_model(frf_, twice, options_).trustworthy());
-  const FitResult fit = settled_fit(frf_, twice, options_);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message();
-  EXPECT_EQ(count_modes(fit.model), 3);
-  ASSERT_FALSE(fit.decisions.empty());
-  EXPECT_THAT(fit.decisions.front(), HasSubstr("merged"));
+  expect_settled(twice, 16, 3, "merged");
 }
 
 // A mode so broad that its damping ratio ends at the bound converges; it is worth nothing.
 TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   AdditiveModel broad = true_;
-  broad.submodels.push_back(test::empty_submodel(true_, 0, test::mode_coefficients(250.0, 0.9), 1));
+  broad.submodels.push_back(test::empty_mode(true_, 250.0, 0.9));
   const FitResult kept = fit_additive_model(frf_, broad, options_);
   ASSERT_TRUE(kept.trustworthy()) << kept.message();
   ASSERT_EQ(mode_verdict(frf_, ModeNumber::chosen, kept, 2), ModeVerdict::weak);
@@ -188,8 +174,7 @@ TEST_F(SettledFit, AModeThatIsAskedForAndNotWorthItsParametersIsUndetermined) {
 
 TEST_F(SettledFit, TwoModesOfWhichOneDoesAsWellAreUndetermined) {
   AdditiveModel halved = true_;
-  halved.submodels.push_back(
-      test::empty_submodel(true_, 0, test::mode_coefficients(1.003 * kTrue_hz[1], 0.0101), 1));
+  halved.submodels.push_back(test::empty_mode(true_, 1.003 * kTrue_hz[1], 0.0101));
   FitResult fit = fit_additive_model(frf_, halved, options_);
   fit.model.fit.status = FitStatus::gradient_small;
   judge(frf_, {.alike = alike_modes(frf_, options_, fit)}, fit);

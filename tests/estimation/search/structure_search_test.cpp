@@ -7,9 +7,6 @@
 #include "estimation/request/fit_request.hpp"
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
-#include "tests/support/models/model_reference.hpp"
-#include "tests/support/process/random_numbers.hpp"
-#include "tests/support/stages/random_stage.hpp"
 #include "tests/support/stages/varied_plant.hpp"
 
 // Plants of random structure, fitted without any option and with one that is wrong.
@@ -61,12 +58,10 @@ TEST(StructureSearchFixed, DelaysAndAModeAboveTheLinesAreNotTakenForGeneralDampi
   const double modes[][3] = {
       {25.4, 0.037, 1}, {91.6, 0.06, 1}, {132.7, 0.011, 1}, {1090, 0.077, 10}};
   for (const auto& [frequency_hz, damping, gain] : modes) {
-    Eigen::Vector4d shape;
-    Eigen::RowVector3d force;
-    for (double& x : shape) x = random.normal();
-    for (double& x : force) x = random.normal();
+    const Eigen::MatrixXd shape = gain * test::random_matrix(random, 4, 1);
     const std::vector<double> a = test::mode_coefficients(frequency_hz, damping);
-    truth.submodels.push_back({0, {1.0, a[0], a[1]}, {gain * shape * force}, {}, {}});
+    truth.submodels.push_back(
+        {0, {1.0, a[0], a[1]}, {shape * test::random_matrix(random, 1, 3)}, {}, {}});
   }
   FrfEstimate frf;
   frf.inputs = truth.inputs;
@@ -77,8 +72,7 @@ TEST(StructureSearchFixed, DelaysAndAModeAboveTheLinesAreNotTakenForGeneralDampi
   frf.response = test::reference_response(truth, frf.frequency_hz, HoldModel::exact);
   frf.noise_variance =
       (1e-4 * frf.response.cwiseAbs().rowwise().mean()).array().square().matrix().replicate(1, 600);
-  for (Eigen::Index i = 0; i < frf.response.size(); ++i)
-    frf.response(i) += std::sqrt(frf.noise_variance(i)) * random.circular();
+  test::add_noise(frf, random);
 
   const FitResult fit = fit_model(frf);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
@@ -148,8 +142,7 @@ FrfEstimate on_soft_springs(std::uint64_t seed, double damping_of_springs) {
   problem.hold = HoldModel::exact;
   problem.frequency_hz = Eigen::VectorXd::LinSpaced(784, 16.0, 799.0);
   const auto add = [&](double f, double damping, const Eigen::Matrix2d& residue) {
-    problem.model.submodels.push_back(
-        test::empty_submodel(problem.model, 0, test::mode_coefficients(f, damping), 1));
+    problem.model.submodels.push_back(test::empty_mode(problem.model, f, damping));
     Submodel& s = problem.model.submodels.back();
     s.numerator[0] = s.denominator[2] * residue;
   };
@@ -158,7 +151,7 @@ FrfEstimate on_soft_springs(std::uint64_t seed, double damping_of_springs) {
   add(2.5, damping_of_springs, pitch * pitch.transpose() / 8.0);
   add(92.0, 0.006, 0.09 * Eigen::Vector2d(1.0, 0.5) * Eigen::RowVector2d(1.0, 0.6));
   add(310.0, 0.01, 0.09 * Eigen::Vector2d(0.9, -1.0) * Eigen::RowVector2d(1.0, -0.8));
-  problem.G = test::reference_response(problem.model, problem.frequency_hz, problem.hold);
+  test::measure(problem);
   FrfEstimate frf = test::frf_of(problem);
   frf.noise_variance.setConstant(4, frf.lines(), 1e-18);
   for (std::complex<double>& value : frf.response.reshaped()) value += 1e-9 * random.circular();

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/estimation/submodel_cases.hpp"
+#include "tests/support/models/expect_same_fit.hpp"
 
 namespace stageid::test_structured_fit {
 
@@ -22,26 +23,15 @@ std::vector<Part> modes(int count) {
   return out;
 }
 
-FitResult fit_one_denominator(const FrfEstimate& frf, SubmodelRequest request,
-                              const FitOptions& options) {
-  RequestedStructure structure;
-  structure.common.rigid_body = false;
-  structure.submodels = {std::move(request)};
-  ModeSelection none;
-  none.keep_modes = true;
-  return structured_fit(frf, structure, none, options);
-}
-
 class OneDenominator : public testing::TestWithParam<int> {};
 
 TEST_P(OneDenominator, GivesBackNoiseFreeModes) {
   const int K = GetParam();
   const DenseProblem problem = test::measured(modes(K), HoldModel::exact, 2e-4);
-  FitOptions options;
-  options.hold = HoldModel::exact;
-  options.delay_s = 2e-4;
+  FitOptions options =
+      test::fit_options(Weighting::relative, HoldModel::exact, DelayModel::fixed, 2e-4);
   const FitResult fit =
-      fit_one_denominator(test::frf_of(problem), {{0, 2 * K, 2 * K - 1}, false, {}, {}}, options);
+      test::fit_submodels(test::frf_of(problem), {{{0, 2 * K, 2 * K - 1}, false, {}, {}}}, options);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 1U);
   // Digits go with the square of the condition of s^m / A, which is 5e3 for eight modes.
@@ -55,9 +45,8 @@ TEST_P(OneDenominator, HasTheCostAndTheDeviationsOfItsModes) {
   const int K = GetParam();
   const DenseProblem problem = test::measured(modes(K), HoldModel::none, 0.0);
   const FrfEstimate frf = test::noisy(problem, 1e-3, 5);
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  const FitResult one = fit_one_denominator(frf, {{0, 2 * K, 2 * K - 1}, false, {}, {}}, options);
+  FitOptions options = test::fit_options(Weighting::noise_variance);
+  const FitResult one = test::fit_submodels(frf, {{{0, 2 * K, 2 * K - 1}, false, {}, {}}}, options);
   const FitResult apart = fit_additive_model(frf, problem.model, options);
   EXPECT_TRUE(one.trustworthy()) << one.message();
   EXPECT_NEAR(one.model.fit.cost, apart.model.fit.cost, 1e-7 * apart.model.fit.cost);
@@ -80,10 +69,9 @@ TEST(StructuredFit, OfAutomaticOrderTakesAsManyModesAsThereAre) {
                                                {0, mode_poles(330.0, 0.01), 1},
                                                {0, mode_poles(700.0, 0.015), 1}},
                                               HoldModel::none, 0.0);
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   const FitResult fit =
-      fit_one_denominator(test::noisy(problem, 1e-3, 8), {{}, true, {}, {}}, options);
+      test::fit_submodels(test::noisy(problem, 1e-3, 8), {{{}, true, {}, {}}}, options);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 1U);
   EXPECT_EQ(fit.model.submodels[0].denominator.size(), 7U);
@@ -109,12 +97,10 @@ RequestedStructure mixed_request() {
 
 TEST(StructuredFit, FindsThePolesThatNobodyGaveBesideGivenModes) {
   const DenseProblem problem = test::measured(mixed_plant(), HoldModel::none, 0.0);
-  ModeSelection given;
-  given.modes = {{419.0, 0.01, 1}, {702.0, 0.01, 1}};
-  given.keep_modes = true;
   FitOptions options;
   options.max_iterations = 300;
-  const FitResult fit = structured_fit(test::frf_of(problem), mixed_request(), given, options);
+  const FitResult fit = test::fit_submodels(test::frf_of(problem), mixed_request().submodels,
+                                            options, {{419.0, 0.01, 1}, {702.0, 0.01, 1}});
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   EXPECT_LT(fit.model.fit.relative_rms_error, 1e-9);
   ASSERT_EQ(fit.model.submodels.size(), 5U);
@@ -130,8 +116,7 @@ TEST(StructuredFit, ASearchBesideKeepsWhatWasGiven) {
   RequestedStructure structure = mixed_request();
   structure.submodels[1].frequency_hz = {70.0};
   structure.submodels[2].frequency_hz = {131.0, 208.0};
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   const FitResult fit = structured_fit(test::noisy(problem, 1e-4, 3), structure, {}, options);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
   ASSERT_EQ(fit.model.submodels.size(), 5U);
@@ -142,18 +127,12 @@ TEST(StructuredFit, ASearchBesideKeepsWhatWasGiven) {
 
 TEST(StructuredFit, DoesNotDependOnTheNumberOfThreads) {
   const FrfEstimate frf = test::noisy(test::measured(mixed_plant(), HoldModel::none, 0.0), 1e-3, 4);
-  std::vector<FitResult> fits;
-  for (const int threads : {1, 3}) {
+  const auto fit_with = [&](int threads) {
     FitOptions options;
     options.threads = threads;
-    fits.push_back(structured_fit(frf, mixed_request(), {}, options));
-  }
-  ASSERT_EQ(fits[0].model.submodels.size(), fits[1].model.submodels.size());
-  EXPECT_EQ(fits[0].decisions, fits[1].decisions);
-  for (std::size_t i = 0; i < fits[0].model.submodels.size(); ++i) {
-    EXPECT_EQ(fits[0].model.submodels[i].denominator, fits[1].model.submodels[i].denominator);
-    EXPECT_EQ(fits[0].model.submodels[i].numerator, fits[1].model.submodels[i].numerator);
-  }
+    return structured_fit(frf, mixed_request(), {}, options);
+  };
+  test::expect_same(fit_with(1), fit_with(3));
 }
 
 }  // namespace stageid::test_structured_fit

@@ -54,56 +54,48 @@ std::vector<Case> cases() {
   };
 }
 
-class SubmodelRecovery : public testing::TestWithParam<Case> {};
+class SubmodelRecovery : public testing::TestWithParam<Case> {
+ protected:
+  void expect_found(FitOptions options, double delay_s = 0.0) const {
+    SCOPED_TRACE(std::string(to_string(options.hold)) + ", " + to_string(options.method));
+    const std::vector<Part>& parts = GetParam().parts;
+    const DenseProblem problem = measured(parts, options.hold, delay_s);
+    options.max_iterations = 200;
+    const FitResult fit =
+        fit_additive_model(test::frf_of(problem), start_of(parts, problem), options);
+    EXPECT_TRUE(fit.trustworthy()) << fit.message();
+    expect_recovered(fit.model, problem.model);
+    EXPECT_NEAR(fit.model.input_delay_s[0], delay_s, 1e-10);
+  }
+};
 
 TEST_P(SubmodelRecovery, ByEveryDescentMethodThroughHoldAndDelay) {
-  const std::vector<Part>& parts = GetParam().parts;
-  for (const HoldModel hold : {HoldModel::none, HoldModel::exact}) {
-    const double delay_s = hold == HoldModel::none ? 0.0 : 3.1e-4;
-    const DenseProblem problem = measured(parts, hold, delay_s);
-    for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
-      FitOptions options;
-      options.hold = hold;
-      options.delay = hold == HoldModel::none ? DelayModel::fixed : DelayModel::estimate;
-      options.method = method;
-      options.max_iterations = 200;
-      const FitResult fit =
-          fit_additive_model(test::frf_of(problem), start_of(parts, problem), options);
-      EXPECT_TRUE(fit.trustworthy())
-          << to_string(hold) << ", " << to_string(method) << ": " << fit.message();
-      expect_recovered(fit.model, problem.model);
-      EXPECT_NEAR(fit.model.input_delay_s[0], delay_s, 1e-10);
-    }
+  for (const FitMethod method : {FitMethod::riv, FitMethod::gn}) {
+    FitOptions options;
+    options.method = method;
+    expect_found(options);
+    options.hold = HoldModel::exact;
+    options.delay = DelayModel::estimate;
+    expect_found(options, 3.1e-4);
   }
 }
 
 // Without noise, its fixed point is the true model.
 TEST_P(SubmodelRecovery, BySanathananAndKoerner) {
-  const DenseProblem problem = measured(GetParam().parts, HoldModel::none, 0.0);
   FitOptions options;
   options.method = FitMethod::sk;
-  options.max_iterations = 200;
-  const FitResult fit =
-      fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message();
-  expect_recovered(fit.model, problem.model);
+  expect_found(options);
 }
 
 TEST_P(SubmodelRecovery, UnderWeightMatrices) {
-  const DenseProblem problem = measured(GetParam().parts, HoldModel::none, 0.0);
-  FitOptions options;
-  options.weighting = Weighting::user;
+  FitOptions options = test::fit_options(Weighting::user);
   // Hermitian, positive definite, with ties between all channels.
-  Eigen::MatrixXcd W = Eigen::MatrixXcd::Identity(4, 4);
-  W(0, 1) = {0.3, 0.2};
-  W(2, 3) = {0.1, -0.4};
-  W = Eigen::MatrixXcd(W * W.adjoint());
-  options.user_weight_matrices = W.reshaped().replicate(1, problem.frequency_hz.size());
-  options.max_iterations = 200;
-  const FitResult fit =
-      fit_additive_model(test::frf_of(problem), start_of(GetParam().parts, problem), options);
-  EXPECT_TRUE(fit.trustworthy()) << fit.message();
-  expect_recovered(fit.model, problem.model);
+  Eigen::MatrixXcd root = Eigen::MatrixXcd::Identity(4, 4);
+  root(0, 1) = {0.3, 0.2};
+  root(2, 3) = {0.1, -0.4};
+  const Eigen::MatrixXcd W = root * root.adjoint();
+  options.user_weight_matrices = W.reshaped().replicate(1, 400);
+  expect_found(options);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, SubmodelRecovery, testing::ValuesIn(cases()),

@@ -54,10 +54,8 @@ TEST(Suspension, WhereARigidBodyAloneDoesNotExplainTheLines) {
 
 /// Requests a free rigid body, the default; the delay is estimated.
 FitResult fit_by_default(const test::DenseProblem& problem, double noise) {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  options.hold = problem.hold;
-  options.delay = DelayModel::estimate;
+  FitOptions options =
+      test::fit_options(Weighting::noise_variance, problem.hold, DelayModel::estimate);
   return structured_fit(test::noisy(problem, noise, 4), {}, {}, options);
 }
 
@@ -87,8 +85,7 @@ TEST(Suspension, IsNotFoundUnderAFreeBody) {
 }
 
 TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   // (0.05/5)^2 = 1e-4 of the largest line, under noise of a tenth of the mean.
   const FitResult fit = fit_suspended(test::noisy(suspended(0.05), 0.1, 6), {}, options);
   EXPECT_TRUE(fit.trustworthy()) << fit.message();
@@ -99,8 +96,7 @@ TEST(Suspension, HasNoDeviationWhereTheLinesDoNotDetermineIt) {
 }
 
 TEST(Suspension, ThatIsHeldLeavesSurplusModesFlagged) {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
+  FitOptions options = test::fit_options(Weighting::noise_variance);
   RequestedStructure structure;
   structure.common.rigid_body = false;
   structure.suspension = true;

@@ -6,6 +6,8 @@
 #include "estimation/equations/arrow_system.hpp"
 #include "estimation/search/automatic_fit.hpp"
 #include "estimation/search/fit_additive_model.hpp"
+#include "tests/support/models/expect_same_fit.hpp"
+#include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/process/thread_team.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
@@ -21,28 +23,10 @@ const test::RandomStage& wide_stage() {
 }
 
 FitOptions options_of(const test::RandomStage& stage) {
-  FitOptions options;
-  options.weighting = Weighting::noise_variance;
-  options.hold = HoldModel::exact;
-  options.delay = DelayModel::estimate;
-  options.delay_s = stage.delay_s;
+  FitOptions options = test::fit_options(Weighting::noise_variance, HoldModel::exact,
+                                         DelayModel::estimate, stage.delay_s);
   options.threads = 1;
   return options;
-}
-
-void expect_same_bytes(const FitResult& a, const FitResult& b) {
-  EXPECT_EQ(a.cost, b.cost);
-  EXPECT_EQ(a.removal_cost, b.removal_cost);
-  EXPECT_EQ(a.model.fit.relative_rms_error, b.model.fit.relative_rms_error);
-  ASSERT_EQ(a.model.submodels.size(), b.model.submodels.size());
-  for (std::size_t i = 0; i < a.model.submodels.size(); ++i) {
-    const Submodel& s = a.model.submodels[i];
-    const Submodel& t = b.model.submodels[i];
-    EXPECT_EQ(s.denominator, t.denominator);
-    EXPECT_EQ(s.natural_frequency_std_hz, t.natural_frequency_std_hz);
-    EXPECT_TRUE(s.numerator == t.numerator);
-    EXPECT_TRUE(s.numerator_std == t.numerator_std);
-  }
 }
 
 TEST(TeamFit, AFitHasTheSameBytesInEveryTeam) {
@@ -55,7 +39,7 @@ TEST(TeamFit, AFitHasTheSameBytesInEveryTeam) {
       run_team(size, [&](const Team& team) {
         FitOptions shared = options;
         shared.team = &team;
-        expect_same_bytes(fit_additive_model(stage.frf, stage.truth, shared), alone);
+        test::expect_same(fit_additive_model(stage.frf, stage.truth, shared), alone);
       });
   }
 }
@@ -70,9 +54,7 @@ TEST(TeamFit, ASearchHasTheSameBytesInEveryTeam) {
     run_team(size, [&](const Team& team) {
       FitOptions shared = options;
       shared.team = &team;
-      const FitResult fit = automatic_fit(stage.frf, structure, search, shared);
-      expect_same_bytes(fit, alone);
-      EXPECT_EQ(fit.decisions, alone.decisions);
+      test::expect_same(automatic_fit(stage.frf, structure, search, shared), alone);
     });
 }
 
