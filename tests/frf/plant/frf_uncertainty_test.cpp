@@ -1,11 +1,12 @@
 // Stated variances, checked by repeating the experiment with other noise.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <map>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "frf/plant/plant_frf.hpp"
+#include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/closed_loop.hpp"
 
 namespace stageid::test_frf_uncertainty {
@@ -26,57 +27,43 @@ Eigen::MatrixXcd correlated_noise() {
 
 /// Deviations from the truth and the predicted covariance, over seeds.
 struct Trials {
-  Eigen::VectorXd frequency_hz;
-  std::vector<Eigen::MatrixXcd> deviations;  ///< one per seed: 6 x lines
-  Eigen::MatrixXd noise_variance;            ///< mean over the seeds
-  Eigen::MatrixXd total_variance;
-  Eigen::MatrixXcd covariance;
-  Eigen::MatrixXcd residual;
-  Eigen::MatrixXcd input_factor;
+  std::vector<Eigen::MatrixXcd> deviations;  ///< one per line: 6 x seeds
+  FrfEstimate mean;                          ///< of variances and covariances
 };
 
 Trials repeat(LoopExperiment x) {
   const test::ClosedLoop loop = test::small_stage();
   Trials trials;
+  trials.deviations.assign(x.lines.size(), Eigen::MatrixXcd(6, kSeeds));
   x.noise_factor = correlated_noise();
   for (int seed = 0; seed < kSeeds; ++seed) {
     x.seed = static_cast<std::uint64_t>(1000 + seed);
     const MemoryLog log = test::simulate_log(loop, x);
     const FrfEstimate frf =
         estimate_plant_frf({&log}, {.covariance = CovarianceKind::full, .threads = 1});
-    Eigen::MatrixXcd deviation = frf.response;
-    for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-      const Eigen::MatrixXcd G = loop.plant(test::omega_of(x, k));
-      deviation.col(k) -= Eigen::Map<const Eigen::VectorXcd>(G.data(), G.size());
-    }
-    if (trials.deviations.empty()) {
-      trials.noise_variance.setZero(6, frf.lines());
-      trials.total_variance.setZero(6, frf.lines());
-      trials.covariance.setZero(36, frf.lines());
-      trials.residual.setZero(4, frf.lines());
-      trials.input_factor.setZero(9, frf.lines());
-    }
-    trials.deviations.push_back(deviation);
-    trials.noise_variance += frf.noise_variance / kSeeds;
-    if (frf.total_variance.size() != 0) trials.total_variance += frf.total_variance / kSeeds;
-    trials.covariance += frf.covariance / kSeeds;
-    trials.residual += frf.residual_covariance / kSeeds;
-    trials.input_factor += frf.input_factor / kSeeds;
-    trials.frequency_hz = frf.frequency_hz;
+    for (Eigen::Index k = 0; k < frf.lines(); ++k)
+      trials.deviations[k].col(seed) =
+          frf.response.col(k) - loop.plant(test::omega_of(x, k)).reshaped();
+    const auto average = [seed](auto& mean, const auto& value) {
+      if (seed == 0) mean.setZero(value.rows(), value.cols());
+      mean += value / kSeeds;
+    };
+    average(trials.mean.noise_variance, frf.noise_variance);
+    average(trials.mean.total_variance, frf.total_variance);
+    average(trials.mean.covariance, frf.covariance);
+    average(trials.mean.residual_covariance, frf.residual_covariance);
+    average(trials.mean.input_factor, frf.input_factor);
   }
   return trials;
 }
 
 /// Largest deviation from the unit matrix of the sample covariance on line k, whitened by `predicted`. Each entry has
 /// standard deviation 1 / sqrt(kSeeds) if the prediction is right.
-double largest_deviation(const Trials& trials, const Eigen::MatrixXcd& predicted, Eigen::Index k) {
-  const Eigen::MatrixXcd L = predicted.llt().matrixL();
-  Eigen::MatrixXcd sample = -Eigen::MatrixXcd::Identity(6, 6);
-  for (const Eigen::MatrixXcd& deviation : trials.deviations) {
-    const Eigen::VectorXcd w = L.triangularView<Eigen::Lower>().solve(deviation.col(k));
-    sample += w * w.adjoint() / kSeeds;
-  }
-  return sample.cwiseAbs().maxCoeff();
+double largest_deviation(const Trials& trials, const Eigen::MatrixXcd& predicted, std::size_t k) {
+  const Eigen::MatrixXcd L = test::cholesky(predicted);
+  const Eigen::MatrixXcd white = solve(L, trials.deviations[k]);
+  const Eigen::MatrixXcd sample = white * white.adjoint() / kSeeds;
+  return (sample - Eigen::MatrixXcd::Identity(6, 6)).cwiseAbs().maxCoeff();
 }
 
 /// Cov(vec G) = A kron C_E with A transposed: the result of omitting the transpose of U^-T.
@@ -107,36 +94,30 @@ class NoiseVariance : public testing::TestWithParam<AxisScheme> {
 
 TEST_P(NoiseVariance, TheSampleVarianceLiesInItsChiSquareInterval) {
   const Trials& trials = this->trials();
-  const Eigen::Index lines = trials.frequency_hz.size();
-  for (Eigen::Index c = 0; c < 6; ++c) {
-    double over_lines = 0.0;
-    for (Eigen::Index k = 0; k < lines; ++k) {
-      double sum = 0.0;
-      for (const Eigen::MatrixXcd& deviation : trials.deviations) sum += std::norm(deviation(c, k));
-      const double ratio = sum / kSeeds / trials.noise_variance(c, k);
-      // 2 S ratio is chi-square with 2 S degrees of freedom: mean 1, standard deviation 1 /
-      // sqrt(S). 60 ratios: 4.5 standard deviations.
-      EXPECT_NEAR(ratio, 1.0, 4.5 / std::sqrt(kSeeds)) << "entry " << c << ", line " << k;
-      over_lines += ratio / static_cast<double>(lines);
-    }
-    EXPECT_NEAR(over_lines, 1.0, 4.0 / std::sqrt(kSeeds * static_cast<double>(lines)))
-        << "entry " << c;
-  }
+  const std::size_t lines = trials.deviations.size();
+  Eigen::MatrixXd ratio(6, lines);
+  for (std::size_t k = 0; k < lines; ++k)
+    ratio.col(k) = trials.deviations[k].rowwise().squaredNorm() / kSeeds;
+  ratio = ratio.cwiseQuotient(trials.mean.noise_variance).eval();
+  // 2 S ratio is chi-square with 2 S degrees of freedom: mean 1, standard deviation 1 / sqrt(S). 60 ratios: 4.5
+  // standard deviations.
+  EXPECT_LT((ratio.array() - 1.0).abs().maxCoeff(), 4.5 / std::sqrt(kSeeds)) << ratio;
+  EXPECT_LT((ratio.rowwise().mean().array() - 1.0).abs().maxCoeff(),
+            4.0 / std::sqrt(kSeeds * static_cast<double>(lines)))
+      << ratio;
 }
 
 TEST_P(NoiseVariance, TheFullCovarianceWhitensTheDeviations) {
   const Trials& trials = this->trials();
   double worst_if_transposed = 0.0;
-  for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
-    const Eigen::MatrixXcd predicted =
-        Eigen::Map<const Eigen::MatrixXcd>(trials.covariance.col(k).data(), 6, 6);
+  for (std::size_t k = 0; k < trials.deviations.size(); ++k) {
+    const Eigen::MatrixXcd predicted = trials.mean.covariance.col(k).reshaped(6, 6);
     EXPECT_LT(largest_deviation(trials, predicted, k), 5.0 / std::sqrt(kSeeds))  // of 360 entries
         << "line " << k;
     worst_if_transposed = std::max(
         worst_if_transposed, largest_deviation(trials, with_transpose_forgotten(predicted), k));
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      EXPECT_NEAR(predicted(c, c).real() / trials.noise_variance(c, k), 1.0, 1e-12);
-    }
+    for (Eigen::Index c = 0; c < 6; ++c)
+      EXPECT_NEAR(predicted(c, c).real() / trials.mean.noise_variance(c, k), 1.0, 1e-12);
   }
   // The test detects the error for which it exists.
   EXPECT_GT(worst_if_transposed, 10.0 / std::sqrt(kSeeds));
@@ -145,29 +126,23 @@ TEST_P(NoiseVariance, TheFullCovarianceWhitensTheDeviations) {
 // A likelihood needs n_u^2 + n_y^2 numbers per line, not (n_u n_y)^2.
 TEST_P(NoiseVariance, InputFactorAndResidualCovarianceMakeUpTheFullCovariance) {
   const Trials& trials = this->trials();
-  for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
+  for (std::size_t k = 0; k < trials.deviations.size(); ++k) {
+    const Eigen::MatrixXcd C_E = trials.mean.residual_covariance.col(k).reshaped(2, 2);
     Eigen::MatrixXcd predicted(6, 6);
-    for (Eigen::Index j = 0; j < 3; ++j) {
-      for (Eigen::Index l = 0; l < 3; ++l) {
-        predicted.block(2 * j, 2 * l, 2, 2) =
-            trials.input_factor(j + 3 * l, k) *
-            Eigen::Map<const Eigen::MatrixXcd>(trials.residual.col(k).data(), 2, 2);
-      }
-    }
+    for (Eigen::Index j = 0; j < 3; ++j)
+      for (Eigen::Index l = 0; l < 3; ++l)
+        predicted.block(2 * j, 2 * l, 2, 2) = trials.mean.input_factor(j + 3 * l, k) * C_E;
     EXPECT_LT(largest_deviation(trials, predicted, k), 5.0 / std::sqrt(kSeeds)) << "line " << k;
   }
 }
 
 // In the loop Y - G U is the open-loop noise for any controller: C_E = F F^H / P.
 TEST_P(NoiseVariance, TheResidualCovarianceIsThatOfTheOpenLoopNoise) {
-  const Trials& trials = this->trials();
   const Eigen::MatrixXcd expected = correlated_noise() * correlated_noise().adjoint() / kPeriods;
   // M E (P - 1) = 12 degrees of freedom per seed: standard deviation 1 / sqrt(12 S) = 1.7 %; 40 entries.
-  for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
-    const Eigen::MatrixXcd found =
-        Eigen::Map<const Eigen::MatrixXcd>(trials.residual.col(k).data(), 2, 2);
-    EXPECT_LT((found - expected).norm(), 0.07 * expected.norm()) << "line " << k;
-  }
+  const Eigen::MatrixXcd& found = trials().mean.residual_covariance;
+  for (Eigen::Index k = 0; k < found.cols(); ++k)
+    EXPECT_LT((found.col(k) - expected.reshaped()).norm(), 0.07 * expected.norm()) << "line " << k;
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, NoiseVariance,
@@ -178,14 +153,11 @@ INSTANTIATE_TEST_SUITE_P(Schemes, NoiseVariance,
                          });
 
 TEST(FrfUncertainty, WithoutDistortionsTheTotalVarianceIsTheNoiseVariance) {
-  const Trials trials = repeat({.realizations = 4, .periods = 2});
-  for (Eigen::Index c = 0; c < 6; ++c) {
-    for (Eigen::Index k = 0; k < trials.frequency_hz.size(); ++k) {
-      // M - 1 = 3 degrees of freedom per seed against M E (P - 1) = 12: relative standard deviation
-      // sqrt((1/3 + 1/12) / S) = 3.7 %; 60 ratios.
-      EXPECT_NEAR(trials.total_variance(c, k) / trials.noise_variance(c, k), 1.0, 4.5 * 0.037);
-    }
-  }
+  const FrfEstimate mean = repeat({.realizations = 4, .periods = 2}).mean;
+  // M - 1 = 3 degrees of freedom per seed against M E (P - 1) = 12: relative standard deviation
+  // sqrt((1/3 + 1/12) / S) = 3.7 %; 60 ratios.
+  const Eigen::ArrayXXd ratio = mean.total_variance.array() / mean.noise_variance.array();
+  EXPECT_LT((ratio - 1.0).abs().maxCoeff(), 4.5 * 0.037) << ratio;
 }
 
 // Each realization has another plant (as with stochastic nonlinear contributions), without noise or loop. Then
@@ -196,11 +168,10 @@ TEST(FrfUncertainty, TheTotalVarianceIsTheScatterOverRealizations) {
   const std::array<double, 3> gain = {1.0, 1.1, 0.7};
   MemoryLog log;
   for (int m = 0; m < 3; ++m) {
-    test::ClosedLoop loop = test::small_stage();
+    test::ClosedLoop loop = test::open_loop();
     loop.plant = [plant = loop.plant, g = gain[static_cast<std::size_t>(m)]](double omega) {
       return Eigen::MatrixXcd(g * plant(omega));
     };
-    loop.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
     const MemoryLog one = test::simulate_log(loop, x);
     if (m == 0) log.log_info = one.log_info;
     for (int e = 0; e < 3; ++e) {
@@ -227,13 +198,11 @@ TEST(FrfUncertainty, TheTotalVarianceIsTheScatterOverRealizations) {
 }
 
 TEST(FrfUncertainty, OrthogonalExperimentsDivideTheVarianceByTheNumberOfAxes) {
-  test::ClosedLoop loop = test::small_stage();
-  loop.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
   LoopExperiment x{.realizations = 4, .periods = 40, .seed = 77};
   x.noise_factor = correlated_noise();
-  const MemoryLog single = test::simulate_log(loop, x);
+  const MemoryLog single = test::simulate_log(test::open_loop(), x);
   x.scheme = AxisScheme::orthogonal;
-  const MemoryLog orthogonal = test::simulate_log(loop, x);
+  const MemoryLog orthogonal = test::simulate_log(test::open_loop(), x);
   // Open loop, amplitude 1: Var = C_E,ii / (M P) against the same over 3. M E (P - 1) = 468 degrees of freedom on each
   // of 10 lines: 1.5 % per mean.
   const double ratio = (estimate_plant_frf({&single}).noise_variance.array() /
@@ -247,9 +216,7 @@ TEST(FrfUncertainty, OrthogonalExperimentsDivideTheVarianceByTheNumberOfAxes) {
 TEST(FrfUncertainty, RunsOfUnequalLengthAreWeightedByTheirPeriods) {
   LoopExperiment x{.periods = 6, .seed = 12};
   x.noise_factor = correlated_noise();
-  test::ClosedLoop loop = test::small_stage();
-  loop.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
-  MemoryLog log = test::simulate_log(loop, x);
+  MemoryLog log = test::simulate_log(test::open_loop(), x);
   const FrfEstimate equal = estimate_plant_frf({&log});
   log.log_runs[0].samples = 3 * 250;  // 2 of 6 periods
   const FrfEstimate cut = estimate_plant_frf({&log});

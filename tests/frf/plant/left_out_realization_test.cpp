@@ -72,6 +72,7 @@ TEST(LeftOutRealization, AMissingOrIncompleteRunIsTold) {
   log.log_runs[5].complete = false;
   const FrfEstimate frf = estimate_plant_frf({&log}, {});
   EXPECT_EQ(frf.realizations, 1);
+  EXPECT_EQ(frf.total_variance.size(), 0);
   ASSERT_EQ(frf.left_out_realizations.size(), 2U);
   EXPECT_EQ(frf.left_out_realizations[0].realization, 0);
   EXPECT_EQ(frf.left_out_realizations[0].reason,

@@ -29,13 +29,19 @@ double largest_error(const FrfEstimate& frf, const test::Transfer& plant) {
   return largest;
 }
 
+MemoryLog log_of(const LoopExperiment& x) { return test::simulate_log(test::small_stage(), x); }
+
+void expect_exact(const FrfEstimate& frf) {
+  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+}
+
 TEST(PlantFrf, IndirectMethodRecoversTheExactPlantInClosedLoop) {
   const LoopExperiment x{.realizations = 2, .periods = 3};
-  const MemoryLog log = test::simulate_log(test::small_stage(), x);
+  const MemoryLog log = log_of(x);
 
   const FrfEstimate frf = estimate_plant_frf({&log});
 
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+  expect_exact(frf);
   EXPECT_EQ(frf.inputs, log.log_info.actuators);
   EXPECT_EQ(frf.outputs, log.log_info.sensors);
   ASSERT_EQ(frf.lines(), 10);
@@ -101,19 +107,19 @@ TEST(PlantFrf, NoiseInTheLoopDoesNotBiasIt) {
 }
 
 TEST(PlantFrf, APeriodOfTransientSpoilsTheEstimateUnlessItIsDropped) {
-  const MemoryLog log = test::simulate_log(test::small_stage(), {.periods = 2});
-  EXPECT_LT(largest_error(estimate_plant_frf({&log}), test::small_stage().plant), kRounding);
+  const MemoryLog log = log_of({.periods = 2});
+  expect_exact(estimate_plant_frf({&log}));
   const FrfOptions all{.transient_periods = 0, .periods = PeriodChoice::unmarked};
   EXPECT_GT(largest_error(estimate_plant_frf({&log}, all), test::small_stage().plant), 1e-3);
 }
 
 TEST(PlantFrf, MoreTransientPeriodsThanTheLogSaysMayBeDropped) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.periods = 3, .transient_periods = 2});
+  MemoryLog log = log_of({.periods = 3, .transient_periods = 2});
   log.log_info.transient_periods = 1;
   const FrfOptions all{.periods = PeriodChoice::unmarked};
   EXPECT_GT(largest_error(estimate_plant_frf({&log}, all), test::small_stage().plant), 1e-3);
   const FrfEstimate frf = estimate_plant_frf({&log}, {.transient_periods = 2});
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+  expect_exact(frf);
   EXPECT_EQ(frf.periods, 3);
 }
 
@@ -122,38 +128,24 @@ TEST(PlantFrf, OtherSchemesAndNumbersOfExperimentsGiveTheSamePlant) {
   for (const int experiments : {3, 7})
     for (const AxisScheme scheme :
          {AxisScheme::random, AxisScheme::single_axis, AxisScheme::orthogonal}) {
-      const MemoryLog log = test::simulate_log(
-          test::small_stage(),
-          {.experiments = experiments, .realizations = 2, .scheme = scheme, .seed = 4});
+      const MemoryLog log =
+          log_of({.experiments = experiments, .realizations = 2, .scheme = scheme, .seed = 4});
       const FrfEstimate frf = estimate_plant_frf({&log});
-      EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+      expect_exact(frf);
       EXPECT_EQ(frf.experiments, experiments);
     }
 }
 
-TEST(PlantFrf, OneInputAndOneOutputOfTheSameLoop) {
-  const test::ClosedLoop full = test::small_stage();
-  const test::ClosedLoop loop{
-      [full](double omega) { return Eigen::MatrixXcd(full.plant(omega).block(0, 0, 1, 1)); },
-      [full](double omega) { return Eigen::MatrixXcd(full.controller(omega).block(0, 0, 1, 1)); }};
-  const MemoryLog log = test::simulate_log(loop, {.axes = 1, .periods = 1});
-  const FrfEstimate frf = estimate_plant_frf({&log});
-  EXPECT_LT(largest_error(frf, loop.plant), kRounding);
-}
-
 TEST(PlantFrf, OddPeriodLengthsReachTheLineBelowHalfTheSampleRate) {
   LoopExperiment x{.period_samples = 127, .lines = {1, 30, 63}};
-  const MemoryLog log = test::simulate_log(test::small_stage(), x);
+  const MemoryLog log = log_of(x);
   const FrfEstimate frf = estimate_plant_frf({&log});
   ASSERT_EQ(frf.lines(), 3);
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+  expect_exact(frf);
 }
 
-// Laws
-// ---------------------------------------------------------------------------------------------
-
 TEST(PlantFrf, PermutedInputsPermuteColumnsAndPermutedOutputsRows) {
-  const MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2});
+  const MemoryLog log = log_of({.realizations = 2});
   const FrfEstimate straight = estimate_plant_frf({&log});
   const FrfEstimate turned =
       estimate_plant_frf({&log}, {.inputs = {"a3", "a1", "a2"}, .outputs = {"z2", "z1"}});
@@ -169,7 +161,7 @@ TEST(PlantFrf, PermutedInputsPermuteColumnsAndPermutedOutputsRows) {
 TEST(PlantFrf, AScaledSensorScalesItsRowAndAScaledActuatorItsColumn) {
   LoopExperiment x{.realizations = 2, .periods = 3, .seed = 8};
   x.noise_factor = 1e-3 * Eigen::MatrixXcd::Identity(2, 2);
-  MemoryLog log = test::simulate_log(test::small_stage(), x);
+  MemoryLog log = log_of(x);
   const FrfEstimate before = estimate_plant_frf({&log});
   for (LogSamples& record : log.records) {
     record.sensors.col(1) *= 8.0;
@@ -190,7 +182,7 @@ TEST(PlantFrf, AScaledSensorScalesItsRowAndAScaledActuatorItsColumn) {
 }
 
 TEST(PlantFrf, AStrongerExcitationChangesNothing) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {});
+  MemoryLog log = log_of({});
   const FrfEstimate before = estimate_plant_frf({&log});
   for (std::size_t i = 0; i < log.records.size(); ++i) {
     log.records[i].sensors *= 3.0;
@@ -201,11 +193,8 @@ TEST(PlantFrf, AStrongerExcitationChangesNothing) {
   EXPECT_LT((after.response - before.response).norm(), kRounding * before.response.norm());
 }
 
-// Selection
-// ----------------------------------------------------------------------------------------
-
 TEST(PlantFrf, SomeInputsAreColumnsOfTheWholeEstimate) {
-  const MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2, .periods = 3});
+  const MemoryLog log = log_of({.realizations = 2, .periods = 3});
   const FrfEstimate all = estimate_plant_frf({&log});
   const FrfEstimate some = estimate_plant_frf({&log}, {.inputs = {"a3", "a1"}});
   ASSERT_EQ(some.n_inputs(), 2);
@@ -217,11 +206,11 @@ TEST(PlantFrf, SomeInputsAreColumnsOfTheWholeEstimate) {
 }
 
 TEST(PlantFrf, ExcitationNamesOtherThanActuatorsMeanAllActuators) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {});
+  MemoryLog log = log_of({});
   log.log_info.excitation = test::channels("d", 3, "N");
   const FrfEstimate frf = estimate_plant_frf({&log});
   EXPECT_EQ(frf.inputs, log.log_info.actuators);
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+  expect_exact(frf);
 }
 
 // Two of three actuators are excited; the controller moves the third. The estimate is then the plant with the third
@@ -251,24 +240,13 @@ TEST(PlantFrf, TheInputsAreTheExcitedActuatorsAndTheOthersPowerIsReported) {
 }
 
 TEST(PlantFrf, OnlyTheRealizationsAskedForAreUsed) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 3});
+  MemoryLog log = log_of({.realizations = 3});
   for (std::size_t run = 3; run < 6; ++run)
     log.records[run].sensors *= 2.0;  // corrupts realization 1
   EXPECT_GT(largest_error(estimate_plant_frf({&log}), test::small_stage().plant), 0.1);
   const FrfEstimate frf = estimate_plant_frf({&log}, {.realizations = {2, 0}});
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
+  expect_exact(frf);
   EXPECT_EQ(frf.realizations, 2);
-}
-
-TEST(PlantFrf, IncompleteRunsArePassedOverWithTheirRealization) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2});
-  log.log_runs[4].complete = false;
-  log.records[4].sensors.setConstant(7.0);
-  log.log_runs[4].samples = 13;  // incomplete
-  const FrfEstimate frf = estimate_plant_frf({&log});
-  EXPECT_EQ(frf.realizations, 1);
-  EXPECT_EQ(frf.total_variance.size(), 0);
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
 }
 
 TEST(PlantFrf, OfSeveralCompleteRunsTheLastCounts) {
@@ -280,7 +258,7 @@ TEST(PlantFrf, OfSeveralCompleteRunsTheLastCounts) {
 }
 
 TEST(PlantFrf, RealizationsMayBeSpreadOverLogs) {
-  const MemoryLog both = test::simulate_log(test::small_stage(), {.realizations = 2});
+  const MemoryLog both = log_of({.realizations = 2});
   MemoryLog first = both;
   MemoryLog second = both;
   first.log_runs[3].complete = first.log_runs[4].complete = first.log_runs[5].complete = false;
@@ -290,28 +268,12 @@ TEST(PlantFrf, RealizationsMayBeSpreadOverLogs) {
   EXPECT_EQ(apart.response, estimate_plant_frf({&both}).response);
 }
 
-// Quality
-// ------------------------------------------------------------------------------------------
-
-TEST(PlantFrf, PeriodsWithAMarkedSampleAreDropped) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.periods = 4});
-  log.records[1].marked[2 * 250 + 17] = 1;
-  log.records[1].sensors.middleRows(500, 250).setConstant(99.0);
+TEST(PlantFrf, OneCleanPeriodGivesNoNoiseVariance) {
+  MemoryLog log = log_of({.realizations = 2, .periods = 2});
+  for (LogSamples& record : log.records) record.marked[700] = 1;
+  log.records[1].marked[17] = 1;  // in the transient
   const FrfEstimate frf = estimate_plant_frf({&log});
-  EXPECT_LT(largest_error(frf, test::small_stage().plant), kRounding);
-  EXPECT_EQ(frf.periods, 3);
-  EXPECT_EQ(frf.noise_dof, 3.0 + 2.0 + 3.0);
-}
-
-TEST(PlantFrf, AMarkInTheTransientDoesNotMatter) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.periods = 2});
-  log.records[1].marked[17] = 1;
-  EXPECT_EQ(estimate_plant_frf({&log}).periods, 2);
-}
-
-TEST(PlantFrf, OnePeriodGivesNoNoiseVariance) {
-  const MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2, .periods = 1});
-  const FrfEstimate frf = estimate_plant_frf({&log});
+  EXPECT_EQ(frf.periods, 1);
   EXPECT_EQ(frf.noise_variance.size(), 0);
   EXPECT_EQ(frf.residual_covariance.size(), 0);
   EXPECT_EQ(frf.noise_dof, 0.0);
@@ -319,20 +281,10 @@ TEST(PlantFrf, OnePeriodGivesNoNoiseVariance) {
   EXPECT_NO_THROW(check(frf));
 }
 
-TEST(PlantFrf, OneCleanPeriodGivesNoNoiseVarianceEither) {
-  MemoryLog log = test::simulate_log(test::small_stage(), {.periods = 2});
-  for (LogSamples& record : log.records) record.marked[700] = 1;
-  const FrfEstimate frf = estimate_plant_frf({&log});
-  EXPECT_EQ(frf.noise_variance.size(), 0);
-  EXPECT_EQ(frf.periods, 1);
-}
-
 // Open loop, flat excitation: U = R, so cond(U) is that of the excitation: 1 for single axes of
 // equal level, and 5 if one axis is five times as strong.
 TEST(PlantFrf, TheConditionOfTheInputsIsReported) {
-  test::ClosedLoop loop = test::small_stage();
-  loop.controller = [](double) { return Eigen::MatrixXcd::Zero(3, 2); };
-  MemoryLog log = test::simulate_log(loop, {.realizations = 2});
+  MemoryLog log = test::simulate_log(test::open_loop(), {.realizations = 2});
   EXPECT_LT((estimate_plant_frf({&log}).input_condition.array() - 1.0).abs().maxCoeff(), 1e-9);
   log.excitation_periods[3] *= 5.0;  // realization 1, axis 0; the largest is reported
   log.records[3].actuators *= 5.0;
@@ -341,7 +293,7 @@ TEST(PlantFrf, TheConditionOfTheInputsIsReported) {
 }
 
 TEST(PlantFrf, ProgressReachesTheTotal) {
-  const MemoryLog log = test::simulate_log(test::small_stage(), {.realizations = 2, .periods = 3});
+  const MemoryLog log = log_of({.realizations = 2, .periods = 3});
   double last = 0.0;
   double end = 0.0;
   int calls = 0;

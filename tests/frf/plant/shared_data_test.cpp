@@ -1,7 +1,6 @@
 // Data of other programs, not included in the source tree.
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <filesystem>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "acquisition/files/hdf5_file.hpp"
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/log_reader.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/multisine/dft.hpp"
 #include "frf/file/frf_file.hpp"
 #include "frf/plant/plant_frf.hpp"
@@ -58,7 +58,7 @@ Eigen::MatrixXcd plain_estimate(const LogReader& log, const std::vector<int>& li
       }
     }
     for (std::size_t k = 0; k < lines.size(); ++k) {
-      const Eigen::MatrixXcd G = Z[k].topRows(n_y) * Z[k].bottomRows(n_u).inverse();
+      const Eigen::MatrixXcd G = Z[k].topRows(n_y) * inverse(Z[k].bottomRows(n_u));
       mean.col(static_cast<Eigen::Index>(k)) +=
           Eigen::Map<const Eigen::VectorXcd>(G.data(), G.size()) /
           static_cast<double>(realizations);
