@@ -16,6 +16,7 @@
 #include "tests/support/models/expect_same_frf.hpp"
 #include "tests/support/models/numbered_frf.hpp"
 #include "tests/support/process/error_message.hpp"
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test_frf_file {
@@ -28,13 +29,6 @@ namespace fs = std::filesystem;
 
 class FrfFile : public testing::Test {
  protected:
-  std::string bytes(const char* name) const {
-    std::ifstream in(folder_ / name, std::ios::binary);
-    std::ostringstream all;
-    all << in.rdbuf();
-    return all.str();
-  }
-
   std::string read_error(const char* name) const {
     return test::error_message<FormatError>([&] { read_frf(folder_ / name); });
   }
@@ -72,26 +66,21 @@ FrfEstimate with_quality() {
 }
 
 TEST_F(FrfFile, GivesBackWhatWasWritten) {
-  FrfEstimate frf = with_quality();
-  write_frf(folder_ / "frf.h5", frf);
-  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
-  frf.method = FrfMethod::lpm;
-  frf.covariance_lines = 9;
-  frf.correlated_lines = 3.5;
-  frf.experiment_noise_ratio = 2.5;
-  frf.interpolation_misfit = numbered(4, 1, 0.5);
-  write_frf(folder_ / "frf.h5", frf);
-  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
-}
-
-TEST_F(FrfFile, WhatIsUnknownStaysUnknown) {
-  FrfEstimate frf;
-  frf.frequency_hz = Eigen::VectorXd::Constant(1, 2.0);
-  frf.inputs = {{"a"}, {"N"}};
-  frf.outputs = {{"z"}, {"m"}};
-  frf.response = Eigen::MatrixXcd::Constant(1, 1, {1.0, 2.0});
-  write_frf(folder_ / "frf.h5", frf);
-  test::expect_same(read_frf(folder_ / "frf.h5"), frf);
+  FrfEstimate lpm = with_quality();
+  lpm.method = FrfMethod::lpm;
+  lpm.covariance_lines = 9;
+  lpm.correlated_lines = 3.5;
+  lpm.experiment_noise_ratio = 2.5;
+  lpm.interpolation_misfit = numbered(4, 1, 0.5);
+  FrfEstimate bare;  // what is unknown stays unknown
+  bare.frequency_hz = Eigen::VectorXd::Constant(1, 2.0);
+  bare.inputs = {{"a"}, {"N"}};
+  bare.outputs = {{"z"}, {"m"}};
+  bare.response = Eigen::MatrixXcd::Constant(1, 1, {1.0, 2.0});
+  for (const FrfEstimate& frf : {with_quality(), lpm, bare}) {
+    write_frf(folder_ / "frf.h5", frf);
+    test::expect_same(read_frf(folder_ / "frf.h5"), frf);
+  }
 }
 
 // The layout of docs/formats.md: [N x n_y x n_u] in C order, as indexed by h5py and MATLAB users.
@@ -172,8 +161,8 @@ TEST_F(FrfFile, TheConfidenceRadiusNamesItsVariance) {
 TEST_F(FrfFile, SameContentSameBytes) {
   write_frf(folder_ / "a.h5", numbered_frf());
   write_frf(folder_ / "b.h5", read_frf(folder_ / "a.h5"));
-  EXPECT_FALSE(bytes("a.h5").empty());
-  EXPECT_EQ(bytes("a.h5"), bytes("b.h5"));
+  EXPECT_FALSE(test::bytes_of(folder_ / "a.h5").empty());
+  EXPECT_EQ(test::bytes_of(folder_ / "a.h5"), test::bytes_of(folder_ / "b.h5"));
 }
 
 /// A file of another program: only the required datasets.

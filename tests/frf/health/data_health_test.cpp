@@ -12,7 +12,6 @@
 #include "frf/plant/plant_frf.hpp"
 #include "frf/wiring/feedback_check.hpp"
 #include "tests/support/process/random_numbers.hpp"
-#include "tests/support/stages/closed_loop.hpp"
 #include "tests/support/stages/sampled_loop.hpp"
 
 namespace stageid::test_data_health {

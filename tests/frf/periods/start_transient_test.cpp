@@ -37,16 +37,6 @@ struct Setting {
   std::uint64_t seed = 1;
 };
 
-LoopExperiment experiment(const Setting& s) {
-  LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = 500, .axes = s.channels};
-  x.lines = test::line_range(5, 199, 2);
-  x.realizations = s.realizations;
-  x.periods = s.periods;
-  x.transient_periods = s.transient_periods;
-  x.seed = s.seed;
-  return x;
-}
-
 /// Coloured: white noise through a pole of 0.99; modal: unrecorded white forces, which excite the modes for as long as
 /// they ring.
 MemoryLog simulate(const Setting& s) {
@@ -55,7 +45,12 @@ MemoryLog simulate(const Setting& s) {
       s.channels, s.channels,
       {{random.uniform(20.0, 60.0), 0.1}, {93.0, s.decay_s}, {random.uniform(120.0, 180.0), 0.1}},
       kSampleRateHz, 0.02);
-  const LoopExperiment x = experiment(s);
+  LoopExperiment x{.sample_rate_hz = kSampleRateHz, .period_samples = 500, .axes = s.channels};
+  x.lines = test::line_range(5, 199, 2);
+  x.realizations = s.realizations;
+  x.periods = s.periods;
+  x.transient_periods = s.transient_periods;
+  x.seed = s.seed;
   MemoryLog log = test::simulate_sampled_log(plant, x, s.colour == Colour::white ? s.noise : 0.0);
   if (s.colour == Colour::white) return log;
   for (LogSamples& record : log.records) {
@@ -149,17 +144,12 @@ std::vector<Finding> of_change(const Change& change, std::uint64_t seed, bool ne
                          .transient_periods = 2,
                          .periods = 4};
   for (int run = 0; run < runs; ++run) {
-    const auto period = [&](const Eigen::MatrixXcd& shape, int p) {
-      Eigen::MatrixXcd Z =
-          Eigen::MatrixXcd::NullaryExpr(2, 60, [&random] { return random.circular(); });
-      Z.middleCols(first.value_or((60 - lines) / 2), lines) += change(p) * shape;
-      return Z;
-    };
     Eigen::MatrixXcd shape;
     const auto next = [&](int p) {
-      if (p == 0 || new_phases)
-        shape = Eigen::MatrixXcd::NullaryExpr(2, lines, [&random] { return random.circular(); });
-      return period(shape, p);
+      if (p == 0 || new_phases) shape = test::circular_matrix(random, 2, lines);
+      Eigen::MatrixXcd Z = test::circular_matrix(random, 2, 60);
+      Z.middleCols(first.value_or((60 - lines) / 2), lines) += change(p) * shape;
+      return Z;
     };
     StartRecorder recorder(next(0));
     for (int p = 1; p <= 4; ++p) recorder.take(next(p));
@@ -201,21 +191,16 @@ INSTANTIATE_TEST_SUITE_P(
 
 // What remains of a strong start is found in few runs, and what noise does beside it is not.
 TEST(StartTransient, AStrongStartIsTestedAgainstWhatTheRunsDifferBy) {
-  for (const double left : {0.1, 0.0}) {
-    int named = 0;
-    for (std::uint64_t seed = 1; seed <= 40; ++seed)
-      named += of_change([left](int p) { return p == 0   ? 40.0
-                                                : p == 1 ? 40.0 * left
-                                                         : 0.0; }, seed,
-                         false, 5, {}, 6)
-                       .empty()
-                   ? 0
-                   : 1;
-    if (left > 0.0)
-      EXPECT_GE(named, 38);
-    else
-      EXPECT_LE(named, 2);
-  }
+  const auto named = [](double left) {
+    int out = 0;
+    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+      const auto change = [left](int p) { return p == 0 ? 40.0 : p == 1 ? 40.0 * left : 0.0; };
+      if (!of_change(change, seed, false, 5, {}, 6).empty()) ++out;
+    }
+    return out;
+  };
+  EXPECT_GE(named(0.1), 38);
+  EXPECT_LE(named(0.0), 2);
 }
 
 // What is gone after one used period scatters the periods as noise does, so the deviations contain it, however large it was.
@@ -239,7 +224,7 @@ TEST(StartTransient, AtAnEndOfTheLinesOnlyALimitCycleIsAFault) {
         return std::polar(1e5 * std::pow(0.5, p), turn * p);
       };
       const std::vector<Finding> found = of_change(change, seed, false, 1, 0);
-      const bool fault = std::any_of(found.begin(), found.end(), [](const Finding& f) {
+      const bool fault = std::ranges::any_of(found, [](const Finding& f) {
         return f.severity == Severity::fault && f.cause == Cause::limit_cycle;
       });
       EXPECT_EQ(fault, cycle) << (found.empty() ? "nothing" : found[0].what + found[0].figure);

@@ -58,8 +58,8 @@ TEST(CovarianceSmoothing, RefusesWhatCannotBeSmoothed) {
 // Two periods and one realization: one degree of freedom per experiment and line, 19.0 in the quantile; seven lines
 // together 7. The noise has the same spectrum on all lines, in closed loop.
 TEST(CovarianceSmoothing, OverSeedsDegreesOfFreedomAreWhatTheySay) {
-  LoopExperiment x{.lines = {}, .axes = 1, .periods = 2, .transient_periods = 0};
-  for (int line = 1; line <= 41; line += 2) x.lines.push_back(line);
+  LoopExperiment x{
+      .lines = test::line_range(1, 41, 2), .axes = 1, .periods = 2, .transient_periods = 0};
   test::ClosedLoop loop{[](double) { return Eigen::MatrixXcd::Ones(2, 1); },
                         [](double) { return Eigen::MatrixXcd::Constant(1, 2, 0.4); }};
   x.noise_factor = 0.01 * Eigen::MatrixXcd::Identity(2, 2);

@@ -37,9 +37,7 @@ Case draw(std::uint64_t seed, int M, double relative_distortion) {
   frf.total_dof = M - 1.0;
   frf.noise_dof = kNoiseDof;
   const auto estimated = [&](double variance, int dof) {
-    double sum = 0.0;
-    for (int i = 0; i < dof; ++i) sum += std::norm(random.circular());
-    return variance * sum / dof;
+    return variance * test::circular_matrix(random, dof, 1).squaredNorm() / dof;
   };
   frf.noise_variance.resize(1, kLines);
   frf.total_variance.resize(1, kLines);
@@ -124,21 +122,17 @@ TEST(DistortionVariance, OfAWeaklyDrivenModeIsThatOfItsStrongActuator) {
 TEST(DistortionVariance, OfForcesIsCorrelatedBetweenTheOutputsAsTheResponseIs) {
   test::RandomNumbers random(8);
   constexpr Eigen::Index kOutputs = 3, kInputs = 2, kFew = 5;
-  const auto drawn = [&random](Eigen::Index rows, Eigen::Index columns) {
-    return Eigen::MatrixXcd(
-        Eigen::MatrixXcd::NullaryExpr(rows, columns, [&random] { return random.circular(); }));
-  };
   FrfEstimate frf;
   frf.outputs.names.resize(kOutputs);
   frf.inputs.names.resize(kInputs);
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(kFew, 10.0, 50.0);
-  frf.response = drawn(kOutputs * kInputs, kFew);
+  frf.response = test::circular_matrix(random, kOutputs * kInputs, kFew);
   frf.noise_variance.resize(kOutputs * kInputs, kFew);
   frf.residual_covariance.resize(kOutputs * kOutputs, kFew);
   Eigen::MatrixXd variance(kOutputs * kInputs, kFew);
   Eigen::MatrixXcd expected(kOutputs * kOutputs, kFew);
   for (Eigen::Index k = 0; k < kFew; ++k) {
-    const Eigen::MatrixXcd root = drawn(kOutputs, kOutputs);
+    const Eigen::MatrixXcd root = test::circular_matrix(random, kOutputs, kOutputs);
     const Eigen::MatrixXcd C_E = root * root.adjoint();
     frf.residual_covariance.col(k) = C_E.reshaped();
     frf.noise_variance.col(k) = C_E.diagonal().real().replicate(kInputs, 1);

@@ -141,25 +141,20 @@ TEST(AsMeasured, PutsBackWhatWasTakenOut) {
   }
 }
 
-TEST(AsMeasured, Errors) {
-  const FrfEstimate frf = sampled([](double) { return Complex(1.0, 0.0); });
-  EXPECT_THROW(as_measured(frf), std::invalid_argument);
-  FrfEstimate unknown_rate = compensate(frf, Compensation::delay, 0.0);
-  unknown_rate.sample_rate_hz = 0.0;
-  EXPECT_THROW(as_measured(unknown_rate), std::invalid_argument);
-}
-
 TEST(HoldCompensation, Errors) {
   const FrfEstimate frf = sampled([](double) { return Complex(1.0, 0.0); });
-  EXPECT_THROW(compensate(compensate(frf, Compensation::delay, 0.0), Compensation::hold, 0.0),
-               std::invalid_argument);
+  EXPECT_THROW(as_measured(frf), std::invalid_argument);
+  EXPECT_THROW(compensate(frf, Compensation::hold, std::nan("")), std::invalid_argument);
+  FrfEstimate delayed = compensate(frf, Compensation::delay, 0.0);
+  EXPECT_THROW(compensate(delayed, Compensation::hold, 0.0), std::invalid_argument);
+  delayed.sample_rate_hz = 0.0;
+  EXPECT_THROW(as_measured(delayed), std::invalid_argument);
   FrfEstimate unknown_rate = frf;
   unknown_rate.sample_rate_hz = 0.0;
   EXPECT_THROW(compensate(unknown_rate, Compensation::delay, 0.0), std::invalid_argument);
   FrfEstimate no_hold = frf;
   no_hold.hold = Hold::none;
   EXPECT_THROW(compensate(no_hold, Compensation::hold, 0.0), std::invalid_argument);
-  EXPECT_THROW(compensate(frf, Compensation::hold, std::nan("")), std::invalid_argument);
 }
 
 }  // namespace stageid::test_hold_compensation

@@ -97,17 +97,14 @@ TEST(LeakedNoise, WithoutLeakageNothingChanges) {
   EXPECT_LE(changed, 8);
 }
 
-TEST(LeakedNoise, CopiesOfARealizationKeepAVariance) {
-  Example example({0.0, 0.0});
-  lower_leaked_noise(example.scatter, example.frf);
-  EXPECT_GT(example.frf.noise_variance.minCoeff(), 0.0);
-}
-
-TEST(LeakedNoise, OneRealizationShowsNothing) {
-  Example example({0.2, 0.2});
-  const Eigen::MatrixXd before = example.frf.noise_variance;
-  lower_leaked_noise({}, example.frf);
-  EXPECT_EQ(example.frf.noise_variance, before);
+TEST(LeakedNoise, CopiesOfARealizationKeepAVarianceAndOneAloneShowsNothing) {
+  Example copies({0.0, 0.0});
+  lower_leaked_noise(copies.scatter, copies.frf);
+  EXPECT_GT(copies.frf.noise_variance.minCoeff(), 0.0);
+  Example one({0.2, 0.2});
+  const Eigen::MatrixXd before = one.frf.noise_variance;
+  lower_leaked_noise({}, one.frf);
+  EXPECT_EQ(one.frf.noise_variance, before);
 }
 
 /// Mean over the lines and entries of |G - G_0|^2 over its variance, for a loop with a slow force on actuator 0.

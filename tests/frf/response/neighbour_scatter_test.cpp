@@ -66,17 +66,14 @@ TEST(LineScatter, OfADistortedPlantItHoldsTheDistortion) {
   EXPECT_EQ(scatter.dof, 9.0);
 }
 
-TEST(LineScatter, WithoutANoiseVarianceTheRatioIsUnknown) {
+TEST(LineScatter, WithoutANoiseVarianceOrEnoughLinesTheRatioIsUnknown) {
   FrfEstimate frf = plant(0.0, 3);
+  const LineScatter few = line_scatter(select_band(frf, 1.0, 3.0));
+  EXPECT_EQ(few.variance.size(), 0);
+  EXPECT_EQ(few.over_noise, 0.0);
   frf.noise_variance.resize(0, 0);
   EXPECT_EQ(line_scatter(frf).over_noise, 0.0);
   EXPECT_EQ(line_scatter(frf).variance.cols(), kLines);
-}
-
-TEST(LineScatter, OfTooFewLinesNothingIsSaid) {
-  const LineScatter scatter = line_scatter(select_band(plant(0.0, 3), 1.0, 3.0));
-  EXPECT_EQ(scatter.variance.size(), 0);
-  EXPECT_EQ(scatter.over_noise, 0.0);
 }
 
 }  // namespace stageid::test_neighbour_scatter

@@ -28,24 +28,18 @@ FrfEstimate one_band(int lines, double total, double noise, double total_dof, do
 }
 
 // scipy: stats.chi2.sf(-2 K log(stats.f.sf(x, 2 a, 2 b)), 2 K).
-TEST(Nonlinearity, PValuesAreThoseOfScipy) {
+TEST(Nonlinearity, IsTestedAsByScipyAndMeasuredOfOneRealization) {
   const auto p = [](int K, double x, int a, double b) {
     return nonlinearity_test(one_band(K, x, 1.0, a, b)).p_value(0, 0);
   };
   EXPECT_NEAR(p(1, 3.0, 1, 4.0), 0.10662224073302785, 1e-9);
   EXPECT_NEAR(p(1, 2.5, 4, 9.0), 0.050735410649804746, 1e-9);
   EXPECT_NEAR(p(10, 1.7, 3, 12.0), 0.014870413896499016, 1e-9);
-}
-
-// Files of others often lack the degrees of freedom.
-TEST(Nonlinearity, WithoutATestThereIsNoVerdict) {
-  EXPECT_FALSE(NonlinearityTest{}.nonlinear());
-  EXPECT_FALSE(linearity_of(one_band(20, 1.0, 1.0, 0.0, 0.0)).nonlinear());
-}
-
-TEST(Nonlinearity, DistortionIsThatOfOneRealization) {
   const FrfEstimate frf = one_band(10, 5.0, 1.0, 2.0, 4.0);
   EXPECT_NEAR(nonlinearity_test(frf).distortion(0, 0), std::sqrt(3.0 * 4.0), 1e-12);
+  // Files of others often lack the degrees of freedom.
+  EXPECT_FALSE(NonlinearityTest{}.nonlinear());
+  EXPECT_FALSE(linearity_of(one_band(20, 1.0, 1.0, 0.0, 0.0)).nonlinear());
 }
 
 TEST(Nonlinearity, BandsAreOctavesOfEnoughLines) {

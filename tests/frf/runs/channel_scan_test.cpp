@@ -13,9 +13,7 @@ namespace stageid::test_channel_scan {
 
 Eigen::VectorXd normal_samples(Eigen::Index n, std::uint64_t seed) {
   test::RandomNumbers random(seed);
-  Eigen::VectorXd x(n);
-  for (double& value : x) value = random.normal();
-  return x;
+  return test::random_vector(random, n);
 }
 
 // A slow signal behind a coarse converter repeats values for long everywhere; a stuck channel does so once.

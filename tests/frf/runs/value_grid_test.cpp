@@ -8,9 +8,7 @@ namespace stageid::test_value_grid {
 
 Eigen::VectorXd gaussian(int count, std::uint64_t seed) {
   test::RandomNumbers random(seed);
-  Eigen::VectorXd out(count);
-  for (double& value : out) value = random.normal();
-  return out;
+  return test::random_vector(random, count);
 }
 
 double step_of(const Eigen::VectorXd& samples) {
@@ -19,16 +17,13 @@ double step_of(const Eigen::VectorXd& samples) {
   return grid.step();
 }
 
-TEST(ValueGrid, FindsTheStepAlsoBesideZero) {
+TEST(ValueGrid, FindsTheStepAlsoBesideZeroAndNoneWithoutAConverter) {
   const Eigen::VectorXd counts = (gaussian(500, 1) * 300.0).array().round();
   for (const double step : {1e-8, 0.1, 0.3, 7.0}) {
     SCOPED_TRACE(step);
     EXPECT_NEAR(step_of(step * counts), step, 1e-6 * step);
     EXPECT_NEAR(step_of((step * counts).array() + 0.37 * step), step, 1e-6 * step);
   }
-}
-
-TEST(ValueGrid, HasNoneWithoutAConverter) {
   EXPECT_EQ(step_of(gaussian(500, 2)), 0.0);
   EXPECT_EQ(step_of(Eigen::VectorXd::Constant(500, 3.0)), 0.0);
   EXPECT_EQ(step_of(Eigen::VectorXd()), 0.0);

@@ -8,25 +8,28 @@
 namespace stageid::test_distributions {
 
 // scipy.stats.f.logsf(x, 2 a, 2 b); the second overflows without intermediate scaling.
-TEST(Distributions, LogTailOfFIsThatOfScipy) {
+TEST(Distributions, TailsAndMomentsAreThoseOfScipy) {
   EXPECT_NEAR(log_tail_of_f(1.2, 130, 1170.0), -3.8900547289422773, 1e-9);
   EXPECT_NEAR(log_tail_of_f(1.05, 2000, 20000.0), -4.026592717858111, 1e-7);
   EXPECT_NEAR(log_tail_of_f(0.9, 5, 7.5), -0.5881163002608537, 1e-12);
-}
-
-// scipy.stats.chi2.sf(2 h, 2 K)
-TEST(Distributions, TailOfEvidenceIsThatOfScipy) {
+  // scipy.stats.chi2.sf(2 h, 2 K)
   EXPECT_NEAR(tail_of_evidence(12.3, 7), 0.03872784616227062, 1e-12);
   EXPECT_EQ(tail_of_evidence(0.0, 7), 1.0);
   EXPECT_EQ(tail_of_evidence(3.0, 0), 1.0);
-}
-
-// scipy.stats.chi2.sf(x, n)
-TEST(Distributions, TailOfChiSquareIsThatOfScipy) {
+  // scipy.stats.chi2.sf(x, n)
   EXPECT_NEAR(tail_of_chi_square(4.0, 4.0), 0.40600584970983794, 1e-14);
   EXPECT_NEAR(tail_of_chi_square(52.0, 36.0), 0.04110463210330187, 1e-14);
   EXPECT_NEAR(tail_of_chi_square(8400.0, 8000.0), 0.0009156555871932195, 1e-14);
   EXPECT_NEAR(std::log(tail_of_chi_square(38.0, 4.0)), -16.00426772644601, 1e-12);
+  // scipy.special.digamma(x) - log(x), polygamma(1, x)
+  EXPECT_NEAR(mean_of_log_power(1.0), -0.5772156649015329, 1e-14);
+  EXPECT_NEAR(mean_of_log_power(2.5), -0.2131340912289118, 1e-14);
+  EXPECT_NEAR(mean_of_log_power(25.0), -0.02013331201622659, 1e-14);
+  EXPECT_NEAR(variance_of_log_power(1.0), 1.6449340668482266, 1e-14);
+  EXPECT_NEAR(variance_of_log_power(2.5), 0.4903577561002349, 1e-14);
+  EXPECT_NEAR(variance_of_log_power(25.0), 0.04081066325722558, 1e-14);
+  EXPECT_FALSE(std::isfinite(mean_of_log_power(0.0)));
+  EXPECT_FALSE(std::isfinite(variance_of_log_power(0.0)));
 }
 
 TEST(Distributions, TailOfChiSquareNeverThrows) {
@@ -39,21 +42,6 @@ TEST(Distributions, TailOfChiSquareNeverThrows) {
   EXPECT_TRUE(std::isnan(tail_of_chi_square(nan, 4.0)));
   EXPECT_TRUE(std::isnan(tail_of_chi_square(4.0, 0.0)));
   EXPECT_TRUE(std::isnan(tail_of_chi_square(4.0, nan)));
-}
-
-// scipy.special.digamma(x) - log(x), polygamma(1, x)
-TEST(Distributions, MomentsOfALogPowerAreThoseOfScipy) {
-  EXPECT_NEAR(mean_of_log_power(1.0), -0.5772156649015329, 1e-14);
-  EXPECT_NEAR(mean_of_log_power(2.5), -0.2131340912289118, 1e-14);
-  EXPECT_NEAR(mean_of_log_power(25.0), -0.02013331201622659, 1e-14);
-  EXPECT_NEAR(variance_of_log_power(1.0), 1.6449340668482266, 1e-14);
-  EXPECT_NEAR(variance_of_log_power(2.5), 0.4903577561002349, 1e-14);
-  EXPECT_NEAR(variance_of_log_power(25.0), 0.04081066325722558, 1e-14);
-}
-
-TEST(Distributions, MomentsOfALogPowerWithoutDegreesOfFreedomAreNotFinite) {
-  EXPECT_FALSE(std::isfinite(mean_of_log_power(0.0)));
-  EXPECT_FALSE(std::isfinite(variance_of_log_power(0.0)));
 }
 
 TEST(Distributions, AgreesWithClosedForms) {

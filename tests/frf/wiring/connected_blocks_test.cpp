@@ -37,10 +37,8 @@ std::vector<PlantLine> decoupled_plant(std::uint64_t seed,
       Term term;
       term.omega = m < 3 ? 0.0 : 2.0 * std::numbers::pi * random.uniform(170.0, 1900.0);
       term.damping = random.uniform(0.003, 0.015);
-      Eigen::VectorXd y(rows), u(columns);
-      for (double& value : y) value = random.normal();
-      for (double& value : u) value = random.normal();
-      term.R = y * u.transpose();
+      const Eigen::VectorXd y = test::random_vector(random, rows);
+      term.R = y * test::random_vector(random, columns).transpose();
       terms.back().push_back(term);
     }
   }
