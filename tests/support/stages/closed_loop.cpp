@@ -163,4 +163,8 @@ ClosedLoop small_stage() {
   return loop;
 }
 
+ClosedLoop open_loop() {
+  return {small_stage().plant, [](double) { return Eigen::MatrixXcd::Zero(3, 2); }};
+}
+
 }  // namespace stageid::test

@@ -79,4 +79,7 @@ MemoryLog simulate_log(const ClosedLoop& loop, const LoopExperiment& x);
 /// actuators. Its controller is not symmetric either, so that a transposed matrix is seen.
 ClosedLoop small_stage();
 
+/// The same without feedback.
+ClosedLoop open_loop();
+
 }  // namespace stageid::test
