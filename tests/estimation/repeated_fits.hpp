@@ -1,6 +1,10 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <cmath>
 #include <functional>
+#include <vector>
 
 #include "estimation/search/fit_additive_model.hpp"
 #include "tests/estimation/noisy_stage.hpp"
