@@ -4,12 +4,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
-
-#include "acquisition/files/input_files.hpp"
 
 namespace stageid::test {
 namespace {
@@ -17,12 +14,6 @@ namespace {
 const std::filesystem::path kConfigs = std::filesystem::path(STAGEID_SOURCE_DIR) / "configs";
 
 }  // namespace
-
-std::string read_bytes(const std::filesystem::path& file) { return read_whole_file(file); }
-
-void write_bytes(const std::filesystem::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary) << bytes;
-}
 
 testing::AssertionResult same_bytes(const std::string& a, const std::string& b) {
   if (a == b) return testing::AssertionSuccess() << "all " << a.size() << " bytes are the same";

@@ -7,13 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/support/process/file_bytes.hpp"
 #include "tests/support/process/run_program.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 
 namespace stageid::test {
 
-std::string read_bytes(const std::filesystem::path& file);
-void write_bytes(const std::filesystem::path& file, const std::string& bytes);
 std::string replaced(std::string text, const std::string& from, const std::string& to);
 
 /// Says where two contents part, without printing them: most are binary or long.

@@ -30,7 +30,7 @@ std::string healthy_file(const TemporaryDirectory& directory) {
   file.create_growing("/rows", 2, H5T_IEEE_F64LE, 100);
   file.append_rows("/rows", 500, values.data());
   file.close();
-  return test::bytes_of(directory / "healthy.h5");
+  return test::read_bytes(directory / "healthy.h5");
 }
 
 struct Everything {

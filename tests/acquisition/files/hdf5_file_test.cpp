@@ -141,9 +141,9 @@ TEST_F(Hdf5FileTest, IntegersAndFloatsStandForEachOtherInAttributes) {
 }
 
 TEST_F(Hdf5FileTest, WritesTheSameBytesAtAnotherTime) {
-  const std::string first = test::bytes_of(with_everything(directory_ / "first.h5"));
+  const std::string first = test::read_bytes(with_everything(directory_ / "first.h5"));
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // HDF5 stores whole seconds
-  EXPECT_EQ(test::bytes_of(with_everything(directory_ / "second.h5")), first);
+  EXPECT_EQ(test::read_bytes(with_everything(directory_ / "second.h5")), first);
 }
 
 TEST_F(Hdf5FileTest, WritesEmptyThings) {

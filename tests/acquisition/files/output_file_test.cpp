@@ -42,9 +42,9 @@ TEST_F(OutputFileTest, ReplacesTheTargetOnlyWhenCommitted) {
   write_text_file(directory_ / "out", "old");
   OutputFile output(directory_ / "out");
   std::ofstream(output.path()) << "new";
-  EXPECT_EQ(test::bytes_of(directory_ / "out"), "old");
+  EXPECT_EQ(test::read_bytes(directory_ / "out"), "old");
   output.commit();
-  EXPECT_EQ(test::bytes_of(directory_ / "out"), "new");
+  EXPECT_EQ(test::read_bytes(directory_ / "out"), "new");
   EXPECT_EQ(entries(directory_.path()), 1U) << "the temporary file was left behind";
 }
 
@@ -63,9 +63,9 @@ TEST_F(OutputFileTest, WritesThroughASymbolicLink) {
   fs::create_directory(directory_ / "far");
   fs::create_symlink(directory_ / "far/real", directory_ / "link");
   write_text_file(directory_ / "link", "text");  // dangling at first
-  EXPECT_EQ(test::bytes_of(directory_ / "far/real"), "text");
+  EXPECT_EQ(test::read_bytes(directory_ / "far/real"), "text");
   write_text_file(directory_ / "link", "more");
-  EXPECT_EQ(test::bytes_of(directory_ / "far/real"), "more");
+  EXPECT_EQ(test::read_bytes(directory_ / "far/real"), "more");
   EXPECT_TRUE(fs::is_symlink(directory_ / "link"));
   EXPECT_EQ(entries(directory_ / "far"), 1U);
 }
@@ -75,7 +75,7 @@ TEST_F(OutputFileTest, WritesARelativeNameIntoTheWorkingDirectory) {
   fs::current_path(directory_.path());
   write_text_file("out", "text");
   fs::current_path(before);
-  EXPECT_EQ(test::bytes_of(directory_ / "out"), "text");
+  EXPECT_EQ(test::read_bytes(directory_ / "out"), "text");
 }
 
 TEST_F(OutputFileTest, RefusesTargetsThatAreNoFiles) {
@@ -109,7 +109,7 @@ TEST_F(OutputFileTest, AFullDiskLeavesTheOldFileAndNothingElse) {
     expect_file_error([&] { write_text_file(directory_ / "out", std::string(5000, 'x')); },
                       directory_ / "out", std::strerror(EFBIG));
   }
-  EXPECT_EQ(test::bytes_of(directory_ / "out"), "old");
+  EXPECT_EQ(test::read_bytes(directory_ / "out"), "old");
   EXPECT_EQ(entries(directory_.path()), 1U);
 }
 

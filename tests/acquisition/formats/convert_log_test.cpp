@@ -134,7 +134,7 @@ TEST_F(ConvertLog, LeavesNothingHalfWritten) {
   EXPECT_THROW(convert_log(*reader, directory_ / "a.txt"), std::invalid_argument);
   EXPECT_THROW(convert_log(*reader, directory_ / "none/a.h5"), FileError);
   // The log is damaged after it was opened, so that the conversion fails.
-  std::string bytes = test::bytes_of(directory_ / "a.slog");
+  std::string bytes = test::read_bytes(directory_ / "a.slog");
   bytes[bytes.size() * 3 / 4] ^= 1;
   test::write_bytes(directory_ / "a.slog", bytes);
   EXPECT_THROW(convert_log(*reader, directory_ / "a.h5"), FormatError);

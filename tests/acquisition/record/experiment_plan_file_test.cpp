@@ -76,7 +76,7 @@ TEST_F(ExperimentPlanFile, WritesTheSameBytesTwiceAndLeavesNothingElse) {
   const ExperimentPlan plan(grid(), spec());
   write_experiment_plan(directory_ / "a.h5", plan);
   write_experiment_plan(directory_ / "b.h5", plan);
-  EXPECT_EQ(test::bytes_of(directory_ / "a.h5"), test::bytes_of(directory_ / "b.h5"));
+  EXPECT_EQ(test::read_bytes(directory_ / "a.h5"), test::read_bytes(directory_ / "b.h5"));
   EXPECT_EQ(std::distance(fs::directory_iterator(directory_.path()), fs::directory_iterator()), 2);
 }
 

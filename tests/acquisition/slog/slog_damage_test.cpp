@@ -40,7 +40,7 @@ using SlogDamage = test::SmallLogTest;
 
 TEST_F(SlogDamage, EveryFlippedByteIsAnError) {
   test::write_small_log(file_, 2, 18);
-  const std::string good = test::bytes_of(file_);
+  const std::string good = test::read_bytes(file_);
   ASSERT_TRUE(content(file_).has_value());
   for (std::size_t at = 0; at < good.size(); ++at) {
     std::string bad = good;
@@ -62,7 +62,7 @@ TEST_F(SlogDamage, EveryFlippedByteIsAnError) {
 
 TEST_F(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
   test::write_small_log(file_, 2, 9);
-  const std::string good = test::bytes_of(file_);
+  const std::string good = test::read_bytes(file_);
   std::uint64_t rows_before = 0;
   for (std::size_t size = 0; size < good.size(); ++size) {
     test::write_bytes(file_, good.substr(0, size));
@@ -85,7 +85,7 @@ TEST_F(SlogDamage, EveryTruncationIsAnErrorAndItsIntactRowsAreGiven) {
 // The following tests cover failures of the disk, not of a process: the log is cut at any length, then resumed.
 TEST_F(SlogDamage, EveryTruncationCanBeResumed) {
   test::write_small_log(file_, 1, 9);
-  const std::string good = test::bytes_of(file_);
+  const std::string good = test::read_bytes(file_);
   SlogBlockHeader first;
   std::memcpy(&first, good.data(), sizeof first);
   for (std::size_t size = slog_block_bytes(first); size < good.size(); size += 13) {
@@ -112,8 +112,8 @@ TEST_F(SlogDamage, EveryTruncationCanBeResumed) {
 TEST_F(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
   test::write_small_log(file_);
   test::write_small_log(directory_ / "b.slog");
-  const std::string a = test::bytes_of(file_);
-  const std::string b = test::bytes_of(directory_ / "b.slog");
+  const std::string a = test::read_bytes(file_);
+  const std::string b = test::read_bytes(directory_ / "b.slog");
   ASSERT_EQ(a.size(), b.size());
   // As after a power failure: the second half was never written and contains an older file.
   SlogSource source(file_);
@@ -125,7 +125,7 @@ TEST_F(SlogDamage, BlocksOfAnotherLogAreNotTaken) {
 
 TEST_F(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
   test::write_small_log(file_, 2, 9);
-  const std::string good = test::bytes_of(file_);
+  const std::string good = test::read_bytes(file_);
   const std::vector<SlogBlock> blocks = [&] {
     return scan_slog(SlogSource(file_), SlogScanDepth::headers).blocks;
   }();
@@ -137,7 +137,7 @@ TEST_F(SlogDamage, AMissingBlockIsNoticedThoughAllOthersAreIntact) {
 
 TEST_F(SlogDamage, AScanInStepsFindsTheSame) {
   test::write_small_log(file_, 2, 9);
-  const std::string good = test::bytes_of(file_);
+  const std::string good = test::read_bytes(file_);
   const SlogScan intact = scan_slog(SlogSource(file_), SlogScanDepth::payloads);
   const auto agrees = [&](const std::string& bytes) {
     test::write_bytes(file_, bytes);
@@ -176,7 +176,7 @@ TEST_F(SlogDamage, AScanInStepsFindsTheSame) {
 struct SlogRecover : test::SmallLogTest {
   void SetUp() override {
     test::write_small_log(file_, 3, 9);
-    good_ = test::bytes_of(file_);
+    good_ = test::read_bytes(file_);
     blocks_ = scan_slog(SlogSource(file_), SlogScanDepth::headers).blocks;
   }
 
@@ -213,7 +213,7 @@ TEST_F(SlogRecover, AnIntactLogIsCopiedWhole) {
   EXPECT_EQ(report.complete_runs, 3);
   EXPECT_TRUE(report.damage.empty());
   EXPECT_EQ(content(out_), content(file_));
-  EXPECT_EQ(test::bytes_of(file_), good_);
+  EXPECT_EQ(test::read_bytes(file_), good_);
 }
 
 TEST_F(SlogRecover, RowsLostInTheMiddleBecomeMarkedRows) {

@@ -91,7 +91,7 @@ TEST_F(SlogReaderTest, SeveralThreadsReadAtOnce) {
 
 TEST_F(SlogReaderTest, UpdatesWhileTheLogIsBeingWritten) {
   test::write_small_log(file_, 3, 9);
-  const std::string whole = test::bytes_of(file_);
+  const std::string whole = test::read_bytes(file_);
   const std::size_t first = SlogSource(file_).bytes() / 10;  // with the description
   test::write_bytes(file_, whole.substr(0, first));
   SlogReader growing(file_, false);

@@ -80,7 +80,7 @@ TEST_F(SlogWriterTest, ARunWithoutExcitationHasNone) {
 TEST_F(SlogWriterTest, RefusesAnExistingFileAndLeavesItAlone) {
   test::write_bytes(file_, "precious");
   expect_error<FileError>([&] { create(); }, file_, "already exists");
-  EXPECT_EQ(test::bytes_of(file_), "precious");
+  EXPECT_EQ(test::read_bytes(file_), "precious");
   EXPECT_THROW(SlogWriter::create(directory_ / "none/a.slog", test::small_info()), FileError);
   EXPECT_THROW(SlogWriter::resume(directory_ / "none.slog", test::small_info()), FileError);
 }
@@ -151,13 +151,13 @@ TEST_F(SlogWriterTest, AFullDiskKeepsWhatWasAcknowledgedAndCanBeResumed) {
 
 TEST_F(SlogWriterTest, ResumeAppendsToACleanlyClosedLog) {
   test::write_small_log(file_, 1);
-  const std::string before = test::bytes_of(file_);
+  const std::string before = test::read_bytes(file_);
   {
     SlogWriter log = resume();
     test::write_run(log, 1);
     log.close(3, "later");
   }
-  EXPECT_EQ(test::bytes_of(file_).substr(0, before.size()), before) << "append-only";
+  EXPECT_EQ(test::read_bytes(file_).substr(0, before.size()), before) << "append-only";
   const SlogReader reader(file_);
   ASSERT_EQ(reader.runs().size(), 2U);
   EXPECT_EQ(reader.end()->exit_code, 3);
@@ -168,7 +168,7 @@ TEST_F(SlogWriterTest, ResumeAppendsToACleanlyClosedLog) {
 
 TEST_F(SlogWriterTest, ResumeRefusesAnotherExperiment) {
   test::write_small_log(file_, 1);
-  const std::string before = test::bytes_of(file_);
+  const std::string before = test::read_bytes(file_);
   LogInfo other = test::small_info();
   other.period_samples = 24;
   expect_error<FormatError>([&] { SlogWriter::resume(file_, other); }, file_,
@@ -181,7 +181,7 @@ TEST_F(SlogWriterTest, ResumeRefusesAnotherExperiment) {
   other = test::small_info();
   other.metadata_json = R"({"started":"another time"})";
   EXPECT_NO_THROW(SlogWriter::resume(file_, other));
-  EXPECT_EQ(test::bytes_of(file_), before) << "nothing was written yet";
+  EXPECT_EQ(test::read_bytes(file_), before) << "nothing was written yet";
 }
 
 TEST_F(SlogWriterTest, ResumeMovesADamagedTailAside) {
@@ -195,11 +195,11 @@ TEST_F(SlogWriterTest, ResumeMovesADamagedTailAside) {
       intact = log.bytes();
       log.write(test::rows_of(0, 20, 10));
     }
-    const std::string whole = test::bytes_of(file_);
+    const std::string whole = test::read_bytes(file_);
     test::write_bytes(file_, whole.substr(0, whole.size() - 100));
     SlogWriter log = resume();
     EXPECT_EQ(log.bytes(), intact);
-    EXPECT_EQ(test::bytes_of(directory_ / saved),
+    EXPECT_EQ(test::read_bytes(directory_ / saved),
               whole.substr(intact, whole.size() - 100 - intact));
     test::write_run(log, 0);
     log.close(0, "");
@@ -212,11 +212,11 @@ TEST_F(SlogWriterTest, ResumeMovesADamagedTailAside) {
 
 TEST_F(SlogWriterTest, ResumeDoesNotThrowIntactBlocksAway) {
   test::write_small_log(file_, 2);
-  std::string bytes = test::bytes_of(file_);
+  std::string bytes = test::read_bytes(file_);
   bytes[bytes.size() / 2] ^= 1;
   test::write_bytes(file_, bytes);
   expect_error<FormatError>([&] { resume(); }, file_, "recover");
-  EXPECT_EQ(test::bytes_of(file_), bytes);
+  EXPECT_EQ(test::read_bytes(file_), bytes);
 }
 
 }  // namespace stageid::test_slog_writer

@@ -57,7 +57,7 @@ struct ModelFile : testing::Test {
                             const std::string& what) {
     write_model(file_, full_model());
     const Json patch = Json::array({Json::parse(operation)});
-    test::write_bytes(file_, Json::parse(test::bytes_of(file_)).patch(patch).dump());
+    test::write_bytes(file_, Json::parse(test::read_bytes(file_)).patch(patch).dump());
     EXPECT_THAT(read_error(), AllOf(HasSubstr(place), HasSubstr(what))) << operation;
   }
 
@@ -113,7 +113,7 @@ TEST_F(ModelFile, RoundTripsEveryBit) {
 TEST_F(ModelFile, HasTheFieldsOfTheContract) {
   const AdditiveModel model = full_model();
   write_model(file_, model);
-  const Json root = Json::parse(test::bytes_of(file_));
+  const Json root = Json::parse(test::read_bytes(file_));
   EXPECT_EQ(root["format"], "stageid-model");
   EXPECT_EQ(root["format_version"], 1);
   EXPECT_EQ(root["inputs"], Json({"a1", "a2", "a3"}));
@@ -196,7 +196,7 @@ TEST_F(ModelFile, WithoutItsFileOrDirectoryIsAFileErrorAndLeavesNothing) {
 
 TEST_F(ModelFile, CutShortAnywhereOrNotOfThisFormatIsAFormatError) {
   write_model(file_, full_model());
-  const std::string whole = test::bytes_of(file_);
+  const std::string whole = test::read_bytes(file_);
   for (std::size_t length = 0; length + 2 < whole.size(); length += 97) {
     SCOPED_TRACE(length);
     test::write_bytes(file_, whole.substr(0, length));

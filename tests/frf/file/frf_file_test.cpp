@@ -161,8 +161,8 @@ TEST_F(FrfFile, TheConfidenceRadiusNamesItsVariance) {
 TEST_F(FrfFile, SameContentSameBytes) {
   write_frf(folder_ / "a.h5", numbered_frf());
   write_frf(folder_ / "b.h5", read_frf(folder_ / "a.h5"));
-  EXPECT_FALSE(test::bytes_of(folder_ / "a.h5").empty());
-  EXPECT_EQ(test::bytes_of(folder_ / "a.h5"), test::bytes_of(folder_ / "b.h5"));
+  EXPECT_FALSE(test::read_bytes(folder_ / "a.h5").empty());
+  EXPECT_EQ(test::read_bytes(folder_ / "a.h5"), test::read_bytes(folder_ / "b.h5"));
 }
 
 /// A file of another program: only the required datasets.

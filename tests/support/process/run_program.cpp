@@ -80,7 +80,7 @@ ProgramResult run_program(const std::filesystem::path& program,
   int status = 0;
   ::waitpid(child, &status, 0);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return {code, bytes_of(out), bytes_of(err)};
+  return {code, read_bytes(out), read_bytes(err)};
 }
 
 }  // namespace stageid::test
