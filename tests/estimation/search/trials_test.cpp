@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/process/random_numbers.hpp"
+
 namespace stageid::part_of_data_test {
 
 FrfEstimate frf_of(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines) {
@@ -12,7 +14,8 @@ FrfEstimate frf_of(Eigen::Index outputs, Eigen::Index inputs, Eigen::Index lines
   frf.outputs.units.assign(static_cast<std::size_t>(outputs), "m");
   frf.inputs.units.assign(static_cast<std::size_t>(inputs), "N");
   frf.frequency_hz = Eigen::VectorXd::LinSpaced(lines, 1.0, static_cast<double>(lines));
-  frf.response = Eigen::MatrixXcd::Random(outputs * inputs, lines);
+  test::RandomNumbers random(1);
+  frf.response = circular_matrix(random, outputs * inputs, lines);
   return frf;
 }
 
@@ -28,8 +31,9 @@ AdditiveModel one_mode(const FrfEstimate& frf) {
   model.outputs = frf.outputs;
   model.input_delay_s = Eigen::VectorXd::LinSpaced(frf.n_inputs(), 0.0, 1e-3);
   model.output_delay_s.setZero(frf.n_outputs());
+  test::RandomNumbers random(2);
   model.submodels.push_back(
-      {0, {1.0, 0.1, 100.0}, {Eigen::MatrixXd::Random(frf.n_outputs(), frf.n_inputs())}, {}, {}});
+      {0, {1.0, 0.1, 100.0}, {random_matrix(random, frf.n_outputs(), frf.n_inputs())}, {}, {}});
   return model;
 }
 

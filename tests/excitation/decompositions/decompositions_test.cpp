@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "tests/support/process/random_numbers.hpp"
+
 namespace stageid::decompositions_test {
 namespace {
 
@@ -87,8 +89,9 @@ TEST(Decompositions, SingularVectorsOfTheRequestedKind) {
 
 TEST(Decompositions, SingularValuesOfLargeMatricesOfAnyRank) {
   for (const Eigen::Index rank : {Eigen::Index{3}, Eigen::Index{40}}) {
-    const MatrixXcd tall = MatrixXcd::Random(40, rank);
-    const MatrixXcd wide = MatrixXcd::Random(rank, 60);
+    test::RandomNumbers random(1);
+    const MatrixXcd tall = circular_matrix(random, 40, rank);
+    const MatrixXcd wide = circular_matrix(random, rank, 60);
     const MatrixXcd m = tall * wide;
     const auto parts = svd(m, Eigen::ComputeThinU | Eigen::ComputeThinV);
     EXPECT_TRUE(product_of(parts).isApprox(m));
@@ -101,7 +104,8 @@ TEST(Decompositions, SingularValuesOfLargeMatricesOfAnyRank) {
 }
 
 TEST(Decompositions, TheTriangleInPlaceIsTheCholeskyFactorUpToSigns) {
-  const MatrixXd m = MatrixXd::Random(7, 3);
+  test::RandomNumbers random(1);
+  const MatrixXd m = random_matrix(random, 7, 3);
   MatrixXd factored = m;
   qr_in_place(factored);
   const MatrixXd R = factored.topRows(3).triangularView<Eigen::Upper>();
@@ -111,9 +115,10 @@ TEST(Decompositions, TheTriangleInPlaceIsTheCholeskyFactorUpToSigns) {
 
 // What is left is orthogonal to every column.
 TEST(Decompositions, LeastSquaresByQr) {
-  const MatrixXd m = MatrixXd::Random(9, 3);
+  test::RandomNumbers random(1);
+  const MatrixXd m = random_matrix(random, 9, 3);
   const MatrixXd adjoint = m.transpose();
-  const VectorXd b = VectorXd::Random(9);
+  const VectorXd b = random_vector(random, 9);
   for (const VectorXd& x : {least_squares(qr(m), b), least_squares(pivoted_qr(m), b),
                             shortest_least_squares(m, b), VectorXd(pseudo_inverse(m) * b)}) {
     const VectorXd left = b - m * x;
@@ -133,8 +138,9 @@ TEST(Decompositions, ShortestOfTheLeastSquares) {
 }
 
 TEST(Decompositions, InverseAndSolutionOfComplexEquations) {
-  const MatrixXcd m = MatrixXcd::Random(4, 4);
-  const MatrixXcd b = MatrixXcd::Random(4, 2);
+  test::RandomNumbers random(1);
+  const MatrixXcd m = circular_matrix(random, 4, 4);
+  const MatrixXcd b = circular_matrix(random, 4, 2);
   EXPECT_TRUE((m * inverse(m)).isIdentity(1e-12));
   EXPECT_TRUE((m * solve(m, b)).isApprox(b));
 }

@@ -11,6 +11,7 @@
 #include "hal/simulator/rigid_body.hpp"
 #include "tests/hal/measured_response.hpp"
 #include "tests/hal/stage_bench.hpp"
+#include "tests/support/process/random_numbers.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test_controller_sections {
@@ -91,13 +92,13 @@ TEST(TransferSections, RefuseWhatCannotBeComputed) {
 }
 
 ControllerStateSpace random_system(Eigen::Index n, Eigen::Index actuators, Eigen::Index sensors) {
-  std::srand(3);
+  test::RandomNumbers random(3);
   ControllerStateSpace s;
-  s.a = Eigen::MatrixXd::Random(n, n);
+  s.a = random_matrix(random, n, n);
   s.a *= 0.8 / svd(s.a, 0).singularValues()[0];
-  s.b = Eigen::MatrixXd::Random(n, sensors);
-  s.c = Eigen::MatrixXd::Random(actuators, n);
-  s.d = Eigen::MatrixXd::Random(actuators, sensors);
+  s.b = random_matrix(random, n, sensors);
+  s.c = random_matrix(random, actuators, n);
+  s.d = random_matrix(random, actuators, sensors);
   return s;
 }
 
