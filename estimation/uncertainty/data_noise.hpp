@@ -85,10 +85,9 @@ SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eige
 
 /// Columns X = C_diag^1/2 W J of channels, as required by correlated_gram().
 struct CorrelatedColumns {
-  Eigen::Index first_input = 0;
   /// Per input: the parameters of its columns, in order.
   std::vector<std::vector<Eigen::Index>> parameters;
-  /// Columns of an output (0-based) of the input first_input + u, lines x parameters[u].
+  /// Columns of an output (0-based) of an input, lines x parameters[u].
   std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, IndexRange lines)> columns;
   /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
   /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.

@@ -74,6 +74,7 @@ void add_channels(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, 
         const auto im = X[d].im.middleCols(first, n).array();
         right.re = re.colwise() * w_re - im.colwise() * w_im;
         right.im = im.colwise() * w_re + re.colwise() * w_im;
+        // Of a mode, two columns each: packing them for the usual product takes longer than the product.
         Eigen::Map<Eigen::MatrixXd> gram(sum, n, n);
         gram += X[c].re.middleCols(first, n).transpose().lazyProduct(right.re);
         gram += X[c].im.middleCols(first, n).transpose().lazyProduct(right.im);

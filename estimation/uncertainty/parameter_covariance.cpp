@@ -69,7 +69,6 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
     cross[c].setZero(problem.globals(), problem.functions());
   CorrelatedColumns inputs;
-  inputs.first_input = range.first / n_y;
   inputs.parameters.assign(range.count / n_y, indices(0, problem.globals()));
   inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
     const Eigen::Index c = range.first + n_y * u + y;
