@@ -188,6 +188,8 @@ constexpr bool kOwnSystemCalls = false;  // sanitizers make calls of their own
 #else
 constexpr bool kOwnSystemCalls = true;
 #endif
+constexpr const char* kCannotForbid =
+    kOwnSystemCalls ? "no seccomp here" : "the sanitizer makes system calls of its own";
 
 /// Wait status of a child that does `work` with system calls forbidden; nothing if they cannot be forbidden.
 template <typename Work>
@@ -208,7 +210,7 @@ std::optional<int> status_without_system_calls(Work work) {
 TEST_P(LoopPurity, NoSystemCallButSleepAndTime) {
   WholeLoop whole(GetParam());
   const std::optional<int> status = status_without_system_calls([&] { whole.run(); });
-  if (!status) GTEST_SKIP() << "a sanitizer makes system calls, or there is no seccomp";
+  if (!status) GTEST_SKIP() << kCannotForbid;
   EXPECT_TRUE(WIFEXITED(*status)) << "killed by signal " << WTERMSIG(*status);
 }
 
@@ -216,7 +218,7 @@ TEST(LoopPurityControl, AMemoryMapWouldHaveBeenSeen) {
   const std::optional<int> status = status_without_system_calls([] {
     static_cast<void>(::mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
   });
-  if (!status) GTEST_SKIP() << "a sanitizer makes system calls, or there is no seccomp";
+  if (!status) GTEST_SKIP() << kCannotForbid;
   EXPECT_TRUE(WIFSIGNALED(*status) && WTERMSIG(*status) == SIGSYS);
 }
 
