@@ -27,6 +27,7 @@
 #include <utility>
 #include <vector>
 
+#include "acquisition/files/json_text.hpp"
 #include "tests/support/judgement/judgement_case.hpp"
 
 namespace {
@@ -104,7 +105,7 @@ void work(const Arguments& a, const std::vector<std::pair<int, Trouble>>& cases,
       result = {
           {"seed", seed}, {"trouble", to_string(trouble)}, {"exit", -1}, {"said", error.what()}};
     }
-    const std::string line = result.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    const std::string line = json_line(result) + "\n";
     std::FILE* stream = std::fopen(a.output.c_str(), "a");
     if (stream == nullptr) std::_Exit(1);
     std::fwrite(line.data(), 1, line.size(), stream);
