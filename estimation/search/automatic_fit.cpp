@@ -244,7 +244,6 @@ class AutomaticFit {
     take_structure_of(search->best_.model);
     delay_denied_ = std::move(search->delay_denied_);
     adopt(fit_additive_model(frf_, with_all_channels(frf_, search->best_.model), quick_));
-    structured_at_ = history_.size();
     return true;
   }
 
@@ -372,11 +371,11 @@ class AutomaticFit {
     }
   }
 
-  /// A part of the data, on which moves are tried, and the score of best_ there.
+  /// A part of the data, on which moves are tried, and the score that best_ has on all lines according to it.
   struct Sample {
     explicit Sample(const AutomaticFit& search)
         : data(part_of_data(search.frf_, search.quick_, search.best_.model)),
-          worth(data.frf, search.structure_, data.options.user_weights) {
+          worth(data.frf, search.structure_, data.options.user_weights, search.frf_.lines()) {
       FitResult fit = fit_additive_model(data.frf, data.model, data.options);
       if (!data.all && worth.at_rounding(fit) && !search.at_rounding()) {
         // Rounding decides nothing.
@@ -400,7 +399,7 @@ class AutomaticFit {
     };
     std::vector<Better> better;
     for (StructureMove& move : moves) {
-      FitResult trial = tried(sample, move);
+      FitResult trial = tried(sample.data.frf, sample.worth, sample.now, move.model, move.options);
       const double then = sample.worth.criterion(trial);
       if (trial.status() == FitStatus::singular || !(then < sample.now)) continue;
       better.push_back({then, std::move(move), std::move(trial)});
@@ -412,12 +411,12 @@ class AutomaticFit {
     });
   }
 
-  static FitResult tried(const Sample& sample, const StructureMove& move) {
-    FitOptions options = move.options;
-    const FitProblem problem =
-        make_problem(sample.data.frf, move.model, options, options.user_weights);
-    options.worthwhile_cost = sample.worth.cost_at(sample.now, move.model, problem.parameters());
-    return fit_additive_model(sample.data.frf, move.model, options);
+  /// A fit that gives up early if it does not reach a criterion.
+  static FitResult tried(const FrfEstimate& frf, const ModeWorth& worth, double criterion,
+                         const AdditiveModel& model, FitOptions options) {
+    const FitProblem problem = make_problem(frf, model, options, options.user_weights);
+    options.worthwhile_cost = worth.cost_at(criterion, model, problem.parameters());
+    return fit_additive_model(frf, model, options);
   }
 
   /// @returns false if all data do not confirm the move
@@ -425,7 +424,7 @@ class AutomaticFit {
     FitOptions options = quick_;
     options.delay = move.options.delay;
     options.delay_s = move.options.delay_s;
-    if (!all) fit = fit_additive_model(frf_, with_all_channels(frf_, fit.model), options);
+    if (!all) fit = tried(frf_, worth_, score(), with_all_channels(frf_, fit.model), options);
     if (!is_better(fit)) return false;
     say("{}: cost {:.6g} -> {:.6g}, {} -> {} parameters", move.flag, cost(), fit.model.fit.cost,
         best_.parameters, fit.parameters);

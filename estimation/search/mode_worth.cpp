@@ -16,8 +16,15 @@ double most_by_noise(double parameters) {
   return parameters + kClearly * std::sqrt(2.0 * parameters);
 }
 
+/// What a part with so many parameters must gain: more than by noise, and so much that the response becomes more accurate.
+/// Below twice their number, the error without them is smaller than their variance (Akaike). Hundreds of parameters, such
+/// as general damping, would else be accepted because they imitate some other small error.
+double gain_of_use(double parameters) {
+  return std::max(2.0 * parameters, most_by_noise(parameters));
+}
+
 /// In units of 2 ln(likelihood). Poles and B_0 of the modes: ln(data) each (BIC). The other parts belong to a structure
-/// that is one of a few, not the best of many, so each is right if noise cannot gain as much: the B_1 of all modes, a
+/// that is one of a few, not the best of many, so each is right if it is of use at all: the B_1 of all modes, a
 /// direct term, a rigid body, the delays. With ln(data) for each of the hundreds of parameters of many channels, a part
 /// would be left out that shifts the modes by several of their standard deviations.
 double cost_of_parameters(const AdditiveModel& model, double channels, double parameters,
@@ -33,12 +40,12 @@ double cost_of_parameters(const AdditiveModel& model, double channels, double pa
       of_damping += numerators - channels;
     } else {
       of_others += s.order() + numerators;
-      cost += most_by_noise(s.order() + numerators);
+      cost += gain_of_use(s.order() + numerators);
     }
   }
   const double of_delays = parameters - of_modes - of_damping - of_others;
   if (of_delays < 0.0) return parameters * std::log(data);  // residues of given ranks
-  return cost + of_modes * std::log(data) + most_by_noise(of_damping) + most_by_noise(of_delays);
+  return cost + of_modes * std::log(data) + gain_of_use(of_damping) + gain_of_use(of_delays);
 }
 
 /// Also 2 ln(lines) for the choice of the frequency among the lines. Without it, the best of thousands of places would
@@ -67,13 +74,16 @@ Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& mo
 
 ModeWorth::ModeWorth(const FrfEstimate& frf)
     : lines_(static_cast<double>(frf.lines())),
+      all_lines_(lines_),
       channels_(static_cast<double>(frf.response.rows())),
       data_(frf.independent_numbers()),
       parameters_of_mode_(2.0 + channels_) {}
 
 ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
-                     const Eigen::MatrixXd& weights)
+                     const Eigen::MatrixXd& weights, Eigen::Index all_lines)
     : ModeWorth(frf) {
+  if (all_lines > 0) all_lines_ = static_cast<double>(all_lines);
+  data_ *= all_lines_ / lines_;
   if (structure.general_damping) parameters_of_mode_ += channels_;
   rounding_ = kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum();
 }
@@ -82,7 +92,9 @@ double ModeWorth::squares(const FitResult& fit) const {
   return std::max(2.0 * lines_ * fit.model.fit.cost, rounding_);
 }
 
-double ModeWorth::cost_of_one() const { return cost_of_mode(parameters_of_mode_, data_, lines_); }
+double ModeWorth::cost_of_one() const {
+  return cost_of_mode(parameters_of_mode_, data_, all_lines_);
+}
 
 double ModeWorth::criterion(const FitResult& fit) const {
   return data_ * std::log(squares(fit)) + penalty(fit.model, fit.parameters);
@@ -90,7 +102,7 @@ double ModeWorth::criterion(const FitResult& fit) const {
 
 double ModeWorth::criterion_of_structure(const FrfEstimate& frf, const FitResult& fit) const {
   const double of_mode = 2.0 + channels_;
-  const double saved = cost_of_mode(of_mode, data_, lines_) - most_by_noise(of_mode);
+  const double saved = cost_of_mode(of_mode, data_, all_lines_) - gain_of_use(of_mode);
   const auto beside = std::ranges::count_if(fit.model.submodels, [&](const Submodel& s) {
     return is_searched_mode(s) && side_of_lines(frf, s.natural_frequency_hz()) != 0;
   });
@@ -98,8 +110,11 @@ double ModeWorth::criterion_of_structure(const FrfEstimate& frf, const FitResult
 }
 
 double ModeWorth::penalty(const AdditiveModel& model, Eigen::Index parameters) const {
-  return cost_of_parameters(model, channels_, static_cast<double>(parameters), data_) +
-         2.0 * count_modes(model) * std::log(lines_);
+  const auto count = static_cast<double>(parameters);
+  // Noise gains one per parameter on any number of lines, but the criterion of a part multiplies it with the lines.
+  const double of_noise = (all_lines_ / lines_ - 1.0) * count;
+  return cost_of_parameters(model, channels_, count, data_) +
+         2.0 * count_modes(model) * std::log(all_lines_) + of_noise;
 }
 
 double ModeWorth::cost_at(double criterion, const AdditiveModel& model,
@@ -108,7 +123,7 @@ double ModeWorth::cost_at(double criterion, const AdditiveModel& model,
 }
 
 double ModeWorth::price(const FitResult& fit, double parameters) const {
-  return in_squares(squares(fit), cost_of_mode(parameters, data_, lines_), data_);
+  return in_squares(squares(fit), cost_of_mode(parameters, data_, all_lines_), data_);
 }
 
 double ModeWorth::most_by_chance(const FitResult& fit) const {

@@ -23,8 +23,10 @@ class ModeWorth {
   /// For fits whose residual is far above rounding.
   explicit ModeWorth(const FrfEstimate& frf);
   /// For a search. @param weights n_c x N, of the fits that are compared
-  ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
-            const Eigen::MatrixXd& weights);
+  /// @param all_lines of the data that are judged, if `frf` has only some of them: what its fits gain beyond noise is
+  /// taken to be alike on the others
+  ModeWorth(const FrfEstimate& frf, const ModelStructure& structure, const Eigen::MatrixXd& weights,
+            Eigen::Index all_lines = 0);
 
   /// Smaller is better.
   double criterion(const FitResult& fit) const;
@@ -57,6 +59,7 @@ class ModeWorth {
   double penalty(const AdditiveModel& model, Eigen::Index parameters) const;
 
   double lines_ = 0.0;
+  double all_lines_ = 0.0;
   double channels_ = 0.0;
   double data_ = 0.0;  ///< number of independent real numbers
   double parameters_of_mode_ = 0.0;
