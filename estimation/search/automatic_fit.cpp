@@ -56,7 +56,7 @@ class AutomaticFit {
   }
 
   /// Whether modes may be misplaced: the residual still shows one.
-  bool may_exchange() const {
+  bool may_exchange() {
     return selection_.exactly > 0 && !selection_.keep_modes &&
            selection_.exactly < affordable_modes() && best_.status() != FitStatus::singular &&
            !at_rounding() && !limit_reached() && missing_mode();
@@ -160,19 +160,23 @@ class AutomaticFit {
     return fit.status() != FitStatus::singular && worth_.criterion(fit) < score();
   }
 
-  std::vector<ProposedMode> proposals(std::size_t most) const {
-    return proposed_modes(frf_, best_.model, quick_.user_weights, most, quick_.workers());
+  /// The largest modes in the residual.
+  const std::vector<ProposedMode>& proposals() {
+    if (std::exchange(proposed_at_, history_.size()) != history_.size())
+      proposals_ = proposed_modes(frf_, best_.model, quick_.user_weights, added_together(),
+                                  quick_.workers());
+    return proposals_;
   }
 
   /// The largest mode in the residual, if it may be worth its parameters.
-  std::optional<ModeCandidate> missing_mode() const {
-    const std::vector<ProposedMode> missed = proposals(1);
+  std::optional<ModeCandidate> missing_mode() {
+    const std::vector<ProposedMode>& missed = proposals();
     if (missed.empty() || kReach * missed.front().gain <= worth_.price(best_)) return std::nullopt;
     return missed.front().mode;
   }
 
   /// Whether that mode is beside the lines. Every structure imitates such modes, so they are added first.
-  bool misses_mode_beside_lines() const {
+  bool misses_mode_beside_lines() {
     const std::optional<ModeCandidate> mode = missing_mode();
     return mode && side_of_lines(frf_, mode->frequency_hz) != 0;
   }
@@ -454,7 +458,7 @@ class AutomaticFit {
         if (restructure()) reduce();
         if (round > 1 && a_delay_explains_more()) break;
       }
-      const std::vector<ProposedMode> candidates = proposals(added_together());
+      const std::vector<ProposedMode> candidates = proposals();
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
     }
@@ -651,7 +655,9 @@ class AutomaticFit {
   FitResult proportional_;           ///< the last one before general damping
   std::vector<std::string> decisions_;
   std::vector<double> history_;
-  // Size of the history when no such move was left; with the same model, none is tried again.
+  std::vector<ProposedMode> proposals_;
+  // Size of the history when modes were proposed, or no such move was left; with the same model, none is tried again.
+  std::size_t proposed_at_ = 0;
   std::size_t merged_at_ = 0;
   std::size_t structured_at_ = 0;
   std::size_t exhausted_at_ = 0;  // modes to add
