@@ -1,6 +1,7 @@
 // The program for MPI: mpirun -n COUNT stageid-mpi COMMAND ... The only source that includes <mpi.h>.
 #include <fcntl.h>
 #include <mpi.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -113,6 +114,8 @@ int main(int argc, char** argv) {
   int exit_code = EXIT_FAILURE;
   {
     const MpiTeam team;
+    // A process leaves the rows of others unwritten (ChannelData); a huge page would contain them.
+    if (team.size() > 1) ::prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0);
     // Results and messages are those of the first process; the others send it their errors.
     if (team.rank() > 0) be_silent({STDOUT_FILENO, STDERR_FILENO});
     exit_code = stageid::program_main(argc, argv, team);

@@ -102,6 +102,13 @@ class Hdf5File {
   /// Rows [first, first + count) of a 1-D or 2-D dataset as float64, row-major, into `out`.
   void read_rows(const std::string& dataset, hsize_t first, hsize_t count, double* out) const;
 
+  /// A box of a dataset, row-major: `extent` indices from `first` on of every dimension, real or complex numbers.
+  template <typename Scalar>
+  void read_box(const std::string& dataset, const std::vector<hsize_t>& first,
+                const std::vector<hsize_t>& extent, Scalar* out) const;
+  /// Rows that are stored together, which should be read together; 1: any.
+  hsize_t rows_of_chunk(const std::string& dataset) const;
+
   void create_group(const std::string& group);
   void write_reals(const std::string& dataset, const std::vector<hsize_t>& shape,
                    const double* data);

@@ -24,6 +24,16 @@ struct DatasetInfo : hdf5::StoredValue {
     const bool compressed = H5Pget_nfilters(properties.get()) > 0;
     return hdf5::plausible_count(file.path(), object, shape, H5Tget_size(type.get()), compressed);
   }
+  void expect_complex() const {
+    expect(kind == Hdf5Kind::complex, "complex numbers (compound type with float members r and i)");
+  }
+  void read_box(hid_t memory_type, const std::vector<hsize_t>& first,
+                const std::vector<hsize_t>& extent, void* out) const {
+    const Hdf5Handle memory(
+        H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, first.data(), nullptr, extent.data(), nullptr);
+    check_read(H5Dread(dataset, memory_type, memory.get(), space.get(), H5P_DEFAULT, out));
+  }
   void check_read(herr_t status) const {
     if (status < 0) fail_to_read();
   }
@@ -65,8 +75,7 @@ std::vector<double> Hdf5File::read_reals(const std::string& dataset) const {
 
 std::vector<std::complex<double>> Hdf5File::read_complex(const std::string& dataset) const {
   const DatasetInfo info(*this, dataset, open_dataset(dataset));
-  info.expect(info.kind == Hdf5Kind::complex,
-              "complex numbers (compound type with float members r and i)");
+  info.expect_complex();
   const Hdf5Handle type = hdf5::complex_type(H5T_NATIVE_DOUBLE);
   return read_all<std::complex<double>>(info, type.get());
 }
@@ -92,12 +101,34 @@ void Hdf5File::read_rows(const std::string& dataset, hsize_t first, hsize_t coun
     info.fail("has " + std::to_string(info.shape[0]) + " rows, fewer than the " +
               std::to_string(first + count) + " needed");
   if (count == 0 || (rank == 2 && info.shape[1] == 0)) return;
-  const hsize_t start[2] = {first, 0};
-  const hsize_t extent[2] = {count, rank == 2 ? info.shape[1] : 1};
-  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(rank), extent, nullptr), H5Sclose);
-  H5Sselect_hyperslab(info.space.get(), H5S_SELECT_SET, start, nullptr, extent, nullptr);
-  info.check_read(
-      H5Dread(info.dataset, H5T_NATIVE_DOUBLE, memory.get(), info.space.get(), H5P_DEFAULT, out));
+  std::vector<hsize_t> extent = info.shape;
+  extent[0] = count;
+  info.read_box(H5T_NATIVE_DOUBLE, rank == 2 ? std::vector<hsize_t>{first, 0} : std::vector{first},
+                extent, out);
+}
+
+template <>
+void Hdf5File::read_box(const std::string& dataset, const std::vector<hsize_t>& first,
+                        const std::vector<hsize_t>& extent, double* out) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect_number("real numbers");
+  info.read_box(H5T_NATIVE_DOUBLE, first, extent, out);
+}
+
+template <>
+void Hdf5File::read_box(const std::string& dataset, const std::vector<hsize_t>& first,
+                        const std::vector<hsize_t>& extent, std::complex<double>* out) const {
+  const DatasetInfo info(*this, dataset, open_dataset(dataset));
+  info.expect_complex();
+  info.read_box(hdf5::complex_type(H5T_NATIVE_DOUBLE).get(), first, extent, out);
+}
+
+hsize_t Hdf5File::rows_of_chunk(const std::string& dataset) const {
+  const Hdf5Handle properties(H5Dget_create_plist(open_dataset(dataset)), H5Pclose);
+  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) return 1;
+  std::vector<hsize_t> chunk(H5S_MAX_RANK, 1);
+  H5Pget_chunk(properties.get(), H5S_MAX_RANK, chunk.data());
+  return chunk[0];
 }
 
 std::string join_shape(const std::vector<hsize_t>& shape) {

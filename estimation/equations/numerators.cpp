@@ -128,17 +128,10 @@ void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit 
   }
 }
 
-/// The channels whose work this process does.
-IndexRange own_channels(const FitProblem& problem) {
-  const TileShare own = problem.team->share(channel_tiles(problem.channels()));
-  const Eigen::Index first = std::min(own.first * kTileChannels, problem.channels());
-  return {first, std::min((own.first + own.count) * kTileChannels, problem.channels()) - first};
-}
-
 /// Calls visit(group, pairs, block) for its own channels in blocks.
 template <typename Visit>
 void visit_blocks(const FitProblem& problem, const BasisGroups& groups, Visit visit) {
-  const IndexRange own = own_channels(problem);
+  const IndexRange own = own_channels(*problem.team, problem.channels());
   groups.for_each([&](const BasisGroup& group) {
     // The products of all functions, shared by all blocks.
     const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,

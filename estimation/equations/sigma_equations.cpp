@@ -25,19 +25,33 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
   return diagonal.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
 }
 
+/// H of the own channels. Tiles are evaluated before they are copied, because the ends of vectors round complex products
+/// differently.
+Eigen::MatrixXcd divided(const Eigen::MatrixXcd& G, const Eigen::VectorXcd& factor,
+                         const Team& team) {
+  Eigen::MatrixXcd H(G.rows(), G.cols());
+  for_each_own_tile(team, G.rows(), [&](IndexRange tile) {
+    const Eigen::MatrixXcd of_tile =
+        G.middleRows(tile.first, tile.count) * factor.cwiseInverse().asDiagonal();
+    H.middleRows(tile.first, tile.count) = of_tile;
+  });
+  return H;
+}
+
 /// Fraction of the path up to each line: kPathShare by the change of log H over all channels, the rest by line index.
 Eigen::VectorXd path_of(const Eigen::MatrixXcd& H, const Team& team) {
   const Eigen::Index last = H.cols() - 1;
-  Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(H.cols(), 1);
-  const TileShare own = team.share(H.cols());
-  for (Eigen::Index k = std::max<Eigen::Index>(1, own.first); k < own.first + own.count; ++k)
-    for (Eigen::Index c = 0; c < H.rows(); ++c) {
-      const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
-      if (std::isfinite(turn)) steps(k) += turn;
-    }
-  team.gather_rows(1, steps);
+  const Eigen::VectorXd steps = sum_over_tiles(team, H.rows(), H.cols(), [&](IndexRange tile) {
+    Eigen::VectorXd part = Eigen::VectorXd::Zero(H.cols());
+    for (Eigen::Index k = 1; k <= last; ++k)
+      for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) {
+        const double turn = std::abs(std::log(H(c, k) / H(c, k - 1)));
+        if (std::isfinite(turn)) part[k] += turn;
+      }
+    return part;
+  });
   Eigen::VectorXd path = Eigen::VectorXd::Zero(H.cols());
-  for (Eigen::Index k = 1; k <= last; ++k) path[k] = path[k - 1] + steps(k);
+  for (Eigen::Index k = 1; k <= last; ++k) path[k] = path[k - 1] + steps[k];
   return kPathShare / std::max(path[last], 1e-300) * path +
          (1.0 - kPathShare) * Eigen::VectorXd::LinSpaced(H.cols(), 0.0, 1.0);
 }
@@ -108,8 +122,8 @@ SigmaEquations::SigmaEquations(Eigen::VectorXcd x, bool unit_circle, const Eigen
                                SplitMatrix own, const Workers& workers)
     : x_(std::move(x)),
       unit_circle_(unit_circle),
-      H_(G * factor.cwiseInverse().asDiagonal()),
-      path_(path_of(H_, channel_tiles(G.rows()) > 1 ? *workers.team : Team::one())),
+      H_(divided(G, factor, *workers.team)),
+      path_(path_of(H_, *workers.team)),
       power_(factor.cwiseAbs2()),
       weights_(weights),
       own_(std::move(own)),
@@ -158,17 +172,20 @@ std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
                                                        const SplitMatrix& phi) const {
   const Eigen::Index n = phi.cols();
   const FractionGram products(poles, x_, unit_circle_);
-  const Team& team = channel_tiles(H_.rows()) > 1 ? *workers_.team : Team::one();
-  const TileShare own = team.share(kShares);
-  std::vector<Eigen::VectorXd> shares(own.count);
-  for_each_task(workers_.threads, static_cast<int>(own.count), [&](int task) {
-    Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);
-    for (Eigen::Index c = own.first + task; c < H_.rows(); c += kShares)
-      S += remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
-                              H_.row(c).transpose(), phi, own_, products);
-    shares[task] = S.reshaped();
-  });
-  const Eigen::MatrixXd S = team.sum(kShares, (n + 1) * (n + 1), shares).reshaped(n + 1, n + 1);
+  const auto of_tile = [&](IndexRange tile) {
+    std::vector<Eigen::MatrixXd> shares(kShares);
+    for_each_task(workers_.threads, kShares, [&](int share) {
+      Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);
+      for (Eigen::Index c = tile.first + share; c < tile.first + tile.count; c += kShares)
+        S += remaining_products(weights_.row(c).transpose().cwiseProduct(power_),
+                                H_.row(c).transpose(), phi, own_, products);
+      shares[share] = S;
+    });
+    for (int share = 1; share < kShares; ++share) shares[0] += shares[share];
+    return Eigen::VectorXd(shares[0].reshaped());
+  };
+  const Eigen::MatrixXd S =
+      sum_over_tiles(*workers_.team, H_.rows(), (n + 1) * (n + 1), of_tile).reshaped(n + 1, n + 1);
   const Eigen::VectorXd scale = inverse_root(S.diagonal());
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(scale.asDiagonal() * S *
                                                          scale.asDiagonal());

@@ -22,6 +22,18 @@ void append(Eigen::MatrixXd& R, const Eigen::MatrixXd& further) {
   R = both.topRows(R.cols()).triangularView<Eigen::Upper>();
 }
 
+/// R of the triangles stacked.
+Eigen::MatrixXd merged(std::vector<Eigen::MatrixXd> triangles, int threads) {
+  while (triangles.size() > 1) {
+    const std::size_t pairs = triangles.size() / 2;
+    for_each_task(threads, static_cast<int>(pairs), [&](int pair) {
+      append(triangles[pair], triangles[triangles.size() - 1 - pair]);
+    });
+    triangles.resize(triangles.size() - pairs);
+  }
+  return std::move(triangles.front());
+}
+
 }  // namespace
 
 Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A) {
@@ -31,29 +43,26 @@ Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A) {
       A.block(eliminated, eliminated, rest, rest).triangularView<Eigen::Upper>());
 }
 
-Eigen::MatrixXd stacked_triangle(Eigen::Index count, const Workers& workers,
+Eigen::MatrixXd stacked_triangle(Eigen::Index channels, const Workers& workers,
                                  const std::function<Eigen::MatrixXd(Eigen::Index)>& factor) {
-  std::vector<Eigen::MatrixXd> shares(std::min(kShares, count));
-  const Team& divided = channel_tiles(count) > 1 ? *workers.team : Team::one();
-  const TileShare own = divided.share(std::ssize(shares));
-  for_each_task(workers.threads, static_cast<int>(own.count), [&](int task) {
-    const Eigen::Index share = own.first + task;
-    Eigen::MatrixXd& R = shares[share];
-    R = factor(share);
-    for (Eigen::Index i = share + kShares; i < count; i += kShares) append(R, factor(i));
+  std::vector<Eigen::MatrixXd> tiles(channel_tiles(channels));
+  const Team& team = *workers.team;
+  for_each_own_tile(team, channels, [&](IndexRange tile) {
+    std::vector<Eigen::MatrixXd> shares(std::min(kShares, tile.count));
+    for_each_task(workers.threads, static_cast<int>(shares.size()), [&](int share) {
+      Eigen::MatrixXd& R = shares[share];
+      R = factor(tile.first + share);
+      for (Eigen::Index i = share + kShares; i < tile.count; i += kShares)
+        append(R, factor(tile.first + i));
+    });
+    tiles[tile.first / kTileChannels] = merged(std::move(shares), workers.threads);
   });
-  for (int owner = 0; owner < divided.size(); ++owner) {
-    const TileShare of_owner = divided.share(std::ssize(shares), owner);
-    for (Eigen::Index i = of_owner.first; i < of_owner.first + of_owner.count; ++i)
-      broadcast(divided, owner, shares[i]);
+  for (int owner = 0; team.divides(std::ssize(tiles)) && owner < team.size(); ++owner) {
+    const TileShare of_owner = team.share(std::ssize(tiles), owner);
+    for (Eigen::Index t = of_owner.first; t < of_owner.first + of_owner.count; ++t)
+      broadcast(team, owner, tiles[t]);
   }
-  while (shares.size() > 1) {
-    const std::size_t pairs = shares.size() / 2;
-    for_each_task(workers.threads, static_cast<int>(pairs),
-                  [&](int pair) { append(shares[pair], shares[shares.size() - 1 - pair]); });
-    shares.resize(shares.size() - pairs);
-  }
-  return std::move(shares.front());
+  return merged(std::move(tiles), workers.threads);
 }
 
 }  // namespace stageid

@@ -11,9 +11,9 @@ namespace stageid {
 /// overwritten.
 Eigen::MatrixXd triangle_after(Eigen::Index eliminated, Eigen::MatrixXd& A);
 
-/// R of the matrices factor(0), factor(1), ... stacked, all upper triangular with the same columns. The order of the
-/// work does not depend on the workers. @pre count > 0
-Eigen::MatrixXd stacked_triangle(Eigen::Index count, const Workers& workers,
+/// R of the matrices factor(0), factor(1), ... of the channels stacked, all upper triangular with the same columns. The
+/// order of the work does not depend on the workers, which factor their own channels. @pre channels > 0
+Eigen::MatrixXd stacked_triangle(Eigen::Index channels, const Workers& workers,
                                  const std::function<Eigen::MatrixXd(Eigen::Index)>& factor);
 
 }  // namespace stageid

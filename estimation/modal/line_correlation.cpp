@@ -3,26 +3,29 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frf/response/channel_tiles.hpp"
+
 namespace stageid {
 namespace {
 
 constexpr Eigen::Index kMostLags = 64;
 constexpr double kClearlyPositive = 5.0;  // standard deviations of the correlation of white noise
-constexpr Eigen::Index kChannels = 256;   // at a time
 
 /// Real parts of the autocorrelation over the lines for lags 0, 1, ...; lag 0 is 1.
 Eigen::ArrayXd autocorrelation(const FrfEstimate& frf, const ModelBlockResponse& model,
                                const Eigen::MatrixXd& variance, Eigen::Index lags) {
-  Eigen::ArrayXd sums = Eigen::ArrayXd::Zero(lags + 1);
-  for (Eigen::Index first = 0; first < frf.response.rows(); first += kChannels) {
-    const Eigen::Index count = std::min(kChannels, frf.response.rows() - first);
+  const auto of_tile = [&](DataRange tile) {
+    const auto [first, count] = tile;
     const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
     const Eigen::ArrayXXcd E =
         frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
     const Eigen::MatrixXcd white =
         (of_noise > 0.0).select(E / of_noise.sqrt(), std::complex<double>(0.0));  // 0: unknown
-    for (Eigen::Index lag = 0; lag <= lags; ++lag) sums[lag] += product_at_lag(white, lag).real();
-  }
+    Eigen::VectorXd part(lags + 1);
+    for (Eigen::Index lag = 0; lag <= lags; ++lag) part[lag] = product_at_lag(white, lag).real();
+    return part;
+  };
+  const Eigen::ArrayXd sums = sum_over_tiles(*frf.team, variance.rows(), lags + 1, of_tile);
   return sums / sums[0];
 }
 

@@ -45,11 +45,18 @@ struct Part {
 class Parts {
  public:
   Parts(const FrfEstimate& frf, double dof)
-      : frf_(frf),
-        dof_(dof),
-        rounding_(kRounding * frf.response.colwise().squaredNorm().transpose()),
-        share_(frf.response.rowwise().squaredNorm()) {
-    share_ /= std::max(share_.sum(), std::numeric_limits<double>::min());
+      : frf_(frf), dof_(dof), share_(Eigen::VectorXd::Zero(frf.response.rows())) {
+    rounding_ =
+        kRounding * sum_over_tiles(*frf.team, share_.size(), frf.lines(), [&](IndexRange tile) {
+          const Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
+          share_.segment(tile.first, tile.count) = G.rowwise().squaredNorm();
+          return Eigen::VectorXd(G.colwise().squaredNorm().transpose());
+        });
+    const auto of_tile = [&](IndexRange tile) {
+      return Eigen::VectorXd(share_.segment(tile.first, tile.count)).sum();
+    };
+    share_ /= std::max(number_over_tiles(*frf.team, share_.size(), of_tile),
+                       std::numeric_limits<double>::min());
     parts_.push_back({});
     for (const std::string& name : frf.outputs.names) parts_.push_back({"output " + name});
     for (const std::string& name : frf.inputs.names) parts_.push_back({"input " + name});
@@ -58,7 +65,6 @@ class Parts {
       parts_.push_back(
           {fmt::format("{:.4g} to {:.4g} Hz", frf.frequency_hz[first], frf.frequency_hz[last])});
     }
-    seen_.resize(parts_.size());
   }
 
   /// Adds one line of some channels: residual, variance and weights (empty: all count).
@@ -77,34 +83,59 @@ class Parts {
   }
 
   /// Counts the lines of every part. Like add_line(), but for all channels.
-  void count_line(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXd>& variance,
-                  const Eigen::Ref<const Eigen::VectorXd>& weights) {
-    std::fill(seen_.begin(), seen_.end(), false);
-    for (Eigen::Index c = 0; c < variance.size(); ++c)
-      if (counts(variance[c], weights.size() > 0 ? weights[c] : 1.0))
-        for (const std::size_t p : parts_of(c, k)) seen_[p] = true;
-    for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].lines += seen_[p] ? 1.0 : 0.0;
+  void count_lines(const Eigen::MatrixXd& variance, const Eigen::MatrixXd& weights) {
+    const auto [own, count] = frf_.own();
+    const auto entry_counts = [&](Eigen::Index c, Eigen::Index k) {
+      return counts(variance(c, k), weights.rows() > 0 ? weights(c, k) : 1.0);
+    };
+    bool all_count = true;
+    for (Eigen::Index k = 0; k < frf_.lines(); ++k)
+      for (Eigen::Index c = own; c < own + count; ++c) all_count &= entry_counts(c, k);
+    all_count = !frf_.any(!all_count);
+    const Eigen::Index of_lines = 1 + frf_.n_outputs() + frf_.n_inputs();
+    for (std::size_t p = 0; all_count && p < parts_.size(); ++p)
+      parts_[p].lines = static_cast<double>(
+          static_cast<Eigen::Index>(p) < of_lines
+              ? frf_.lines()
+              : std::min(kRun, frf_.lines() - kRun * (static_cast<Eigen::Index>(p) - of_lines)));
+    for (Eigen::Index k = 0; !all_count && k < frf_.lines(); ++k) {
+      Eigen::VectorXd seen = Eigen::VectorXd::Zero(std::ssize(parts_));
+      for (Eigen::Index c = own; c < own + count; ++c)
+        if (entry_counts(c, k))
+          for (const std::size_t p : parts_of(c, k)) seen[static_cast<Eigen::Index>(p)] = 1.0;
+      seen = frf_.team->sum(channel_tiles(share_.size()), seen.size(), {seen});
+      for (std::size_t p = 0; p < parts_.size(); ++p)
+        parts_[p].lines += seen[static_cast<Eigen::Index>(p)] > 0.0 ? 1.0 : 0.0;
+    }
   }
 
-  /// The sums of add_line() as numbers.
-  Eigen::VectorXd take_sums() {
-    Eigen::VectorXd sums(size());
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
+  /// The sums of add_line() for the channels of a tile as numbers, `size()` in all: those of the few parts that they
+  /// belong to, in the order of add_sums().
+  Eigen::RowVectorXd take_sums(IndexRange tile) {
+    Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(size());
+    Eigen::Index at = 0;
+    for (const std::size_t p : parts_of(tile)) {
       Part& part = parts_[p];
-      sums.segment<3>(3 * static_cast<Eigen::Index>(p)) << part.t, part.r, part.entries;
+      sums.segment<3>(at) << part.t, part.r, part.entries;
       part.t = part.r = part.entries = 0.0;
+      at += 3;
     }
     return sums;
   }
-  void set_sums(const Eigen::VectorXd& sums) {
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
-      const auto of_part = sums.segment<3>(3 * static_cast<Eigen::Index>(p));
-      parts_[p].t = of_part[0];
-      parts_[p].r = of_part[1];
-      parts_[p].entries = of_part[2];
+  void add_sums(IndexRange tile, const Eigen::RowVectorXd& sums) {
+    Eigen::Index at = 0;
+    for (const std::size_t p : parts_of(tile)) {
+      parts_[p].t += sums[at++];
+      parts_[p].r += sums[at++];
+      parts_[p].entries += sums[at++];
     }
   }
-  Eigen::Index size() const { return 3 * std::ssize(parts_); }
+  Eigen::Index size() const {
+    const Eigen::Index channels = std::min(kTileChannels, share_.size());
+    const Eigen::Index runs = (frf_.lines() + kRun - 1) / kRun;
+    return 3 *
+           (1 + std::min(channels, frf_.n_outputs()) + std::min(channels, frf_.n_inputs()) + runs);
+  }
 
   const Part& all() const { return parts_.front(); }
 
@@ -144,6 +175,17 @@ class Parts {
             static_cast<std::size_t>(runs + k / kRun)};
   }
 
+  /// The parts to which the channels of a tile belong, in order.
+  std::vector<std::size_t> parts_of(IndexRange tile) const {
+    std::vector<std::size_t> out;
+    for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c)
+      for (const std::size_t p : parts_of(c, 0)) out.push_back(p);
+    for (Eigen::Index k = 0; k < frf_.lines(); k += kRun) out.push_back(parts_of(0, k)[3]);
+    std::ranges::sort(out);
+    out.erase(std::ranges::unique(out).begin(), out.end());
+    return out;
+  }
+
   /// If r has no mean, the mean of t is used as size of the excess.
   double excess(const Part& part) const {
     return expected() > 0.0 ? part.mean_r() / expected() : kAllowed * part.mean_t();
@@ -164,7 +206,6 @@ class Parts {
   Eigen::VectorXd rounding_;  // of every line
   Eigen::VectorXd share_;     // of every channel: they may have different units
   std::vector<Part> parts_;
-  std::vector<bool> seen_;
 };
 
 constexpr Eigen::Index kTile = 64;  // lines
@@ -192,7 +233,9 @@ ResidualVerdict judge_by(const FrfEstimate& frf, const ModelBlockResponse& model
   Parts parts(frf, dof);
   const Eigen::MatrixXd none(0, frf.lines());
   const Eigen::MatrixXd& W = weights.size() > 0 ? weights : none;
-  const auto sums = [&](const IndexRange& channels) {
+  const Eigen::Index tiles = channel_tiles(frf.response.rows());
+  Eigen::MatrixXd sums(tiles, parts.size());
+  for_each_own_tile(team, frf.response.rows(), [&](const IndexRange& channels) {
     for_each_residual(frf, model, channels, [&](const ResponseBlock& block, const auto& E) {
       for (Eigen::Index i = 0; i < block.lines; ++i) {
         const Eigen::Index k = block.first_line + i;
@@ -201,10 +244,12 @@ ResidualVerdict judge_by(const FrfEstimate& frf, const ModelBlockResponse& model
             W.col(k).segment(W.rows() > 0 ? channels.first : 0, W.rows() > 0 ? channels.count : 0));
       }
     });
-    return parts.take_sums();
-  };
-  parts.set_sums(sum_over_tiles(team, frf.response.rows(), parts.size(), sums));
-  for (Eigen::Index k = 0; k < frf.lines(); ++k) parts.count_line(k, variance.col(k), W.col(k));
+    sums.row(channels.first / kTileChannels) = parts.take_sums(channels);
+  });
+  team.gather_rows(1, sums);
+  for (Eigen::Index t = 0; t < tiles; ++t)
+    parts.add_sums(channels_of_tile(t, frf.response.rows()), sums.row(t));
+  parts.count_lines(variance, W);
   verdict.chi_square = parts.all().mean_r();
   verdict.expected = parts.expected();
   const Part* unexplained = parts.unexplained();
@@ -219,11 +264,12 @@ ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelBlockResponse
                                 const Eigen::MatrixXd& weights, int threads, const Team& team) {
   if (!has_line_scatter(frf.lines())) return {};
   Eigen::MatrixXd scatter(frf.response.rows(), frf.lines());
-  for_each_residual(
-      frf, model, {0, frf.response.rows()}, [&](const ResponseBlock& block, const auto& E) {
-        scatter.middleCols(block.first_line, block.lines) =
-            scatter_variance(frf.frequency_hz.segment(block.first_line, block.lines), E, threads);
-      });
+  for_each_own_tile(*frf.team, frf.response.rows(), [&](const IndexRange& tile) {
+    for_each_residual(frf, model, tile, [&](const ResponseBlock& block, const auto& E) {
+      scatter.block(tile.first, block.first_line, tile.count, block.lines) =
+          scatter_variance(frf.frequency_hz.segment(block.first_line, block.lines), E, threads);
+    });
+  });
   ResidualVerdict verdict = judge_by(frf, model, weights, ResidualVariance::scatter, kScatterDof,
                                      scatter, "neighbouring lines differ by", team);
   verdict.scatter = std::move(scatter);

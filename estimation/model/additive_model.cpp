@@ -1,6 +1,5 @@
 #include "estimation/model/additive_model.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -49,11 +48,8 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
                          model.sample_rate_hz > 0.0 ? 1.0 / model.sample_rate_hz : 0.0, hold};
   Eigen::MatrixXcd out = Eigen::MatrixXcd::Zero(count, frequency_hz.size());
   SubmodelBasis basis;
-  for (const auto& [delay, members] :
-       channels_by_delay(model.input_delays_s(), model.output_delays_s())) {
-    const auto begin = std::ranges::lower_bound(members, first);
-    const auto end = std::lower_bound(begin, members.end(), first + count);
-    if (begin == end) continue;
+  for (const auto& [delay, members] : channels_by_delay(model.input_delay_s, model.output_delay_s,
+                                                        model.n_outputs(), first, count)) {
     const HoldEquivalent through(lines, delay);
     for (const Submodel& submodel : model.submodels) {
       const SubmodelShape shape = shape_of(submodel);
@@ -61,7 +57,7 @@ Eigen::MatrixXcd response(const AdditiveModel& model,
       for (Eigen::Index k = 0; k < out.cols(); ++k)
         for (int m = 0; m <= shape.numerator_degree; ++m) {
           const double* B = submodel.numerator[m].data();
-          for (auto c = begin; c != end; ++c) out(*c - first, k) += B[*c] * basis.value(k, m);
+          for (const Eigen::Index c : members) out(c - first, k) += B[c] * basis.value(k, m);
         }
     }
   }

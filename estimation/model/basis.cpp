@@ -100,11 +100,15 @@ void evaluate_basis(const HoldEquivalent& through, const SubmodelShape& shape,
 }
 
 std::map<double, std::vector<Eigen::Index>> channels_by_delay(const Eigen::VectorXd& input_s,
-                                                              const Eigen::VectorXd& output_s) {
+                                                              const Eigen::VectorXd& output_s,
+                                                              Eigen::Index outputs,
+                                                              Eigen::Index first,
+                                                              Eigen::Index count) {
   std::map<double, std::vector<Eigen::Index>> groups;
-  for (Eigen::Index u = 0; u < input_s.size(); ++u)
-    for (Eigen::Index y = 0; y < output_s.size(); ++y)
-      groups[input_s[u] + output_s[y]].push_back(y + output_s.size() * u);
+  for (Eigen::Index c = first; c < first + count; ++c)
+    groups[(input_s.size() > 0 ? input_s[c / outputs] : 0.0) +
+           (output_s.size() > 0 ? output_s[c % outputs] : 0.0)]
+        .push_back(c);
   return groups;
 }
 

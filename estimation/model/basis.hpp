@@ -31,9 +31,13 @@ struct WantedBasis {
   bool delay = false;
 };
 
-/// Channels c = output + n_y input that share one delay.
+/// Channels c = output + n_y input that share one delay, of `count` channels from `first` on.
+/// @param input_s, output_s may be empty: 0
 std::map<double, std::vector<Eigen::Index>> channels_by_delay(const Eigen::VectorXd& input_s,
-                                                              const Eigen::VectorXd& output_s);
+                                                              const Eigen::VectorXd& output_s,
+                                                              Eigen::Index outputs,
+                                                              Eigen::Index first,
+                                                              Eigen::Index count);
 
 /// The poles of A(s) = 1 + a_1 s + ... + a_n s^n.
 std::vector<std::complex<double>> roots(const Eigen::Ref<const Eigen::VectorXd>& a);

@@ -154,7 +154,9 @@ void add_work(const FitProblem& problem, bool with_derivatives) {
 /// The groups of all channels, without their functions.
 std::vector<BasisGroup> unevaluated_groups(const FitParameters& beta) {
   std::vector<BasisGroup> groups;
-  for (auto& [delay, channels] : channels_by_delay(beta.input_delay_s, beta.output_delay_s)) {
+  const Eigen::Index outputs = beta.output_delay_s.size();
+  for (auto& [delay, channels] : channels_by_delay(beta.input_delay_s, beta.output_delay_s, outputs,
+                                                   0, beta.input_delay_s.size() * outputs)) {
     groups.emplace_back().delay_s = delay;
     groups.back().channels = std::move(channels);
   }
@@ -230,10 +232,22 @@ bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
   return !(problem.W->row(channel).maxCoeff() > 0.0);
 }
 
+double weighted_power(const FrfEstimate& frf, const Eigen::MatrixXd& weights) {
+  return number_over_tiles(*frf.team, weights.rows(), [&](IndexRange tile) {
+    const Eigen::MatrixXd W = weights.middleRows(tile.first, tile.count);
+    const Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
+    return (W.array() * G.cwiseAbs2().array()).sum();
+  });
+}
+
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
-  Eigen::Index weighted = 0;
-  for (Eigen::Index c = 0; c < problem.channels(); ++c)
-    weighted += has_no_weight(problem, c) ? 0 : 1;
+  const auto weighted = static_cast<Eigen::Index>(
+      number_over_tiles(*problem.team, problem.channels(), [&](IndexRange tile) {
+        Eigen::Index count = 0;
+        for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c)
+          count += has_no_weight(problem, c) ? 0 : 1;
+        return count;
+      }));
   const Eigen::Index without = (problem.channels() - weighted) * problem.functions();
   const double data = static_cast<double>(problem.size() * weighted);
   return 2.0 * static_cast<double>(problem.size()) * cost /

@@ -14,6 +14,7 @@
 #include "estimation/problem/shared_matrix.hpp"
 #include "excitation/threads/team.hpp"
 #include "excitation/threads/worker_pool.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -25,10 +26,7 @@ namespace stageid {
 //   D(k, .)   derivatives of F to the denominator coefficients
 
 /// Neighbouring lines, channels, inputs or functions.
-struct IndexRange {
-  Eigen::Index first = 0;
-  Eigen::Index count = 0;
-};
+using IndexRange = DataRange;
 /// 0 to count - 1 in ranges of at most `most`.
 std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most);
 
@@ -57,7 +55,7 @@ struct FitProblem {
   ModelLines lines;
   Eigen::Index n_outputs = 0;
   Eigen::Index n_inputs = 0;
-  SharedMatrix<Eigen::MatrixXcd> G;    ///< n_c x N
+  SharedMatrix<Eigen::MatrixXcd> G;    ///< n_c x N; with W and v, see ChannelData
   SharedMatrix<Eigen::MatrixXd> W;     ///< n_c x N; see weights()
   std::optional<LineVariance> middle;  ///< v: the weights are W v W instead of W
   std::vector<SubmodelShape> shapes;
@@ -79,30 +77,6 @@ struct FitProblem {
   Eigen::Index globals() const noexcept { return denominators() + delays(); }
   Eigen::Index parameters() const noexcept { return globals() + channels() * functions(); }
 };
-
-/// Channels that are multiplied together. The work of a fit is divided between processes by such tiles, so that the
-/// products are the same for any number of them.
-constexpr Eigen::Index kTileChannels = 256;
-inline Eigen::Index channel_tiles(Eigen::Index channels) {
-  return (channels + kTileChannels - 1) / kTileChannels;
-}
-/// The channels of a tile.
-inline IndexRange channels_of_tile(Eigen::Index tile, Eigen::Index channels) {
-  const Eigen::Index first = tile * kTileChannels;
-  return {first, std::min(kTileChannels, channels - first)};
-}
-
-/// The sum of part(channels) over all tiles, `numbers` long each; each process computes its own tiles.
-template <typename Part>
-Eigen::VectorXd sum_over_tiles(const Team& team, Eigen::Index channels, Eigen::Index numbers,
-                               const Part& part) {
-  const Eigen::Index tiles = channel_tiles(channels);
-  const TileShare own = team.share(tiles);
-  std::vector<Eigen::VectorXd> parts;
-  for (Eigen::Index t = own.first; t < own.first + own.count; ++t)
-    parts.push_back(part(channels_of_tile(t, channels)));
-  return team.sum(tiles, numbers, parts);
-}
 
 /// beta: all estimated parameters.
 struct FitParameters {
@@ -164,7 +138,10 @@ class BasisGroups {
 std::vector<const BasisGroup*> groups_of_channels(const FitProblem& problem,
                                                   const std::vector<BasisGroup>& groups);
 
-/// Whether the weight of a channel is zero on all lines, so that the data do not determine it.
+/// sum W |G|^2. @param weights n_c x N
+double weighted_power(const FrfEstimate& frf, const Eigen::MatrixXd& weights);
+
+/// Whether the weight of an own channel is zero on all lines, so that the data do not determine it.
 bool has_no_weight(const FitProblem& problem, Eigen::Index channel);
 
 /// sum W |E|^2 per complex degree of freedom; 1 if W is the inverse variance and the model is right.

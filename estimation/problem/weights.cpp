@@ -17,8 +17,6 @@ constexpr double kWantedDof = 25.0;
 // With fewer degrees of freedom after smoothing, the scatter of the inverse is infinite or nearly so. Only possible
 // with a handful of lines.
 constexpr double kLeastTogether = 4.0;
-constexpr Eigen::Index kChannels = 256;  // smoothed at a time
-
 std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
   return frf.outputs.names[c % frf.n_outputs()] + " <- " + frf.inputs.names[c / frf.n_outputs()] +
          " at " + std::to_string(frf.frequency_hz[k]) + " Hz";
@@ -45,20 +43,28 @@ double expected_power(double power, double n, double nu) {
 }
 
 /// v^power for power 1 or -1, v the geometric mean over neighbouring lines, which does not spread a resonance of the
-/// variance. Its expectation is that power of the true variance.
-Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power) {
-  if (!(dof > 0.0)) return power > 0.0 ? variance : Eigen::MatrixXd(variance.cwiseInverse());
+/// variance. Its expectation is that power of the true variance. @param own rows to compute
+Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power,
+                               IndexRange own) {
   const Eigen::Index half = window_reach(dof);
   const double nu = std::max(dof, 1.0);
-  if (half == 0 && power > 0.0) return variance;
-  if (half == 0) return variance.cwiseInverse() * ((nu - 1.0) / nu);
   const Eigen::Index N = variance.cols();
+  Eigen::MatrixXd out(variance.rows(), N);
+  if (half == 0) {
+    const auto some = variance.middleRows(own.first, own.count);
+    const double scale = dof > 0.0 ? (nu - 1.0) / nu : 1.0;
+    if (power > 0.0)
+      out.middleRows(own.first, own.count) = some;
+    else
+      out.middleRows(own.first, own.count) = some.cwiseInverse() * scale;
+    return out;
+  }
   Eigen::VectorXd bias(N);
   for (Eigen::Index k = 0; k < N; ++k)
     bias[k] = std::log(expected_power(power, static_cast<double>(window_lines(k, half, N)), nu));
-  Eigen::MatrixXd out(variance.rows(), N);
-  for (Eigen::Index c = 0; c < variance.rows(); c += kChannels) {
-    const Eigen::Index rows = std::min(kChannels, variance.rows() - c);
+  const Eigen::Index end = own.first + own.count;
+  for (Eigen::Index c = own.first; c < end; c += kTileChannels) {
+    const Eigen::Index rows = std::min(kTileChannels, end - c);
     Eigen::MatrixXd logarithm = variance.middleRows(c, rows);
     logarithm = logarithm.array().log().matrix();
     for (Eigen::Index k = 0; k < N; ++k) {
@@ -74,16 +80,17 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
 /// The unbiased inverse of the smoothed variance.
 Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof) {
+  const IndexRange own = own_channels(*frf.team, variance.rows());
   if (frf.residual_covariance.size() == 0 || &variance != &frf.noise_variance ||
       window_reach(dof) == 0)
-    return smoothed_power(variance, dof, -1.0);
+    return smoothed_power(variance, dof, -1.0, own);
   // Var(G_ij) = C_E,ii [(U U^H)^-1]_jj, and only the first factor is random, so only that one is smoothed.
   const Eigen::Index n_y = frf.n_outputs();
   Eigen::MatrixXd C_E(n_y, variance.cols());
   for (Eigen::Index y = 0; y < n_y; ++y)
     C_E.row(y) = frf.residual_covariance.row(y * (n_y + 1)).real();
-  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, -1.0);
-  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, -1.0).array() * C_E.array();
+  if (!(C_E.minCoeff() > 0.0)) return smoothed_power(variance, dof, -1.0, own);
+  const Eigen::ArrayXXd ratio = smoothed_power(C_E, dof, -1.0, {0, n_y}).array() * C_E.array();
   return (ratio.replicate(frf.n_inputs(), 1) / variance.array()).matrix();
 }
 
@@ -94,8 +101,9 @@ Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& 
         "weighting {0} needs /{0} in the FRF, which is missing; use relative, or measure more "
         "periods or realizations",
         name);
+  const auto [first, count] = own_channels(*frf.team, variance.rows());
   for (Eigen::Index k = 0; k < variance.cols(); ++k)
-    for (Eigen::Index c = 0; c < variance.rows(); ++c)
+    for (Eigen::Index c = first; c < first + count; ++c)
       if (!(variance(c, k) > 0.0) || !std::isfinite(variance(c, k)))
         fail_request(
             "{} of {} is zero or not finite; with this weighting every variance must be positive",
@@ -105,8 +113,9 @@ Eigen::MatrixXd inverse_variance(const FrfEstimate& frf, const Eigen::MatrixXd& 
 
 Eigen::MatrixXd inverse_magnitude(const FrfEstimate& frf, double exponent) {
   Eigen::MatrixXd W(frf.response.rows(), frf.response.cols());
+  const auto [first, count] = frf.own();
   for (Eigen::Index k = 0; k < W.cols(); ++k)
-    for (Eigen::Index c = 0; c < W.rows(); ++c) {
+    for (Eigen::Index c = first; c < first + count; ++c) {
       const double magnitude = std::abs(frf.response(c, k));
       if (!(magnitude > 0.0))
         fail_request(
@@ -158,7 +167,8 @@ SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
   Eigen::MatrixXd variance(n_y, N);
   for (Eigen::Index y = 0; y < n_y; ++y)
     variance.row(y) = frf.residual_covariance.row(y * (n_y + 1)).real();
-  const Eigen::MatrixXd deviation = smoothed_power(variance, frf.noise_dof, 1.0).cwiseSqrt();
+  const Eigen::MatrixXd deviation =
+      smoothed_power(variance, frf.noise_dof, 1.0, {0, n_y}).cwiseSqrt();
   Eigen::MatrixXd products(n_y * n_y, N);  // of the deviations of two outputs
   for (Eigen::Index k = 0; k < N; ++k)
     products.col(k) = (deviation.col(k) * deviation.col(k).transpose()).reshaped();
@@ -173,9 +183,13 @@ SmoothedCovariance smoothed_residual_covariance(const FrfEstimate& frf) {
 
 SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOptions& options) {
   if (const auto matrices = make_weight_matrices(frf, options)) return matrices->marginal();
+  const auto [first, count] = frf.own();
   switch (options.weighting) {
-    case Weighting::unit:
-      return Eigen::MatrixXd(Eigen::MatrixXd::Ones(frf.response.rows(), frf.response.cols()));
+    case Weighting::unit: {
+      Eigen::MatrixXd ones(frf.response.rows(), frf.response.cols());
+      ones.middleRows(first, count).setOnes();
+      return ones;
+    }
     case Weighting::inverse_magnitude:
       return inverse_magnitude(frf, 1.0);
     case Weighting::relative:
@@ -191,10 +205,12 @@ SharedMatrix<Eigen::MatrixXd> make_weights(const FrfEstimate& frf, const FitOpti
   const Eigen::MatrixXd& W = options.user_weights;
   if (W.rows() != frf.response.rows() || W.cols() != frf.response.cols())
     fail_request("user weights: the shape must be that of the response in the band");
-  if (W.allFinite() && W.minCoeff() < 0.0)
+  const auto own = W.middleRows(first, count);
+  const bool finite = own.allFinite();
+  if (finite && (own.array() < 0.0).any())
     throw IndefiniteWeights(
         "user weights: a weight is negative, so the cost would have no minimum");
-  if (!W.allFinite() || !(W.maxCoeff() > 0.0))
+  if (!finite || !frf.any((own.array() > 0.0).any()))
     fail_request("user weights: all weights must be finite, and at least one positive");
   return options.user_weights;
 }

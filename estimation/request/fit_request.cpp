@@ -14,6 +14,8 @@
 #include "estimation/request/structure_request.hpp"
 #include "estimation/request/submodel_text.hpp"
 #include "estimation/request/weight_file.hpp"
+#include "estimation/search/trials.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/dc_line.hpp"
 #include "frf/response/hold_compensation.hpp"
 #include "frf/response/neighbour_scatter.hpp"
@@ -162,6 +164,10 @@ class FitDefaults {
     FrfEstimate& frf = setup_.frf;
     const bool unknown = frf.noise_variance.size() == 0;
     if (unknown ? frf.total_variance.size() > 0 : frf.realizations > 1) return false;
+    // The median of some channels is that of many; the scatter of all takes as long as a fit.
+    if (!unknown && channel_tiles(frf.response.rows()) > 1 &&
+        !line_scatter(some_channels(frf), request_.threads).shows_distortion())
+      return false;
     LineScatter scatter = line_scatter(frf, request_.threads);
     if (unknown ? scatter.variance.size() == 0 : !scatter.shows_distortion()) return false;
     if (lines_are_coarse(frf, scatter, request_.threads)) {

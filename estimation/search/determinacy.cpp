@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/model/poles.hpp"
 #include "estimation/search/mode_worth.hpp"
@@ -76,21 +78,30 @@ std::string submodel_name(const FitProblem& problem, const FitParameters& beta, 
 
 std::string undetermined_numerators(const FitProblem& problem, const FitParameters& beta,
                                     const std::vector<BasisGroup>& groups) {
-  double weakest = kSmallestDirection;
-  Eigen::VectorXd direction;
-  for (const BasisGroup& group : groups)
-    for (const Eigen::Index c : group.channels) {
-      const Eigen::VectorXd w = problem.weights(c);
-      const Eigen::MatrixXd M = group.F.re.transpose() * w.asDiagonal() * group.F.re +
-                                group.F.im.transpose() * w.asDiagonal() * group.F.im;
-      const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-      const auto eigen = symmetric_eigen(scale.asDiagonal() * M * scale.asDiagonal());
-      const Eigen::VectorXd& values = eigen.eigenvalues();
-      if (!(values[0] < weakest * values[values.size() - 1])) continue;
-      weakest = values[0] / values[values.size() - 1];
-      direction = eigen.eigenvectors().col(0);
-    }
-  if (direction.size() == 0) return {};
+  // Of every tile: the smallest ratio of eigenvalues, and its direction.
+  const Eigen::Index tiles = channel_tiles(problem.channels());
+  Eigen::MatrixXd found =
+      Eigen::MatrixXd::Constant(tiles, 1 + problem.functions(), kSmallestDirection);
+  for_each_own_tile(*problem.team, problem.channels(), [&](IndexRange tile) {
+    auto weakest = found.row(tile.first / kTileChannels);
+    for (const BasisGroup& group : groups)
+      for (auto at = std::ranges::lower_bound(group.channels, tile.first);
+           at != group.channels.end() && *at < tile.first + tile.count; ++at) {
+        const Eigen::Index c = *at;
+        const Eigen::VectorXd w = problem.weights(c);
+        const Eigen::MatrixXd M = group.F.re.transpose() * w.asDiagonal() * group.F.re +
+                                  group.F.im.transpose() * w.asDiagonal() * group.F.im;
+        const Eigen::VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+        const auto eigen = symmetric_eigen(scale.asDiagonal() * M * scale.asDiagonal());
+        const Eigen::VectorXd& values = eigen.eigenvalues();
+        if (!(values[0] < weakest[0] * values[values.size() - 1])) continue;
+        weakest << values[0] / values[values.size() - 1], eigen.eigenvectors().col(0).transpose();
+      }
+  });
+  problem.team->gather_rows(1, found);
+  Eigen::Index at = 0;
+  if (!(found.col(0).minCoeff(&at) < kSmallestDirection)) return {};
+  const Eigen::VectorXd direction = found.row(at).tail(problem.functions()).transpose();
   std::vector<std::string> names;
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < problem.shapes.size(); ++i) {

@@ -38,13 +38,16 @@ void raise(ParameterCovariance& covariance, double correlated_lines) {
 
 /// Whether all weighted channels are finite; channels without weight are unknown and do not affect the others.
 bool weighted_are_finite(const FitProblem& problem, const ParameterCovariance& covariance) {
-  for (Eigen::Index c = 0; c < problem.channels(); ++c) {
-    const bool finite = covariance.numerator_variance.row(c).allFinite() &&
-                        (covariance.response_variance.size() == 0 ||
-                         covariance.response_variance.row(c).allFinite());
-    if (!finite && !has_no_weight(problem, c)) return false;
-  }
-  return true;
+  return number_over_tiles(*problem.team, problem.channels(), [&](IndexRange tile) {
+           Eigen::Index infinite = 0;
+           for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) {
+             const bool finite = covariance.numerator_variance.row(c).allFinite() &&
+                                 (covariance.response_variance.size() == 0 ||
+                                  covariance.response_variance.row(c).allFinite());
+             infinite += finite || has_no_weight(problem, c) ? 0 : 1;
+           }
+           return infinite;
+         }) == 0.0;
 }
 
 void use_covariance(const FitProblem& problem, ParameterCovariance& covariance, bool likelihood,

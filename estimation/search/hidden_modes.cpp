@@ -17,9 +17,17 @@ namespace {
 double noise_of(const FrfEstimate& frf, const Eigen::MatrixXd& weights, const FitResult& fit,
                 int threads) {
   const double all = fit.model.fit.cost / static_cast<double>(frf.response.rows());
-  const Eigen::MatrixXcd E = frf.response - response(fit.model, frf.frequency_hz, fit.model.hold);
-  const Eigen::MatrixXd variance = scatter_variance(frf.frequency_hz, E, threads);
-  return variance.size() == 0 ? all : std::min(all, 0.5 * weights.cwiseProduct(variance).mean());
+  if (!has_line_scatter(frf.lines())) return all;
+  const auto of_tile = [&](IndexRange tile) {
+    const auto [first, count] = tile;
+    const Eigen::MatrixXcd E = frf.response.middleRows(first, count) -
+                               response(fit.model, frf.frequency_hz, fit.model.hold, first, count);
+    const Eigen::MatrixXd W = weights.middleRows(first, count);
+    return W.cwiseProduct(scatter_variance(frf.frequency_hz, E, threads)).sum();
+  };
+  const double scatter =
+      number_over_tiles(*frf.team, weights.rows(), of_tile) / static_cast<double>(weights.size());
+  return std::min(all, 0.5 * scatter);
 }
 
 }  // namespace

@@ -85,7 +85,7 @@ ModeWorth::ModeWorth(const FrfEstimate& frf, const ModelStructure& structure,
   if (all_lines > 0) all_lines_ = static_cast<double>(all_lines);
   data_ *= all_lines_ / lines_;
   if (structure.general_damping) parameters_of_mode_ += channels_;
-  rounding_ = kRoundingPower * (weights.array() * frf.response.cwiseAbs2().array()).sum();
+  rounding_ = kRoundingPower * weighted_power(frf, weights);
 }
 
 double ModeWorth::squares(const FitResult& fit) const {

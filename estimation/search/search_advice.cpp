@@ -36,18 +36,22 @@ std::vector<std::string> silent_channels(const FrfEstimate& frf, bool inputs) {
   std::vector<std::string> names;
   if (variance.size() == 0) return names;
   const Eigen::Index count = inputs ? frf.n_inputs() : frf.n_outputs();
-  for (Eigen::Index i = 0; i < count; ++i) {
-    Eigen::Index noisy = 0;
-    Eigen::Index all = 0;
-    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
-      if ((inputs ? c / frf.n_outputs() : c % frf.n_outputs()) != i) continue;
-      const auto power = frf.response.row(c).cwiseAbs2().array();
-      noisy += (power < kNoiseOnly * variance.row(c).array()).count();
-      all += frf.lines();
-    }
-    if (static_cast<double>(noisy) > kMostLines * static_cast<double>(all))
+  Eigen::MatrixXd noisy(frf.response.rows(), 1);  // lines of every channel
+  const auto [first, own] = frf.own();
+  const auto power = frf.response.middleRows(first, own).cwiseAbs2().array();
+  noisy.middleRows(first, own) = (power < kNoiseOnly * variance.middleRows(first, own).array())
+                                     .rowwise()
+                                     .count()
+                                     .cast<double>()
+                                     .matrix();
+  frf.team->gather_rows(kTileChannels, noisy);
+  const auto of_pair = noisy.reshaped(frf.n_outputs(), frf.n_inputs());
+  const Eigen::VectorXd sums = inputs ? Eigen::VectorXd(of_pair.colwise().sum().transpose())
+                                      : Eigen::VectorXd(of_pair.rowwise().sum());
+  const double all = static_cast<double>(noisy.size() / count * frf.lines());
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (sums[i] > kMostLines * all)
       names.push_back((inputs ? frf.inputs : frf.outputs).names[static_cast<std::size_t>(i)]);
-  }
   if (static_cast<Eigen::Index>(names.size()) == count) names.clear();
   return names;
 }
@@ -178,23 +182,32 @@ std::string of_reversed_time(const FrfEstimate& frf, const FitOptions& trial,
 
 }  // namespace
 
-FitReason with_advice(FitReason reason, const FrfEstimate& frf, const FitOptions& options,
+FitReason with_advice(FitReason reason, const FrfEstimate& whole, const FitOptions& options,
                       const FitResult& fit, ModeNumber number, bool cut_short) {
-  reason.remedy = without_silent_channels(frf);
+  reason.remedy = without_silent_channels(whole);
   if (!reason.remedy.empty()) return reason;
-  FitOptions trial = trial_options(frf, options);
+  // A dozen fits to all of many channels would take longer than the search.
+  FitOptions trial = trial_options(whole, options);
+  const bool is_part = channel_tiles(whole.response.rows()) > 1;
+  const PartOfData part = is_part ? part_of_data(whole, trial, fit.model) : PartOfData();
+  if (is_part) trial = part.options;
+  const FrfEstimate& frf = is_part ? part.frf : whole;
   trial.limit.reset();
   // In a search that ended early, poles have not converged.
   FitOptions with_deviations = trial;
   with_deviations.uncertainty = true;
   with_deviations.response_variance = false;
-  const FitResult same = fit_additive_model(frf, fit.model, with_deviations);
+  const FitResult same = fit_additive_model(frf, is_part ? part.model : fit.model, with_deviations);
   if (!cut_short) reason.remedy = of_reversed_time(frf, trial, same.model);
   if (!reason.remedy.empty()) return reason;
   advise_structure(frf, options, trial, same, number, cut_short, reason);
   if (reason.flags.empty())
     reason.remedy =
         "No other structure fits better: look there for disturbed lines or a disturbed channel";
+  if (is_part)
+    reason.remedy +=
+        fmt::format(" (tried on {} of {} channels, {} of {} lines)", frf.response.rows(),
+                    whole.response.rows(), frf.lines(), whole.lines());
   return reason;
 }
 

@@ -20,6 +20,35 @@ std::vector<Eigen::Index> spread(Eigen::Index most, Eigen::Index count) {
   return out;
 }
 
+/// Evenly spaced inputs and outputs, up to kPartChannels channels.
+struct PartOfChannels {
+  explicit PartOfChannels(const FrfEstimate& frf) {
+    const auto side = static_cast<Eigen::Index>(std::sqrt(kPartChannels));
+    outputs = spread(std::max(side, kPartChannels / frf.n_inputs()), frf.n_outputs());
+    inputs = spread(kPartChannels / std::ssize(outputs), frf.n_inputs());
+    for (const Eigen::Index u : inputs)
+      for (const Eigen::Index y : outputs) channels.push_back(u * frf.n_outputs() + y);
+  }
+
+  /// Every process has all rows of it.
+  template <typename Lines>
+  FrfEstimate frf(const FrfEstimate& whole, const Lines& lines) const {
+    FrfEstimate out;
+    out.frequency_hz = whole.frequency_hz(lines);
+    out.response = chosen_channels(*whole.team, whole.response, channels, lines);
+    out.correlated_lines = whole.correlated_lines;
+    out.inputs = pick(whole.inputs, inputs);
+    out.outputs = pick(whole.outputs, outputs);
+    out.sample_rate_hz = whole.sample_rate_hz;
+    out.hold = whole.hold;
+    return out;
+  }
+
+  std::vector<Eigen::Index> outputs;
+  std::vector<Eigen::Index> inputs;
+  std::vector<Eigen::Index> channels;
+};
+
 AdditiveModel of_channels(AdditiveModel model, const FrfEstimate& part,
                           const std::vector<Eigen::Index>& outputs,
                           const std::vector<Eigen::Index>& inputs) {
@@ -55,26 +84,24 @@ PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
       std::max<Eigen::Index>(kPartLines, kPartLinesOfAMode * count_modes(model));
   const Eigen::Index step = std::max<Eigen::Index>(1, frf.lines() / wanted);
   const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
-  const auto side = static_cast<Eigen::Index>(std::sqrt(kPartChannels));
-  const std::vector<Eigen::Index> outputs =
-      spread(std::max(side, kPartChannels / frf.n_inputs()), frf.n_outputs());
-  const std::vector<Eigen::Index> inputs =
-      spread(kPartChannels / std::ssize(outputs), frf.n_inputs());
-  std::vector<Eigen::Index> channels;
-  for (const Eigen::Index u : inputs)
-    for (const Eigen::Index y : outputs) channels.push_back(u * frf.n_outputs() + y);
+  const PartOfChannels part(frf);
   PartOfData out;
-  out.all = step == 1 && std::ssize(channels) == frf.response.rows();
+  out.all = step == 1 && std::ssize(part.channels) == frf.response.rows();
   out.options = options;
-  out.options.user_weights = Eigen::MatrixXd((*options.user_weights)(channels, lines));
-  out.frf.frequency_hz = frf.frequency_hz(lines);
-  out.frf.response = frf.response(channels, lines);
-  out.frf.correlated_lines = frf.correlated_lines;
-  out.frf.inputs = pick(frf.inputs, inputs);
-  out.frf.outputs = pick(frf.outputs, outputs);
-  out.frf.sample_rate_hz = frf.sample_rate_hz;
-  out.frf.hold = frf.hold;
-  out.model = of_channels(model, out.frf, outputs, inputs);
+  out.options.user_weights =
+      chosen_channels(*frf.team, *options.user_weights, part.channels, lines);
+  out.frf = part.frf(frf, lines);
+  out.model = of_channels(model, out.frf, part.outputs, part.inputs);
+  return out;
+}
+
+FrfEstimate some_channels(const FrfEstimate& frf) {
+  if (channel_tiles(frf.response.rows()) == 1) return frf;
+  const PartOfChannels part(frf);
+  const auto lines = Eigen::seqN(0, frf.lines());
+  FrfEstimate out = part.frf(frf, lines);
+  if (frf.noise_variance.size() > 0)
+    out.noise_variance = chosen_channels(*frf.team, frf.noise_variance, part.channels, lines);
   return out;
 }
 

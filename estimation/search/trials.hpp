@@ -24,6 +24,10 @@ struct PartOfData {
 PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
                         const AdditiveModel& model);
 
+/// The channels of part_of_data() with their noise variance, on all lines, for first guesses of poles and for statistics
+/// over channels. All, if they are one tile.
+FrfEstimate some_channels(const FrfEstimate& frf);
+
 /// The poles and delays of a model of a part, for all channels; of those that were not in it, the mean delay.
 AdditiveModel with_all_channels(const FrfEstimate& frf, AdditiveModel model);
 

@@ -17,11 +17,12 @@ FitProblem some_channels(const FitProblem& problem) {
   const Eigen::Index step = (problem.channels() + kChannelsOfSearch - 1) / kChannelsOfSearch;
   if (step <= 1) return out;
   const Eigen::Index count = (problem.channels() + step - 1) / step;
-  const auto chosen = Eigen::seqN(0, count, step);
+  std::vector<Eigen::Index> chosen(count);
+  for (Eigen::Index i = 0; i < count; ++i) chosen[i] = i * step;
   out.n_outputs = count;
   out.n_inputs = 1;
-  out.G = Eigen::MatrixXcd((*problem.G)(chosen, Eigen::all));
-  if (problem.W->size() > 0) out.W = Eigen::MatrixXd((*problem.W)(chosen, Eigen::all));
+  out.G = chosen_channels(*problem.team, *problem.G, chosen, Eigen::all);
+  if (problem.W->size() > 0) out.W = chosen_channels(*problem.team, *problem.W, chosen, Eigen::all);
   return out;
 }
 

@@ -9,6 +9,7 @@
 
 #include "estimation/equations/sigma_equations.hpp"
 #include "estimation/model/pole_set.hpp"
+#include "estimation/problem/fit_problem.hpp"
 
 namespace stageid {
 namespace {
@@ -40,7 +41,7 @@ class Relocation {
     const Eigen::VectorXcd x = complex(through.x());
     // Remove delay and hold from the data: the rest is rational in x.
     const Eigen::VectorXcd factor = complex(through.first());
-    signal_ = (weights.array() * frf.response.cwiseAbs2().array()).sum();
+    signal_ = weighted_power(frf, weights);
     for (const Submodel& s : model.submodels) {
       integrators_ = std::max(integrators_, s.integrators);
       constant_ = constant_ || (s.integrators == 0 && s.denominator.size() == 1);

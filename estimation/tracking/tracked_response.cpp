@@ -96,7 +96,7 @@ Eigen::MatrixXcd TrackedResponse::derivatives(const Eigen::VectorXd& x,
   Eigen::MatrixXcd by_delay = Eigen::MatrixXcd::Zero(n_y, N);
   SubmodelBasis basis;
   for (const auto& [delay_s, members] :
-       channels_by_delay(model_.input_delays_s(), model_.output_delays_s())) {
+       channels_by_delay(model_.input_delay_s, model_.output_delay_s, n_y, 0, n_y * n_u)) {
     const HoldEquivalent through(lines_, delay_s + change.delay_s);
     for (std::size_t i = 0; i < model_.submodels.size(); ++i) {
       const Submodel submodel = changed(i, change);

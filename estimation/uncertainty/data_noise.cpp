@@ -11,6 +11,7 @@ constexpr double kClearlyTooLarge = 1.5;
 DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   const Eigen::MatrixXd& known =
       frf.total_variance.size() > 0 ? frf.total_variance : frf.noise_variance;
+  const auto [first, count] = frf.own();
   DataNoise noise;
   // The weights are from the noise variance, but the estimate of a nonlinear plant has a larger scatter.
   const bool distorted = weighting != Weighting::total_variance && frf.total_variance.size() > 0 &&
@@ -18,7 +19,7 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
   if (weighs_by_variance(weighting) && !distorted) {
     noise.knowledge = VarianceKnowledge::weights;
     noise.variance = weighed_variance(frf, weighting);
-  } else if (known.size() > 0 && known.minCoeff() > 0.0) {
+  } else if (known.size() > 0 && !frf.any((known.middleRows(first, count).array() <= 0.0).any())) {
     noise.knowledge = VarianceKnowledge::given;
     noise.variance =
         LineVariance{SharedMatrix<Eigen::MatrixXd>::kept(known), Eigen::ArrayXd::Ones(frf.lines())};

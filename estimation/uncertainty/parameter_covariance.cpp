@@ -12,6 +12,7 @@
 #include "estimation/model/poles.hpp"
 #include "estimation/products/weighted_products.hpp"
 #include "excitation/decompositions/decompositions.hpp"
+#include "excitation/threads/parcel.hpp"
 #include "excitation/threads/worker_pool.hpp"
 
 namespace stageid {
@@ -252,7 +253,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   };
 
   // Each process has the equations of its own parts; nothing but S and K is summed, and the variances gathered.
-  const Team& team = wanted.parts ? Team::one() : *problem.team;
+  const Team& team = *problem.team;
   const auto tiles = std::ssize(parts);
   const TileShare own = team.share(tiles);
   const Eigen::Index globals = problem.globals();
@@ -315,6 +316,15 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
     if (team.any(!all_determined)) return {};
     team.gather_rows(parts.front().count, out.numerator_variance);
     team.gather_rows(parts.front().count, out.response_variance);
+    for (int owner = 0; wanted.parts && owner < team.size(); ++owner) {
+      const TileShare of_owner = team.share(tiles, owner);
+      for (Eigen::Index p = of_owner.first; p < of_owner.first + of_owner.count; ++p)
+        for (Eigen::Index c = parts[p].first; c < parts[p].first + parts[p].count; ++c)
+          for (Eigen::MatrixXd ChannelCovariance::*const matrix :
+               {&ChannelCovariance::own, &ChannelCovariance::cross, &ChannelCovariance::Z,
+                &ChannelCovariance::equations_inverse})
+            broadcast(team, owner, out.parts->channels[c].*matrix);
+    }
   }
   if (!all_determined) return {};
   return out;

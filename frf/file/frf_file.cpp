@@ -14,6 +14,7 @@
 #include "acquisition/files/output_file.hpp"
 #include "frf/file/frf_file_quality.hpp"
 #include "frf/file/line_datasets.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/confidence.hpp"
 
 namespace stageid {
@@ -140,8 +141,6 @@ void read_optional(const Hdf5File& file, FrfEstimate& frf) {
   const Eigen::Index N = frf.lines();
   const Eigen::Index n_y = frf.n_outputs();
   const Eigen::Index n_u = frf.n_inputs();
-  frf.noise_variance = read_columns(file, "/noise_variance", N, n_y, n_u);
-  frf.total_variance = read_columns(file, "/total_variance", N, n_y, n_u);
   frf.covariance = read_columns<Complex>(file, "/covariance", N, n_y * n_u, n_y * n_u);
   frf.residual_covariance = read_columns<Complex>(file, "/residual_covariance", N, n_y, n_y);
   frf.input_factor = read_columns<Complex>(file, "/input_factor", N, n_u, n_u);
@@ -188,7 +187,7 @@ void write_frf(const std::filesystem::path& path, const FrfEstimate& frf) {
   output.commit();
 }
 
-FrfEstimate read_frf(const std::filesystem::path& path) {
+FrfEstimate read_frf(const std::filesystem::path& path, const Team* team) {
   const Hdf5File file = Hdf5File::open(path);
   require_format(file, kFormat, "a frequency response",
                  ". Convert files of other programs with 'stageid import'");
@@ -204,8 +203,16 @@ FrfEstimate read_frf(const std::filesystem::path& path) {
                 join_shape(lines));
   frf.frequency_hz = read_vector(file, "/frequency_hz");
   require_shape(file, "/response", {lines[0], size_of(frf.n_outputs()), size_of(frf.n_inputs())});
-  frf.response = from_c_order(file.read_complex("/response"), frf.n_outputs(), frf.n_inputs());
   read_optional(file, frf);
+  const Eigen::Index N = frf.lines();
+  const Eigen::Index n_y = frf.n_outputs();
+  const Eigen::Index n_u = frf.n_inputs();
+  const bool connected = frf.residual_covariance.size() > 0 || frf.covariance.size() > 0;
+  if (team != nullptr && !connected) frf.team = team;
+  const DataRange own = own_channels(*frf.team, n_y * n_u);
+  frf.response = read_part<std::complex<double>>(file, "/response", N, n_y, n_u, own);
+  frf.noise_variance = read_part<double>(file, "/noise_variance", N, n_y, n_u, own);
+  frf.total_variance = read_part<double>(file, "/total_variance", N, n_y, n_u, own);
   check_as_read(path, frf);
   return frf;
 }

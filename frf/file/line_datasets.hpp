@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "acquisition/files/hdf5_matrices.hpp"
+#include "frf/response/frf_estimate.hpp"
 
 /// Conversion between columns vec(matrix), one per line, and datasets [lines x rows x columns].
 namespace stageid {
@@ -56,6 +58,40 @@ VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset
   if (!file.exists(dataset)) return {};
   require_shape(file, dataset, {size_of(lines), size_of(rows), size_of(columns)});
   return from_c_order(read_array<Scalar>(file, dataset), rows, columns);
+}
+
+/// Some channels of columns vec(matrix), as many rows as there are channels; empty if the dataset is missing. Rows of other channels are not written, see ChannelData. @throws FormatError as read_columns()
+template <typename Scalar>
+VecColumns<Scalar> read_part(const Hdf5File& file, const std::string& dataset, Eigen::Index lines,
+                             Eigen::Index rows, Eigen::Index columns, DataRange channels) {
+  if (!file.exists(dataset)) return {};
+  require_shape(file, dataset, {size_of(lines), size_of(rows), size_of(columns)});
+  VecColumns<Scalar> out(rows * columns, lines);
+  if (channels.count == 0) return out;
+  const Eigen::Index end = channels.first + channels.count;
+  const Eigen::Index left = channels.first / rows;
+  const Eigen::Index width = (end - 1) / rows + 1 - left;
+  // Channels of one column are neighbours in the file, too; of several columns, all rows are read.
+  const Eigen::Index top = width == 1 ? channels.first % rows : 0;
+  const Eigen::Index height = width == 1 ? channels.count : rows;
+  constexpr Eigen::Index kAtOnce = 1 << 20;
+  const Eigen::Index together = std::max({Eigen::Index{1}, kAtOnce / (height * width),
+                                          static_cast<Eigen::Index>(file.rows_of_chunk(dataset))});
+  std::vector<Scalar> data;
+  for (Eigen::Index k = 0; k < lines; k += together) {
+    const Eigen::Index count = std::min(together, lines - k);
+    data.resize(count * height * width);
+    file.read_box(dataset, {size_of(k), size_of(top), size_of(left)},
+                  {size_of(count), size_of(height), size_of(width)}, data.data());
+    for (Eigen::Index i = 0; i < count; ++i)
+      for (Eigen::Index u = 0; u < width; ++u) {
+        const Eigen::Index of_column = (left + u) * rows;
+        for (Eigen::Index y = std::max(top, channels.first - of_column);
+             y < std::min(rows, end - of_column); ++y)
+          out(of_column + y, k + i) = data[(i * height + y - top) * width + u];
+      }
+  }
+  return out;
 }
 
 /// Writes a list of numbers; nothing if it is empty, which means unknown here.

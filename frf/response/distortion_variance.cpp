@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "frf/response/channel_tiles.hpp"
 #include "frf/statistics/frequency_bands.hpp"
 
 namespace stageid {
@@ -11,13 +12,27 @@ namespace {
 
 constexpr int kPasses = 5;  // of the weights: alpha changes by less than a percent afterwards
 
-/// Mean over the inputs of |G|^2, n_y x N.
+/// Mean over the inputs of |G|^2, n_y x N. With one input, only of the channels of this process.
 Eigen::MatrixXd row_power(const FrfEstimate& frf) {
   const Eigen::Index n_y = frf.n_outputs();
-  Eigen::MatrixXd power = Eigen::MatrixXd::Zero(n_y, frf.lines());
-  for (Eigen::Index u = 0; u < frf.n_inputs(); ++u)
-    power += frf.response.middleRows(u * n_y, n_y).cwiseAbs2();
-  return power / static_cast<double>(frf.n_inputs());
+  const auto [first, count] = frf.own();
+  Eigen::MatrixXd power(n_y, frf.lines());
+  if (frf.n_inputs() == 1) {
+    power.middleRows(first, count) = frf.response.middleRows(first, count).cwiseAbs2();
+    return power;
+  }
+  for (Eigen::Index k = 0; k < frf.lines(); ++k) {
+    std::vector<Eigen::VectorXd>
+        parts;  // one per input: outputs are summed in one order in any team
+    for (Eigen::Index c = first, rows = 0; c < first + count; c += rows) {
+      rows = std::min(first + count - c, n_y - c % n_y);
+      parts.emplace_back(Eigen::VectorXd::Zero(n_y)).segment(c % n_y, rows) =
+          frf.response.col(k).segment(c, rows).cwiseAbs2();
+    }
+    power.col(k) = frf.team->sum(channel_tiles(frf.response.rows()), n_y, parts) /
+                   static_cast<double>(frf.n_inputs());
+  }
+  return power;
 }
 
 /// alpha of one channel in one band. @param power row_power()
@@ -41,6 +56,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   DistortionVariance out;
   out.variance.resize(frf.response.rows(), frf.lines());
   const Eigen::MatrixXd row = row_power(frf);
+  const auto [first, count] = frf.own();
   const auto prior_dof = static_cast<double>(kFewestLinesOfBand);  // of the expectation
   out.dof = frf.total_dof + prior_dof;
   out.distortion.band_hz.resize(std::ssize(bands), 2);
@@ -48,7 +64,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
   for (Eigen::Index b = 0; b < std::ssize(bands); ++b) {
     const IndexRange& lines = bands[b];
     out.distortion.band_hz.row(b) << frf.frequency_hz[lines.first], frf.frequency_hz[lines.end - 1];
-    for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+    for (Eigen::Index c = first; c < first + count; ++c) {
       const auto band = [&](const Eigen::MatrixXd& matrix, Eigen::Index i) {
         return matrix.row(i).segment(lines.first, lines.count()).transpose().array().eval();
       };
@@ -62,6 +78,7 @@ DistortionVariance distortion_variance(const FrfEstimate& frf) {
           ((frf.total_dof * total + prior_dof * expected) / out.dof).matrix().transpose();
     }
   }
+  frf.team->gather_rows(kTileChannels, out.distortion.level);
   return out;
 }
 

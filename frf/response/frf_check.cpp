@@ -67,8 +67,9 @@ void check_shape(const char* dataset, const Matrix& matrix, Eigen::Index rows, E
 void check_variance(const char* dataset, const FrfEstimate& frf, const Eigen::MatrixXd& variance) {
   if (variance.size() == 0) return;
   check_shape(dataset, variance, frf.n_outputs() * frf.n_inputs(), frf.lines());
+  const auto [first, count] = frf.own();
   for (Eigen::Index k = 0; k < variance.cols(); ++k) {
-    for (Eigen::Index c = 0; c < variance.rows(); ++c) {
+    for (Eigen::Index c = first; c < first + count; ++c) {
       if (!std::isfinite(variance(c, k))) refuse(entry_place(dataset, frf, c, k), "not finite");
       if (variance(c, k) < 0.0)
         refuse(entry_place(dataset, frf, c, k), "a variance must be 0 or more");
@@ -153,8 +154,9 @@ void check(const FrfEstimate& frf) {
 
   const Eigen::Index n_channels = frf.n_outputs() * frf.n_inputs();
   check_shape("response", frf.response, n_channels, frf.lines());
+  const auto [first, count] = frf.own();
   for (Eigen::Index k = 0; k < frf.lines(); ++k)
-    for (Eigen::Index c = 0; c < n_channels; ++c)
+    for (Eigen::Index c = first; c < first + count; ++c)
       if (!Eigen::numext::isfinite(frf.response(c, k)))
         refuse(entry_place("response", frf, c, k), "not finite");
   check_variance("noise_variance", frf, frf.noise_variance);

@@ -7,6 +7,7 @@
 
 #include "acquisition/files/fail.hpp"
 #include "frf/response/channel_positions.hpp"
+#include "frf/response/channel_tiles.hpp"
 
 namespace stageid {
 namespace {
@@ -26,11 +27,14 @@ Matrix rows_or_empty(const Matrix& matrix, const Indices& rows) {
 }
 
 /// Keeps columns of a matrix, within its own memory; an empty one (unknown) remains empty.
+/// @param rows those that are copied: others are not written
 template <typename Matrix>
-void keep_columns(Matrix& matrix, Eigen::Index first, Eigen::Index kept) {
+void keep_columns(Matrix& matrix, const DataRange& lines, DataRange rows) {
   if (matrix.size() == 0) return;
-  for (Eigen::Index k = 0; first > 0 && k < kept; ++k) matrix.col(k) = matrix.col(first + k);
-  matrix.conservativeResize(Eigen::NoChange, kept);
+  for (Eigen::Index k = 0; lines.first > 0 && k < lines.count; ++k)
+    matrix.col(k).segment(rows.first, rows.count) =
+        matrix.col(lines.first + k).segment(rows.first, rows.count);
+  matrix.conservativeResize(Eigen::NoChange, lines.count);
 }
 
 /// Indices into vec(square matrix) for the given rows and columns of that matrix.
@@ -58,6 +62,26 @@ void select_detection(const FrfEstimate& frf, const Indices& outputs, FrfEstimat
   }
 }
 
+/// The lines with low_hz <= f <= high_hz.
+DataRange lines_of_band(const Eigen::VectorXd& frequency_hz, double low_hz, double high_hz) {
+  if (low_hz > high_hz)
+    fail_request("band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz);
+  const auto* const begin = frequency_hz.data();
+  const auto* const end = begin + frequency_hz.size();
+  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
+  const bool is_band = low_hz <= high_hz;  // neither end is NaN
+  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
+  if (kept == 0) {
+    const std::string range = frequency_hz.size() == 0
+                                  ? std::string("no lines")
+                                  : fmt::format("lines from {} to {} Hz", frequency_hz[0],
+                                                frequency_hz[frequency_hz.size() - 1]);
+    fail_request("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
+                 high_hz, range);
+  }
+  return {first, kept};
+}
+
 }  // namespace
 
 Eigen::VectorXd FrfEstimate::omega_rad_s() const { return 2.0 * std::numbers::pi * frequency_hz; }
@@ -66,31 +90,34 @@ Eigen::Map<const Eigen::MatrixXcd> FrfEstimate::at(Eigen::Index k) const {
   return {response.col(k).data(), n_outputs(), n_inputs()};
 }
 
+ChannelData::ChannelData() : team(&Team::one()) {}
+
+ChannelData::ChannelData(const ChannelData& other)
+    : response(with_rows(other.response, other.own())),
+      noise_variance(with_rows(other.noise_variance, other.own())),
+      total_variance(with_rows(other.total_variance, other.own())),
+      team(other.team) {}
+
+DataRange ChannelData::own() const { return own_channels(*team, response.rows()); }
+
+bool ChannelData::any(bool of_own_rows) const {
+  return team->divides(channel_tiles(response.rows())) ? team->any(of_own_rows) : of_own_rows;
+}
+
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
-  if (low_hz > high_hz)
-    fail_request("band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz);
-  const auto* const begin = frf.frequency_hz.data();
-  const auto* const end = begin + frf.lines();
-  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
-  const bool is_band = low_hz <= high_hz;  // neither end is NaN
-  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
-  if (kept == 0) {
-    const std::string range = frf.lines() == 0
-                                  ? std::string("no lines")
-                                  : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
-                                                frf.frequency_hz[frf.lines() - 1]);
-    fail_request("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
-                 high_hz, range);
-  }
+  const DataRange lines = lines_of_band(frf.frequency_hz, low_hz, high_hz);
+  const DataRange own = frf.own();
+  keep_columns(frf.response, lines, own);
+  for (Eigen::MatrixXd* const columns : {&frf.noise_variance, &frf.total_variance})
+    keep_columns(*columns, lines, own);
   for (Eigen::MatrixXcd* const columns :
-       {&frf.response, &frf.residual_covariance, &frf.input_factor, &frf.covariance})
-    keep_columns(*columns, first, kept);
-  for (Eigen::MatrixXd* const columns :
-       {&frf.noise_variance, &frf.total_variance, &frf.detection.linear_power})
-    keep_columns(*columns, first, kept);
+       {&frf.residual_covariance, &frf.input_factor, &frf.covariance})
+    keep_columns(*columns, lines, {0, columns->rows()});
+  Eigen::MatrixXd& power = frf.detection.linear_power;
+  keep_columns(power, lines, {0, power.rows()});
   for (Eigen::VectorXd* const of_lines :
        {&frf.input_condition, &frf.interpolation_misfit, &frf.frequency_hz}) {
-    if (of_lines->size() != 0) *of_lines = of_lines->segment(first, kept).eval();
+    if (of_lines->size() != 0) *of_lines = of_lines->segment(lines.first, lines.count).eval();
   }
   return frf;
 }

@@ -57,20 +57,46 @@ struct LeftOutRealization {
   friend bool operator==(const LeftOutRealization&, const LeftOutRealization&) = default;
 };
 
-/// A frequency response with its uncertainty: the content of frf.h5.
+class Team;
+
+/// Neighbouring channels or lines.
+struct DataRange {
+  Eigen::Index first = 0;
+  Eigen::Index count = 0;
+};
+
+/// The largest part of a frequency response: what it has per channel and line.
 ///
 /// Storage is the paper's vec: column k of a channel matrix is vec(G(j omega_k)), channel
 /// c = output + outputs * input.
-struct FrfEstimate {
-  Eigen::VectorXd frequency_hz;  ///< N, strictly increasing
-  ChannelList inputs;            ///< n_u
-  ChannelList outputs;           ///< n_y
-  Eigen::MatrixXcd response;     ///< (n_y n_u) x N, unit of output / unit of input
+struct ChannelData {
+  Eigen::MatrixXcd response;  ///< (n_y n_u) x N, unit of output / unit of input
 
   /// E|dG|^2 of the given response (the mean), same shape; empty (0 x 0) if unknown.
   Eigen::MatrixXd noise_variance;  ///< from periods: for a repetition with the same phases
   /// From realizations: noise and stochastic nonlinear contributions.
   Eigen::MatrixXd total_variance;
+
+  /// Processes that divide these rows: each has those of own(). Nobody reads or writes the others, so they take no
+  /// memory. With one tile of channels, or one process, all rows.
+  const Team* team;
+  DataRange own() const;
+  /// Whether something is true of the rows of any process.
+  bool any(bool of_own_rows) const;
+
+  ChannelData();
+  ChannelData(const ChannelData& other);  ///< copies only the rows of own()
+  ChannelData& operator=(const ChannelData& other) { return *this = ChannelData(other); }
+  ChannelData(ChannelData&&) = default;
+  ChannelData& operator=(ChannelData&&) = default;
+  ~ChannelData() = default;
+};
+
+/// A frequency response with its uncertainty: the content of frf.h5.
+struct FrfEstimate : ChannelData {
+  Eigen::VectorXd frequency_hz;  ///< N, strictly increasing
+  ChannelList inputs;            ///< n_u
+  ChannelList outputs;           ///< n_y
 
   double sample_rate_hz = 0.0;  ///< 0: unknown
   Hold hold = Hold::none;

@@ -5,6 +5,8 @@
 #include <functional>
 #include <stdexcept>
 
+#include "frf/response/channel_tiles.hpp"
+
 namespace stageid {
 namespace {
 
@@ -34,12 +36,18 @@ void check_request(const FrfEstimate& frf, double delay_s) {
 /// Multiplies the response by a factor per line, and its variances by the squared magnitude.
 void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)>& factor) {
   const Eigen::VectorXd omega = frf.omega_rad_s();
+  const auto [first, count] = frf.own();
+  // Tile by tile, in any team: at the ends of vectors, complex products are rounded differently.
+  for_each_own_tile(*frf.team, frf.response.rows(), [&](DataRange tile) {
+    Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
+    for (Eigen::Index k = 0; k < frf.lines(); ++k) G.col(k) *= factor(omega[k]);
+    frf.response.middleRows(tile.first, tile.count) = G;
+  });
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
     const std::complex<double> value = factor(omega[k]);
-    frf.response.col(k) *= value;
     const double power = std::norm(value);
     for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance})
-      if (variance->size() != 0) variance->col(k) *= power;
+      if (variance->size() != 0) variance->col(k).segment(first, count) *= power;
     for (Eigen::MatrixXcd* covariance : {&frf.residual_covariance, &frf.covariance})
       if (covariance->size() != 0) covariance->col(k) *= power;
   }

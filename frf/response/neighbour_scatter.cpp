@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <numeric>
-#include <vector>
 
 #include "excitation/threads/worker_pool.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/statistics/local_fit.hpp"
-#include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {
 namespace {
@@ -35,32 +33,46 @@ LocalFit fit_around(const Eigen::VectorXd& frequency_hz, const Eigen::MatrixXcd&
   return fit_locally(problem, kMostPoles);
 }
 
-/// Calls use(a / b) for all b > 0.
-template <typename Use>
-void for_each_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Use& use) {
-  for (Eigen::Index i = 0; i < a.size(); ++i)
-    if (b.data()[i] > 0.0) use(a.data()[i] / b.data()[i]);
+/// The upper median of the nonnegative ratios a / b of all channels with b > 0; 0: there are none. Nonnegative numbers
+/// have the same order as their bits, so it is found digit by digit, by counting: no ratio is stored or sent.
+/// @param a, b called with channel and line
+template <typename A, typename B>
+double median_ratio(const FrfEstimate& frf, Eigen::Index lines, const A& a, const B& b) {
+  constexpr int kDigit = 16;
+  const auto [first, count] = frf.own();
+  std::uint64_t found = 0;  // the higher digits
+  Eigen::Index rank = 0;
+  for (int shift = 64 - kDigit; shift >= 0; shift -= kDigit) {
+    Eigen::VectorXd counts = Eigen::VectorXd::Zero(Eigen::Index{1} << kDigit);
+    for (Eigen::Index k = 0; k < lines; ++k)
+      for (Eigen::Index c = first; c < first + count; ++c) {
+        const double below = b(c, k);
+        if (!(below > 0.0)) continue;
+        const std::uint64_t digits = std::bit_cast<std::uint64_t>(a(c, k) / below) >> shift;
+        if (digits >> kDigit == found) counts[digits & 0xffff] += 1.0;
+      }
+    counts = frf.team->sum(channel_tiles(frf.response.rows()), counts.size(), {counts});
+    if (shift + kDigit == 64) rank = static_cast<Eigen::Index>(counts.sum()) / 2;
+    Eigen::Index digit = 0;
+    while (digit < counts.size() && rank >= static_cast<Eigen::Index>(counts[digit]))
+      rank -= static_cast<Eigen::Index>(counts[digit++]);
+    if (digit == counts.size()) return 0.0;
+    found = found << kDigit | static_cast<std::uint64_t>(digit);
+  }
+  return std::bit_cast<double>(found);
 }
 
-/// Nonnegative numbers have the same order as their bits: exponent and four bits of the fraction.
-std::size_t bin_of(double ratio) { return std::bit_cast<std::uint64_t>(ratio) >> 48; }
-
-/// The upper median of nonnegative ratios. To save memory, they are first counted in bins, and only those of the
-/// middle bin are stored.
-double median_ratio(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  if (a.size() == 0 || b.size() != a.size()) return 0.0;
-  std::vector<std::size_t> counts(std::size_t{1} << 16);
-  for_each_ratio(a, b, [&](double ratio) { ++counts[bin_of(ratio)]; });
-  std::size_t rank = std::accumulate(counts.begin(), counts.end(), std::size_t{0}) / 2;
-  std::size_t bin = 0;
-  while (bin < counts.size() && rank >= counts[bin]) rank -= counts[bin++];
-  if (bin == counts.size()) return 0.0;
-  std::vector<double> ratios;
-  ratios.reserve(counts[bin]);
-  for_each_ratio(a, b, [&](double ratio) {
-    if (bin_of(ratio) == bin) ratios.push_back(ratio);
+/// scatter_variance() of every `step`-th line, tile by tile: each tile has its poles.
+Eigen::MatrixXd scatter_of_tiles(const FrfEstimate& frf, Eigen::Index step, int threads) {
+  const auto lines = Eigen::seq(0, frf.lines() - 1, step);
+  if (!has_line_scatter(lines.size())) return {};
+  Eigen::MatrixXd variance(frf.response.rows(), lines.size());
+  for_each_own_tile(*frf.team, variance.rows(), [&](DataRange tile) {
+    const auto [first, count] = tile;
+    variance.middleRows(first, count) = scatter_variance(
+        frf.frequency_hz(lines), frf.response.middleRows(first, count)(Eigen::all, lines), threads);
   });
-  return value_of_rank(ratios, rank);
+  return variance;
 }
 
 }  // namespace
@@ -80,20 +92,23 @@ Eigen::MatrixXd scatter_variance(const Eigen::VectorXd& frequency_hz, const Eige
 
 LineScatter line_scatter(const FrfEstimate& frf, int threads) {
   LineScatter scatter;
-  scatter.variance = scatter_variance(frf.frequency_hz, frf.response, threads);
+  scatter.variance = scatter_of_tiles(frf, 1, threads);
   if (scatter.variance.size() == 0) return scatter;
   scatter.dof = static_cast<double>(kScatterDof);
-  scatter.over_noise = median_ratio(scatter.variance, frf.noise_variance);
+  if (frf.noise_variance.size() > 0)
+    scatter.over_noise = median_ratio(frf, frf.lines(), scatter.variance, frf.noise_variance);
   return scatter;
 }
 
 bool lines_are_coarse(const FrfEstimate& frf, const LineScatter& scatter, int threads) {
   if (frf.lines() < 2 * kWindow) return true;
-  if (median_ratio(scatter.variance, frf.response.cwiseAbs2()) > kMostOfResponse) return true;
-  const auto others = Eigen::seq(0, frf.lines() - 1, 2);
-  const Eigen::MatrixXd of_half =
-      scatter_variance(frf.frequency_hz(others), frf.response(Eigen::all, others), threads);
-  return median_ratio(of_half, scatter.variance(Eigen::all, others)) > kMostByDistance;
+  const auto power = [&](Eigen::Index c, Eigen::Index k) {
+    return Eigen::numext::abs2(frf.response(c, k));
+  };
+  if (median_ratio(frf, frf.lines(), scatter.variance, power) > kMostOfResponse) return true;
+  const Eigen::MatrixXd of_half = scatter_of_tiles(frf, 2, threads);
+  const auto of_all = [&](Eigen::Index c, Eigen::Index k) { return scatter.variance(c, 2 * k); };
+  return median_ratio(frf, of_half.cols(), of_half, of_all) > kMostByDistance;
 }
 
 }  // namespace stageid

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/frf_estimate.hpp"
 #include "frf/statistics/distributions.hpp"
 #include "frf/statistics/frequency_bands.hpp"
@@ -21,15 +22,20 @@ double evidence(double power, double noise, double linear, int power_dof, double
 }
 
 /// Scatter of the realizations: column b of p_value and distortion.
-void test_scatter(const FrfEstimate& frf, const RealizationScatter& scatter, const IndexRange& band,
+/// @param known of the realizations; if it is empty, the variances
+void test_scatter(const FrfEstimate& frf, const RealizationScatter& known, const IndexRange& band,
                   Eigen::Index b, NonlinearityTest& test) {
   const int a = static_cast<int>(frf.total_dof);
-  for (Eigen::Index c = 0; c < frf.response.rows(); ++c) {
+  const bool is_known = known.total.size() > 0;
+  const Eigen::MatrixXd& total = is_known ? known.total : frf.total_variance;
+  const Eigen::MatrixXd& noise = is_known ? known.noise : frf.noise_variance;
+  const double noise_dof = is_known ? known.noise_dof : frf.noise_dof;
+  const auto [first, count] = frf.own();
+  for (Eigen::Index c = first; c < first + count; ++c) {
     double sum = 0.0;
     double excess = 0.0;
     for (Eigen::Index k = band.first; k < band.end; ++k) {
-      sum += evidence(scatter.total(c, k), scatter.noise(c, k), std::norm(frf.response(c, k)), a,
-                      scatter.noise_dof);
+      sum += evidence(total(c, k), noise(c, k), std::norm(frf.response(c, k)), a, noise_dof);
       excess += std::max(0.0, frf.total_variance(c, k) - frf.noise_variance(c, k));
     }
     test.p_value(c, b) = tail_of_evidence(sum, band.count());
@@ -168,10 +174,6 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
   test.band_hz.resize(bands, 2);
   test.p_value.resize(n_c, bands);
   test.distortion.resize(n_c, bands);
-  const RealizationScatter scatter =
-      evidence.scatter.total.size() > 0
-          ? evidence.scatter
-          : RealizationScatter{frf.total_variance, frf.noise_variance, frf.noise_dof};
   const DetectionLines& detection = frf.detection;
   if (detection.line.size() > 0) {
     test.even.p_value.resize(detection.power.rows(), bands);
@@ -182,7 +184,7 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     const IndexRange& band = octaves[b];
     const double low_hz = frf.frequency_hz[band.first];
     test.band_hz.row(b) << low_hz, frf.frequency_hz[band.end - 1];
-    test_scatter(frf, scatter, band, b, test);
+    test_scatter(frf, evidence.scatter, band, b, test);
     if (detection.line.size() == 0) continue;
     const Eigen::VectorXd linear_power =
         detection.linear_power.middleCols(band.first, band.count()).rowwise().mean();
@@ -190,6 +192,8 @@ NonlinearityTest nonlinearity_test(const FrfEstimate& frf, const LinearityEviden
     test_detection(detection, lines_of(detection, 0, low_hz, high_hz), linear_power, b, test.even);
     test_detection(detection, lines_of(detection, 1, low_hz, high_hz), linear_power, b, test.odd);
   }
+  for (Eigen::MatrixXd* const of_channels : {&test.p_value, &test.distortion})
+    frf.team->gather_rows(kTileChannels, *of_channels);
   // The noise of detection lines is pooled over the experiments, whereas their power is that of some.
   if (frf.experiment_noise_ratio > 1.0)
     for (DetectedDistortion* kind : {&test.even, &test.odd}) kind->p_value.setOnes();

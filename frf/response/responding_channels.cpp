@@ -29,12 +29,20 @@ void add_channel(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& powe
 }  // namespace
 
 ChannelFlags responding_channels(const FrfEstimate& frf) {
-  const auto power = frf.response.cwiseAbs2().array();  // not evaluated, to save memory
+  const auto [first, count] = frf.own();
+  ChannelFlags flags = ChannelFlags::Constant(frf.response.rows(), false);
+  // not evaluated, to save memory
+  const auto power = frf.response.middleRows(first, count).cwiseAbs2().array();
   const bool noise = frf.noise_variance.size() > 0;
   const Eigen::MatrixXd& variance = noise ? frf.noise_variance : frf.total_variance;
-  if (variance.size() == 0) return (power > 0.0).rowwise().any();
+  if (variance.size() == 0) {
+    flags.segment(first, count) = (power > 0.0).rowwise().any();
+    return flags;
+  }
   const double limit = squared_error_quantile(0.95, noise ? frf.noise_dof : frf.total_dof);
-  return 2 * (power > limit * variance.array()).rowwise().count() >= power.cols();
+  const auto above = power > limit * variance.middleRows(first, count).array();
+  flags.segment(first, count) = 2 * above.rowwise().count() >= power.cols();
+  return flags;
 }
 
 Eigen::VectorXd relative_channel_error(const Eigen::ArrayXXd& error_power,

@@ -133,6 +133,11 @@ void read_file(Bytes bytes) {
   read(file.path());
 }
 
+void read_frf_hdf5(Bytes bytes) {
+  const ScratchFile file(bytes, kHdf5);
+  read_frf(file.path());
+}
+
 void read_csv_tables(Bytes bytes) {
   const ScratchFile file(bytes, ".csv");
   read_csv(file.path());
@@ -233,7 +238,7 @@ constexpr std::array kTargets = {Target{"yaml", read_yaml},
                                  Target{"slog", read_slog},
                                  Target{"torn_slog", read_torn_slog},
                                  Target{"hdf5_log", read_hdf5_log},
-                                 Target{"hdf5_frf", read_file<read_frf, kHdf5>},
+                                 Target{"hdf5_frf", read_frf_hdf5},
                                  Target{"excitation", read_file<read_experiment_plan, kHdf5>},
                                  Target{"hdf5_arrays", read_file<read_hdf5_arrays>},
                                  Target{"model", read_file<read_model>},

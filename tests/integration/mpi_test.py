@@ -36,23 +36,33 @@ COMMANDS = {
     "wide.json": ["fit", "../wide.h5"],
     "wide_general.json": ["fit", "../wide.h5", "--modes", "3", "--damping", "general"],
     "wide_exact.json": ["fit", "../exact.h5", "--modes", "3"],
+    "wide_given.json": ["fit", "../wide.h5", "--modes", "20,41,73", "--band", "10", "90"],
+    "wide_realizations.json": ["fit", "../realizations.h5", "--modes", "20,41,73"],
 }
 
 
-def write_wide_frf(path, noise):
-    """More channels than three tiles of 256, of two inputs."""
+def write_wide_frf(path, noise, outputs=460, lines=150, realizations=0):
+    """By default more channels than three tiles of 256, of two inputs."""
     random = np.random.default_rng(1)
-    frequency_hz = np.linspace(5.0, 100.0, 150)
+    frequency_hz = np.linspace(5.0, 100.0, lines)
     s = 2j * np.pi * frequency_hz
-    response = np.zeros((150, 460, 2), complex)
+    response = np.zeros((lines, outputs, 2), complex)
     for f, zeta in ((20.0, 0.02), (41.0, 0.01), (73.0, 0.015)):
         w = 2 * np.pi * f
-        residue = np.outer(random.standard_normal(460), random.standard_normal(2))
+        residue = np.outer(random.standard_normal(outputs), random.standard_normal(2))
         response += residue / (w**2 + 2 * zeta * w * s + s**2)[:, None, None]
     scale = noise * np.sqrt(np.mean(np.abs(response) ** 2))
     response += scale * (random.standard_normal(response.shape) + 1j * random.standard_normal(response.shape)) / np.sqrt(2)
     variance = np.full(response.shape, scale**2) if noise > 0 else None
-    write_frf(path, frequency_hz, response, variance)
+    several = {"datasets": {"total_variance": 1.5 * variance}, "realizations": realizations, "noise_dof": 8.0,
+               "total_dof": realizations - 1.0} if realizations > 0 else {}
+    write_frf(path, frequency_hz, response, variance, **several)
+
+
+# Of the largest process that a command has started.
+PEAK = "import resource, subprocess, sys\n" \
+    "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)\n" \
+    "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024)"
 
 
 def call(words, folder, processes=0):
@@ -82,6 +92,7 @@ def setUpModule():
                    capture_output=True)
     write_wide_frf(WORK / "wide.h5", 1e-3)
     write_wide_frf(WORK / "exact.h5", 0.0)
+    write_wide_frf(WORK / "realizations.h5", 1e-3, realizations=4)
 
 
 class SameResults(unittest.TestCase):
@@ -105,6 +116,23 @@ class SameResults(unittest.TestCase):
                 with self.subTest(processes=processes, output=output):
                     self.assertEqual((of_team / output).read_bytes(), (folder / output).read_bytes())
             self.assertEqual(said_by_team, said)
+
+
+class Memory(unittest.TestCase):
+    def test_a_process_of_many_has_only_its_part_of_the_data(self):
+        lines, outputs = 400, 8 * 256
+        write_wide_frf(WORK / "large.h5", 1e-3, outputs, lines)
+        fit = [MPI_PROGRAM, "fit", "large.h5", "--modes", "20,41,73", "--threads", "1", "-o", "large.json"]
+        peak = {}
+        models = {}
+        for processes in (1, 4):
+            command = [sys.executable, "-c", PEAK, *MPIRUN, "-n", str(processes), *fit]
+            done = subprocess.run(list(map(str, command)), cwd=WORK, check=True, capture_output=True, text=True)
+            peak[processes] = int(done.stdout)
+            models[processes] = (WORK / "large.json").read_bytes()
+        self.assertEqual(models[4], models[1])
+        # Response, variance and weights.
+        self.assertLess(peak[4], peak[1] - 0.5 * 32 * lines * 2 * outputs)
 
 
 class Failures(unittest.TestCase):

@@ -48,12 +48,20 @@ void require_covariance_file(const FitCommandFlags& flags) {
   require_writable(flags.covariance, {flags.frf, flags.output});
 }
 
+/// A fit of free residues with one weight per number needs only the channels of its process. Ranks, weight matrices and
+/// the covariance of all parameters connect all channels.
+bool connects_channels(const FitCommandFlags& flags, const FitRequest& request) {
+  return request.weighting == Weighting::user || request.weighting == Weighting::likelihood ||
+         request.residue_rank > 0 || request.rigid_body.rank > 0 || !flags.covariance.empty();
+}
+
 void fit(const FitCommandFlags& flags, Console& console) {
   const FitRequest request = checked_request(flags);
   require_writable(flags.output, {flags.frf});
   require_model_ending(flags.output);
   require_covariance_file(flags);
-  FitSetup setup = make_fit_setup(request, read_frf(flags.frf));
+  const Team* const readers = connects_channels(flags, request) ? nullptr : console.team;
+  FitSetup setup = make_fit_setup(request, read_frf(flags.frf, readers));
   setup.options.team = console.team;
   setup.options.response_variance = false;  // that of the covariance is exact for all weights
   setup.options.covariance = !flags.covariance.empty();

@@ -155,7 +155,7 @@ void write(const std::filesystem::path& file, const FrfHandle& of) {
 
 /// A read-only array over a matrix of the response.
 template <typename Scalar>
-auto view(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> FrfEstimate::*columns) {
+auto view(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> ChannelData::*columns) {
   return [columns](const py::object& self) {
     const FrfEstimate& of = self.cast<const FrfHandle&>().frf;
     return lines_view<Scalar>(of.*columns, of.n_outputs(), self);

@@ -9,6 +9,7 @@
 
 #include "acquisition/files/json_members.hpp"
 #include "acquisition/files/json_text.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/nonlinearity_sentence.hpp"
 #include "frf/response/responding_channels.hpp"
@@ -64,11 +65,15 @@ std::string cause_of(const FitReason& reason) {
 std::vector<Problem> check_noise(const FrfEstimate& frf) {
   const bool noise = frf.noise_variance.size() > 0;
   const Eigen::MatrixXd& variance = noise ? frf.noise_variance : frf.total_variance;
-  if (variance.size() == 0 || responding_channels(frf).any()) return {};
+  if (variance.size() == 0 || frf.any(responding_channels(frf).any())) return {};
   const double limit = squared_error_quantile(0.95, noise ? frf.noise_dof : frf.total_dof);
-  const auto above =
-      (frf.response.cwiseAbs2().array() > limit * variance.array()).rowwise().count();
-  const double share = static_cast<double>(above.maxCoeff()) / static_cast<double>(frf.lines());
+  const auto [first, count] = frf.own();
+  const auto power = frf.response.middleRows(first, count).cwiseAbs2().array();
+  Eigen::MatrixXd above(frf.response.rows(), 1);  // lines of every channel
+  above.middleRows(first, count) =
+      (power > limit * variance.middleRows(first, count).array()).rowwise().count().cast<double>();
+  frf.team->gather_rows(kTileChannels, above);
+  const double share = above.maxCoeff() / static_cast<double>(frf.lines());
   return {
       {kNoise, false,
        fmt::format("the response is not above its noise: {:.0f} % of the lines of the best channel "
