@@ -17,6 +17,7 @@ constexpr double kWantedDof = 25.0;
 // With fewer degrees of freedom after smoothing, the scatter of the inverse is infinite or nearly so. Only possible
 // with a handful of lines.
 constexpr double kLeastTogether = 4.0;
+
 std::string channel_name(const FrfEstimate& frf, Eigen::Index c, Eigen::Index k) {
   return frf.outputs.names[c % frf.n_outputs()] + " <- " + frf.inputs.names[c / frf.n_outputs()] +
          " at " + std::to_string(frf.frequency_hz[k]) + " Hz";

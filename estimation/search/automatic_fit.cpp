@@ -273,7 +273,8 @@ class AutomaticFit {
   AdditiveModel start() {
     std::vector<ModeCandidate> modes = selection_.modes;
     if (modes.empty() && !selection_.keep_modes) {
-      modes = without_given(pick_modes(some_channels(frf_)), structure_);
+      modes = without_given(
+          guess_from(frf_, [](const FrfEstimate& frf) { return pick_modes(frf); }), structure_);
       const std::size_t most = static_cast<std::size_t>(affordable_modes());
       if (modes.size() > most) modes.resize(most);
       say("start: {} of the CMIF", counted(modes.size(), "peak"));
@@ -283,7 +284,9 @@ class AutomaticFit {
     AdditiveModel model = start_of(modes);
     if (model.submodels.empty()) {
       Eigen::Index k = 0;
-      cmif(some_channels(frf_), CmifKind::accelerance).row(0).maxCoeff(&k);
+      guess_from(frf_, [](const FrfEstimate& frf) { return cmif(frf, CmifKind::accelerance); })
+          .row(0)
+          .maxCoeff(&k);
       model.submodels.push_back(mode_submodel(frf_, structure_, {frf_.frequency_hz[k], 0.01, 1}));
     }
     return model;
@@ -458,7 +461,7 @@ class AutomaticFit {
         if (restructure()) reduce();
         if (round > 1 && a_delay_explains_more()) break;
       }
-      const std::vector<ProposedMode> candidates = proposals();
+      const std::vector<ProposedMode>& candidates = proposals();
       if (!add_clear_ones(candidates) && !add_one(candidates)) break;
       grown = true;
     }

@@ -96,7 +96,6 @@ PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
 }
 
 FrfEstimate some_channels(const FrfEstimate& frf) {
-  if (channel_tiles(frf.response.rows()) == 1) return frf;
   const PartOfChannels part(frf);
   const auto lines = Eigen::seqN(0, frf.lines());
   FrfEstimate out = part.frf(frf, lines);

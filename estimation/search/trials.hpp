@@ -2,6 +2,7 @@
 
 #include "estimation/model/additive_model.hpp"
 #include "estimation/problem/fit_options.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {
@@ -24,9 +25,14 @@ struct PartOfData {
 PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
                         const AdditiveModel& model);
 
-/// The channels of part_of_data() with their noise variance, on all lines, for first guesses of poles and for statistics
-/// over channels. All, if they are one tile.
+/// The channels of part_of_data() with their noise variance, on all lines.
 FrfEstimate some_channels(const FrfEstimate& frf);
+
+/// use(frf) with those channels, for first guesses of poles; with all, if they are one tile.
+template <typename Use>
+auto guess_from(const FrfEstimate& frf, const Use& use) {
+  return channel_tiles(frf.response.rows()) > 1 ? use(some_channels(frf)) : use(frf);
+}
 
 /// The poles and delays of a model of a part, for all channels; of those that were not in it, the mean delay.
 AdditiveModel with_all_channels(const FrfEstimate& frf, AdditiveModel model);

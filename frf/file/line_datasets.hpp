@@ -60,7 +60,8 @@ VecColumns<Scalar> read_columns(const Hdf5File& file, const std::string& dataset
   return from_c_order(read_array<Scalar>(file, dataset), rows, columns);
 }
 
-/// Some channels of columns vec(matrix), as many rows as there are channels; empty if the dataset is missing. Rows of other channels are not written, see ChannelData. @throws FormatError as read_columns()
+/// Some channels of columns vec(matrix), as many rows as there are channels; empty if the dataset is missing. Rows of
+/// other channels are not written, see ChannelData. @throws FormatError as read_columns()
 template <typename Scalar>
 VecColumns<Scalar> read_part(const Hdf5File& file, const std::string& dataset, Eigen::Index lines,
                              Eigen::Index rows, Eigen::Index columns, DataRange channels) {
@@ -75,8 +76,10 @@ VecColumns<Scalar> read_part(const Hdf5File& file, const std::string& dataset, E
   const Eigen::Index top = width == 1 ? channels.first % rows : 0;
   const Eigen::Index height = width == 1 ? channels.count : rows;
   constexpr Eigen::Index kAtOnce = 1 << 20;
-  const Eigen::Index together = std::max({Eigen::Index{1}, kAtOnce / (height * width),
-                                          static_cast<Eigen::Index>(file.rows_of_chunk(dataset))});
+  // Whole chunks, so that none is read twice.
+  const auto chunk = static_cast<Eigen::Index>(file.rows_of_chunk(dataset));
+  const Eigen::Index together =
+      chunk * std::max<Eigen::Index>(1, kAtOnce / (height * width) / chunk);
   std::vector<Scalar> data;
   for (Eigen::Index k = 0; k < lines; k += together) {
     const Eigen::Index count = std::min(together, lines - k);

@@ -22,8 +22,7 @@ Eigen::MatrixXd row_power(const FrfEstimate& frf) {
     return power;
   }
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    std::vector<Eigen::VectorXd>
-        parts;  // one per input: outputs are summed in one order in any team
+    std::vector<Eigen::VectorXd> parts;  // one per input, so that any team sums in one order
     for (Eigen::Index c = first, rows = 0; c < first + count; c += rows) {
       rows = std::min(first + count - c, n_y - c % n_y);
       parts.emplace_back(Eigen::VectorXd::Zero(n_y)).segment(c % n_y, rows) =

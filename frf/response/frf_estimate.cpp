@@ -62,26 +62,6 @@ void select_detection(const FrfEstimate& frf, const Indices& outputs, FrfEstimat
   }
 }
 
-/// The lines with low_hz <= f <= high_hz.
-DataRange lines_of_band(const Eigen::VectorXd& frequency_hz, double low_hz, double high_hz) {
-  if (low_hz > high_hz)
-    fail_request("band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz);
-  const auto* const begin = frequency_hz.data();
-  const auto* const end = begin + frequency_hz.size();
-  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
-  const bool is_band = low_hz <= high_hz;  // neither end is NaN
-  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
-  if (kept == 0) {
-    const std::string range = frequency_hz.size() == 0
-                                  ? std::string("no lines")
-                                  : fmt::format("lines from {} to {} Hz", frequency_hz[0],
-                                                frequency_hz[frequency_hz.size() - 1]);
-    fail_request("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
-                 high_hz, range);
-  }
-  return {first, kept};
-}
-
 }  // namespace
 
 Eigen::VectorXd FrfEstimate::omega_rad_s() const { return 2.0 * std::numbers::pi * frequency_hz; }
@@ -105,7 +85,22 @@ bool ChannelData::any(bool of_own_rows) const {
 }
 
 FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz) {
-  const DataRange lines = lines_of_band(frf.frequency_hz, low_hz, high_hz);
+  if (low_hz > high_hz)
+    fail_request("band {} to {} Hz is reversed; write the lower frequency first", low_hz, high_hz);
+  const auto* const begin = frf.frequency_hz.data();
+  const auto* const end = begin + frf.lines();
+  const Eigen::Index first = std::lower_bound(begin, end, low_hz) - begin;
+  const bool is_band = low_hz <= high_hz;  // neither end is NaN
+  const Eigen::Index kept = is_band ? std::upper_bound(begin, end, high_hz) - begin - first : 0;
+  if (kept == 0) {
+    const std::string range = frf.lines() == 0
+                                  ? std::string("no lines")
+                                  : fmt::format("lines from {} to {} Hz", frf.frequency_hz[0],
+                                                frf.frequency_hz[frf.lines() - 1]);
+    fail_request("band {} to {} Hz contains no lines; the frequency response has {}", low_hz,
+                 high_hz, range);
+  }
+  const DataRange lines{first, kept};
   const DataRange own = frf.own();
   keep_columns(frf.response, lines, own);
   for (Eigen::MatrixXd* const columns : {&frf.noise_variance, &frf.total_variance})

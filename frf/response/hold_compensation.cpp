@@ -35,17 +35,16 @@ void check_request(const FrfEstimate& frf, double delay_s) {
 
 /// Multiplies the response by a factor per line, and its variances by the squared magnitude.
 void multiply(FrfEstimate& frf, const std::function<std::complex<double>(double)>& factor) {
-  const Eigen::VectorXd omega = frf.omega_rad_s();
+  const Eigen::VectorXcd values = frf.omega_rad_s().unaryExpr(factor);
   const auto [first, count] = frf.own();
   // Tile by tile, in any team: at the ends of vectors, complex products are rounded differently.
   for_each_own_tile(*frf.team, frf.response.rows(), [&](DataRange tile) {
     Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
-    for (Eigen::Index k = 0; k < frf.lines(); ++k) G.col(k) *= factor(omega[k]);
+    for (Eigen::Index k = 0; k < frf.lines(); ++k) G.col(k) *= values[k];
     frf.response.middleRows(tile.first, tile.count) = G;
   });
   for (Eigen::Index k = 0; k < frf.lines(); ++k) {
-    const std::complex<double> value = factor(omega[k]);
-    const double power = std::norm(value);
+    const double power = std::norm(values[k]);
     for (Eigen::MatrixXd* variance : {&frf.noise_variance, &frf.total_variance})
       if (variance->size() != 0) variance->col(k).segment(first, count) *= power;
     for (Eigen::MatrixXcd* covariance : {&frf.residual_covariance, &frf.covariance})

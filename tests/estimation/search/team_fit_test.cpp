@@ -39,7 +39,7 @@ TEST(TeamFit, AFitHasTheSameBytesInEveryTeam) {
     FitOptions options = options_of(stage);
     options.method = method;
     const FitResult alone = fit_additive_model(stage.frf, stage.truth, options);
-    for (const int size : {2, 3, 8})  // with 8, processes have no tile
+    for (const int size : {2, 3, 4, 8})  // with 4 and 8, processes have no tile
       run_team(size, [&](const Team& team) {
         FitOptions shared = options;
         shared.team = &team;
