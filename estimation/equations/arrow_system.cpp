@@ -60,7 +60,7 @@ ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
     : ArrowSystem(problem, beta, groups, method, {0, problem.channels()}, use) {}
 
 ArrowSystem::ArrowSystem(const FitProblem& problem, const FitParameters& beta,
-                         const BasisGroups& groups, FitMethod method, IndexRange part,
+                         const BasisGroups& groups, FitMethod method, DataRange part,
                          ChannelEquationsUse use)
     : problem_(problem), beta_(beta), range_(part), use_(use), shared_(problem, beta, method) {
   if (keeps()) channels_.resize(part.count);

@@ -36,7 +36,7 @@ class ArrowSystem {
 
   /// The contribution of these channels only: M, e and the Schur complement are sums over parts.
   ArrowSystem(const FitProblem& problem, const FitParameters& beta, const BasisGroups& groups,
-              FitMethod method, IndexRange part,
+              FitMethod method, DataRange part,
               ChannelEquationsUse use = ChannelEquationsUse::kept);
 
   /// The step of the globals with `damping` times the diagonal of the Schur complement added to it; that of the
@@ -87,7 +87,7 @@ class ArrowSystem {
 
   const FitProblem& problem_;
   const FitParameters& beta_;
-  IndexRange range_;
+  DataRange range_;
   ChannelEquationsUse use_;
   EquationMethod shared_;
   Eigen::MatrixXd M_;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMostIterations = 1000;
 
-Eigen::MatrixXcd residual_tile(const SplitMatrix& E, IndexRange lines) {
+Eigen::MatrixXcd residual_tile(const SplitMatrix& E, DataRange lines) {
   Eigen::MatrixXcd X(E.re.rows(), lines.count);
   X.real() = E.re.middleCols(lines.first, lines.count);
   X.imag() = E.im.middleCols(lines.first, lines.count);
@@ -35,7 +35,7 @@ JointEquations::JointEquations(const FitProblem& problem, const WeightMatrices& 
       T_.im(group.channels, Eigen::all) = B * group.T.im.transpose();
     }
   }
-  e_ = weighted_adjoint([&](IndexRange lines) { return residual_tile(E, lines); });
+  e_ = weighted_adjoint([&](DataRange lines) { return residual_tile(E, lines); });
 }
 
 Eigen::Index JointEquations::size() const noexcept { return problem_.parameters(); }
@@ -43,7 +43,7 @@ Eigen::Index JointEquations::size() const noexcept { return problem_.parameters(
 /// sum Re{J^H W X}, X given by tiles.
 template <typename Columns>
 Eigen::VectorXd JointEquations::weighted_adjoint(const Columns& columns) const {
-  const auto adjoint = [&](IndexRange lines) {
+  const auto adjoint = [&](DataRange lines) {
     Eigen::MatrixXcd X = columns(lines);
     weights_.apply(lines.first, X);
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(size());
@@ -54,11 +54,11 @@ Eigen::VectorXd JointEquations::weighted_adjoint(const Columns& columns) const {
 }
 
 Eigen::VectorXd JointEquations::product(const Eigen::VectorXd& v) const {
-  return weighted_adjoint([&](IndexRange lines) { return response_change(v, lines); });
+  return weighted_adjoint([&](DataRange lines) { return response_change(v, lines); });
 }
 
 /// J v on some lines, n_c x lines: dB F^T + B dF^T, and the delays.
-Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, IndexRange range) const {
+Eigen::MatrixXcd JointEquations::response_change(const Eigen::VectorXd& v, DataRange range) const {
   const auto [first, lines] = range;
   const Eigen::Index n_f = problem_.functions();
   const Eigen::MatrixXd dB = v.tail(problem_.channels() * n_f).reshaped(problem_.channels(), n_f);
@@ -155,7 +155,7 @@ JointEquations::Solution JointEquations::solve(const Eigen::VectorXd& right_side
 
 double weighted_cost(const FitProblem& problem, const WeightMatrices& weights,
                      const SplitMatrix& E) {
-  const auto squares = [&](IndexRange lines) {
+  const auto squares = [&](DataRange lines) {
     const Eigen::MatrixXcd X = residual_tile(E, lines);
     Eigen::MatrixXcd WX = X;
     weights.apply(lines.first, WX);

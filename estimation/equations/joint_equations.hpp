@@ -47,7 +47,7 @@ class JointEquations {
  private:
   template <typename Columns>
   Eigen::VectorXd weighted_adjoint(const Columns& columns) const;
-  Eigen::MatrixXcd response_change(const Eigen::VectorXd& v, IndexRange range) const;
+  Eigen::MatrixXcd response_change(const Eigen::VectorXd& v, DataRange range) const;
   void add_adjoint(const Eigen::MatrixXcd& X, Eigen::Index first, Eigen::VectorXd& sum) const;
 
   const FitProblem& problem_;

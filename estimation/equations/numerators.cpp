@@ -131,7 +131,7 @@ void visit_submodels(const FitProblem& problem, const Eigen::MatrixXd& M, Visit 
 /// Calls visit(group, pairs, block) for its own channels in blocks.
 template <typename Visit>
 void visit_blocks(const FitProblem& problem, const BasisGroups& groups, Visit visit) {
-  const IndexRange own = own_channels(*problem.team, problem.channels());
+  const DataRange own = own_channels(*problem.team, problem.channels());
   groups.for_each([&](const BasisGroup& group) {
     // The products of all functions, shared by all blocks.
     const PairReduction pairs(group.fractions, group.fractions.F, group.fractions.F,
@@ -210,7 +210,7 @@ std::vector<double> removal_costs(const FitProblem& problem, const BasisGroups& 
     });
   });
   const Eigen::VectorXd sum =
-      sum_over_tiles(*problem.team, problem.channels(), costs.rows(), [&](IndexRange tile) {
+      sum_over_tiles(*problem.team, problem.channels(), costs.rows(), [&](DataRange tile) {
         Eigen::VectorXd part = Eigen::VectorXd::Zero(costs.rows());
         for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) part += costs.col(c);
         return part;
@@ -233,7 +233,7 @@ double shrink_numerators(const FitProblem& problem, const BasisGroups& groups,
     B.row(c) += change.transpose();
   });
   gather_numerators(problem, B);
-  return sum_over_tiles(*problem.team, problem.channels(), 1, [&](IndexRange tile) {
+  return sum_over_tiles(*problem.team, problem.channels(), 1, [&](DataRange tile) {
     return Eigen::VectorXd::Constant(1, rise.segment(tile.first, tile.count).sum()).eval();
   })[0];
 }

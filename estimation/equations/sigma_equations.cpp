@@ -30,7 +30,7 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
 Eigen::MatrixXcd divided(const Eigen::MatrixXcd& G, const Eigen::VectorXcd& factor,
                          const Team& team) {
   Eigen::MatrixXcd H(G.rows(), G.cols());
-  for_each_own_tile(team, G.rows(), [&](IndexRange tile) {
+  for_each_own_tile(team, G.rows(), [&](DataRange tile) {
     const Eigen::MatrixXcd of_tile =
         G.middleRows(tile.first, tile.count) * factor.cwiseInverse().asDiagonal();
     H.middleRows(tile.first, tile.count) = of_tile;
@@ -41,7 +41,7 @@ Eigen::MatrixXcd divided(const Eigen::MatrixXcd& G, const Eigen::VectorXcd& fact
 /// Fraction of the path up to each line: kPathShare by the change of log H over all channels, the rest by line index.
 Eigen::VectorXd path_of(const Eigen::MatrixXcd& H, const Team& team) {
   const Eigen::Index last = H.cols() - 1;
-  const Eigen::VectorXd steps = sum_over_tiles(team, H.rows(), H.cols(), [&](IndexRange tile) {
+  const Eigen::VectorXd steps = sum_over_tiles(team, H.rows(), H.cols(), [&](DataRange tile) {
     Eigen::VectorXd part = Eigen::VectorXd::Zero(H.cols());
     for (Eigen::Index k = 1; k <= last; ++k)
       for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) {
@@ -172,7 +172,7 @@ std::optional<Eigen::MatrixXd> SigmaEquations::by_sums(const PoleSet& poles,
                                                        const SplitMatrix& phi) const {
   const Eigen::Index n = phi.cols();
   const FractionGram products(poles, x_, unit_circle_);
-  const auto of_tile = [&](IndexRange tile) {
+  const auto of_tile = [&](DataRange tile) {
     std::vector<Eigen::MatrixXd> shares(kShares);
     for_each_task(workers_.threads, kShares, [&](int share) {
       Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n + 1, n + 1);

@@ -47,7 +47,7 @@ Eigen::MatrixXd stacked_triangle(Eigen::Index channels, const Workers& workers,
                                  const std::function<Eigen::MatrixXd(Eigen::Index)>& factor) {
   std::vector<Eigen::MatrixXd> tiles(channel_tiles(channels));
   const Team& team = *workers.team;
-  for_each_own_tile(team, channels, [&](IndexRange tile) {
+  for_each_own_tile(team, channels, [&](DataRange tile) {
     std::vector<Eigen::MatrixXd> shares(std::min(kShares, tile.count));
     for_each_task(workers.threads, static_cast<int>(shares.size()), [&](int share) {
       Eigen::MatrixXd& R = shares[share];

@@ -215,7 +215,7 @@ class Iteration : public Descent {
 
 double signal_cost(const FitProblem& problem) {
   const Eigen::VectorXd sum =
-      sum_over_tiles(*problem.team, problem.channels(), 1, [&](IndexRange tile) {
+      sum_over_tiles(*problem.team, problem.channels(), 1, [&](DataRange tile) {
         const auto W = problem.W->middleRows(tile.first, tile.count).array();
         const auto G = problem.G->middleRows(tile.first, tile.count).array();
         return Eigen::VectorXd::Constant(1, (W * G.abs2()).sum()).eval();

@@ -47,12 +47,12 @@ class Parts {
   Parts(const FrfEstimate& frf, double dof)
       : frf_(frf), dof_(dof), share_(Eigen::VectorXd::Zero(frf.response.rows())) {
     rounding_ =
-        kRounding * sum_over_tiles(*frf.team, share_.size(), frf.lines(), [&](IndexRange tile) {
+        kRounding * sum_over_tiles(*frf.team, share_.size(), frf.lines(), [&](DataRange tile) {
           const Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
           share_.segment(tile.first, tile.count) = G.rowwise().squaredNorm();
           return Eigen::VectorXd(G.colwise().squaredNorm().transpose());
         });
-    const auto of_tile = [&](IndexRange tile) {
+    const auto of_tile = [&](DataRange tile) {
       return Eigen::VectorXd(share_.segment(tile.first, tile.count)).sum();
     };
     share_ /= std::max(number_over_tiles(*frf.team, share_.size(), of_tile),
@@ -111,7 +111,7 @@ class Parts {
 
   /// The sums of add_line() for the channels of a tile as numbers, `size()` in all: those of the few parts that they
   /// belong to, in the order of add_sums().
-  Eigen::RowVectorXd take_sums(IndexRange tile) {
+  Eigen::RowVectorXd take_sums(DataRange tile) {
     Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(size());
     Eigen::Index at = 0;
     for (const std::size_t p : parts_of(tile)) {
@@ -122,7 +122,7 @@ class Parts {
     }
     return sums;
   }
-  void add_sums(IndexRange tile, const Eigen::RowVectorXd& sums) {
+  void add_sums(DataRange tile, const Eigen::RowVectorXd& sums) {
     Eigen::Index at = 0;
     for (const std::size_t p : parts_of(tile)) {
       parts_[p].t += sums[at++];
@@ -176,7 +176,7 @@ class Parts {
   }
 
   /// The parts to which the channels of a tile belong, in order.
-  std::vector<std::size_t> parts_of(IndexRange tile) const {
+  std::vector<std::size_t> parts_of(DataRange tile) const {
     std::vector<std::size_t> out;
     for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c)
       for (const std::size_t p : parts_of(c, 0)) out.push_back(p);
@@ -213,7 +213,7 @@ constexpr Eigen::Index kTile = 64;  // lines
 /// The residual of some channels, line tile by line tile: use(block, E).
 template <typename Use>
 void for_each_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
-                       const IndexRange& channels, const Use& use) {
+                       const DataRange& channels, const Use& use) {
   for (Eigen::Index first = 0, count = 0; first < frf.lines(); first += count) {
     count = frf.lines() - first;
     if (count >= 2 * kTile) count = kTile;  // the last tile has enough lines for a scatter
@@ -235,7 +235,7 @@ ResidualVerdict judge_by(const FrfEstimate& frf, const ModelBlockResponse& model
   const Eigen::MatrixXd& W = weights.size() > 0 ? weights : none;
   const Eigen::Index tiles = channel_tiles(frf.response.rows());
   Eigen::MatrixXd sums(tiles, parts.size());
-  for_each_own_tile(team, frf.response.rows(), [&](const IndexRange& channels) {
+  for_each_own_tile(team, frf.response.rows(), [&](const DataRange& channels) {
     for_each_residual(frf, model, channels, [&](const ResponseBlock& block, const auto& E) {
       for (Eigen::Index i = 0; i < block.lines; ++i) {
         const Eigen::Index k = block.first_line + i;
@@ -264,7 +264,7 @@ ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelBlockResponse
                                 const Eigen::MatrixXd& weights, int threads, const Team& team) {
   if (!has_line_scatter(frf.lines())) return {};
   Eigen::MatrixXd scatter(frf.response.rows(), frf.lines());
-  for_each_own_tile(*frf.team, frf.response.rows(), [&](const IndexRange& tile) {
+  for_each_own_tile(*frf.team, frf.response.rows(), [&](const DataRange& tile) {
     for_each_residual(frf, model, tile, [&](const ResponseBlock& block, const auto& E) {
       scatter.block(tile.first, block.first_line, tile.count, block.lines) =
           scatter_variance(frf.frequency_hz.segment(block.first_line, block.lines), E, threads);

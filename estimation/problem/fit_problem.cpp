@@ -7,8 +7,8 @@
 
 namespace stageid {
 
-std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most) {
-  std::vector<IndexRange> out;
+std::vector<DataRange> ranges_of(Eigen::Index count, Eigen::Index most) {
+  std::vector<DataRange> out;
   for (Eigen::Index i = 0; i < count; i += most) out.push_back({i, std::min(most, count - i)});
   return out;
 }
@@ -233,7 +233,7 @@ bool has_no_weight(const FitProblem& problem, Eigen::Index channel) {
 }
 
 double weighted_power(const FrfEstimate& frf, const Eigen::MatrixXd& weights) {
-  return number_over_tiles(*frf.team, weights.rows(), [&](IndexRange tile) {
+  return number_over_tiles(*frf.team, weights.rows(), [&](DataRange tile) {
     const Eigen::MatrixXd W = weights.middleRows(tile.first, tile.count);
     const Eigen::MatrixXcd G = frf.response.middleRows(tile.first, tile.count);
     return (W.array() * G.cwiseAbs2().array()).sum();
@@ -242,7 +242,7 @@ double weighted_power(const FrfEstimate& frf, const Eigen::MatrixXd& weights) {
 
 double residual_per_degree(const FitProblem& problem, double cost, Eigen::Index parameters) {
   const auto weighted = static_cast<Eigen::Index>(
-      number_over_tiles(*problem.team, problem.channels(), [&](IndexRange tile) {
+      number_over_tiles(*problem.team, problem.channels(), [&](DataRange tile) {
         Eigen::Index count = 0;
         for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c)
           count += has_no_weight(problem, c) ? 0 : 1;

@@ -25,10 +25,8 @@ namespace stageid {
 //   B(c, j)   the numerator coefficients of channel c
 //   D(k, .)   derivatives of F to the denominator coefficients
 
-/// Neighbouring lines, channels, inputs or functions.
-using IndexRange = DataRange;
 /// 0 to count - 1 in ranges of at most `most`.
-std::vector<IndexRange> ranges_of(Eigen::Index count, Eigen::Index most);
+std::vector<DataRange> ranges_of(Eigen::Index count, Eigen::Index most);
 
 /// The sum of task(range), the tasks in parallel. It is added in order, so it does not depend on the number of threads.
 /// @pre there are ranges

@@ -11,8 +11,7 @@ constexpr Eigen::Index kTileEntries = 1 << 18;
 
 /// E = G - P of some channels on some lines, in memory that can be used again.
 void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& groups,
-                   const Eigen::MatrixXd& B, IndexRange channels, IndexRange lines,
-                   SplitMatrix& E) {
+                   const Eigen::MatrixXd& B, DataRange channels, DataRange lines, SplitMatrix& E) {
   const auto G = problem.G->block(channels.first, lines.first, channels.count, lines.count);
   E.re = G.real();
   E.im = G.imag();
@@ -35,7 +34,7 @@ void load_residual(const FitProblem& problem, const std::vector<BasisGroup>& gro
 }
 
 /// So many channels on some lines; tiles depend on sizes only, never on the number of threads.
-std::vector<IndexRange> line_tiles(const FitProblem& problem, Eigen::Index channels) {
+std::vector<DataRange> line_tiles(const FitProblem& problem, Eigen::Index channels) {
   return ranges_of(problem.size(), std::max<Eigen::Index>(1, kTileEntries / channels));
 }
 
@@ -51,7 +50,7 @@ SplitMatrix residual(const FitProblem& problem, const std::vector<BasisGroup>& g
 double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                      const Eigen::MatrixXd& B) {
   const double squares =
-      ordered_sum(line_tiles(problem, problem.channels()), problem.threads, [&](IndexRange tile) {
+      ordered_sum(line_tiles(problem, problem.channels()), problem.threads, [&](DataRange tile) {
         SplitMatrix E;
         load_residual(problem, groups, B, {0, problem.channels()}, tile, E);
         const auto W = problem.W->middleCols(tile.first, tile.count).array();
@@ -63,10 +62,10 @@ double residual_cost(const FitProblem& problem, const std::vector<BasisGroup>& g
 ResidualSize residual_size(const FitProblem& problem, const std::vector<BasisGroup>& groups,
                            const Eigen::MatrixXd& B, const ChannelFlags& responding) {
   enum : Eigen::Index { kSquares, kCount, kInfinite, kNumbers };
-  const auto of_channels = [&](IndexRange channels) {
+  const auto of_channels = [&](DataRange channels) {
     Eigen::VectorXd part = Eigen::VectorXd::Zero(kNumbers);
     SplitMatrix E;
-    for (const IndexRange lines : line_tiles(problem, channels.count)) {
+    for (const DataRange lines : line_tiles(problem, channels.count)) {
       load_residual(problem, groups, B, channels, lines, E);
       if (!E.re.allFinite() || !E.im.allFinite()) part[kInfinite] = 1.0;
       for (Eigen::Index k = 0; k < lines.count; ++k)

@@ -46,7 +46,7 @@ double expected_power(double power, double n, double nu) {
 /// v^power for power 1 or -1, v the geometric mean over neighbouring lines, which does not spread a resonance of the
 /// variance. Its expectation is that power of the true variance. @param own rows to compute
 Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, double power,
-                               IndexRange own) {
+                               DataRange own) {
   const Eigen::Index half = window_reach(dof);
   const double nu = std::max(dof, 1.0);
   const Eigen::Index N = variance.cols();
@@ -81,7 +81,7 @@ Eigen::MatrixXd smoothed_power(const Eigen::MatrixXd& variance, double dof, doub
 /// The unbiased inverse of the smoothed variance.
 Eigen::MatrixXd smoothed_inverse(const FrfEstimate& frf, const Eigen::MatrixXd& variance,
                                  double dof) {
-  const IndexRange own = own_channels(*frf.team, variance.rows());
+  const DataRange own = own_channels(*frf.team, variance.rows());
   if (frf.residual_covariance.size() == 0 || &variance != &frf.noise_variance ||
       window_reach(dof) == 0)
     return smoothed_power(variance, dof, -1.0, own);

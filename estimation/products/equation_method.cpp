@@ -5,7 +5,7 @@
 namespace stageid {
 
 SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
-                           const BasisGroup& group, Eigen::Index c, IndexRange lines) {
+                           const BasisGroup& group, Eigen::Index c, DataRange lines) {
   const auto on_lines = [lines](const auto& matrix) {
     return matrix.middleRows(lines.first, lines.count);
   };

@@ -9,7 +9,7 @@ namespace stageid {
 
 /// Columns d vec(P)_c / d globals for one channel, lines x globals.
 SplitMatrix global_columns(const FitProblem& problem, const FitParameters& beta,
-                           const BasisGroup& group, Eigen::Index c, IndexRange lines);
+                           const BasisGroup& group, Eigen::Index c, DataRange lines);
 
 /// What the equations of all channels have in common.
 struct EquationMethod {

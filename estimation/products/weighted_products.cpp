@@ -47,7 +47,7 @@ std::vector<ColumnPair> all_pairs(Eigen::Index left, Eigen::Index right) {
   return pairs;
 }
 
-std::vector<TileRange> member_blocks(const BasisGroup& group, IndexRange part, Eigen::Index lines) {
+std::vector<TileRange> member_blocks(const BasisGroup& group, DataRange part, Eigen::Index lines) {
   std::vector<TileRange> blocks;
   const auto begin = group.channels.begin();  // the channels are sorted
   const auto end = std::lower_bound(begin, group.channels.end(), part.first + part.count);

@@ -26,7 +26,7 @@ struct TileRange {
 
 /// The channels of a group that are in `part`, one block per tile of channels, each with all lines: the sums need the
 /// memory of one block.
-std::vector<TileRange> member_blocks(const BasisGroup& group, IndexRange part, Eigen::Index lines);
+std::vector<TileRange> member_blocks(const BasisGroup& group, DataRange part, Eigen::Index lines);
 
 /// Divides the lines of a block between the threads. Shares depend on sizes only, never on the number of threads, so
 /// the sums and their order are always the same.

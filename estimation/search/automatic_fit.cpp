@@ -369,8 +369,8 @@ class AutomaticFit {
       if (overlapping_modes(best_.model).empty()) return;
       const Sample sample(*this);
       const std::vector<StructureMove> all = merges(sample.data.options, sample.data.model);
-      const std::vector<IndexRange> some = ranges_of(std::ssize(all), kTried);
-      if (std::none_of(some.begin(), some.end(), [&](IndexRange range) {
+      const std::vector<DataRange> some = ranges_of(std::ssize(all), kTried);
+      if (std::none_of(some.begin(), some.end(), [&](DataRange range) {
             const auto first = all.begin() + range.first;
             return take_best(sample, {first, first + range.count});
           }))

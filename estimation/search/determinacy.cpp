@@ -82,7 +82,7 @@ std::string undetermined_numerators(const FitProblem& problem, const FitParamete
   const Eigen::Index tiles = channel_tiles(problem.channels());
   Eigen::MatrixXd found =
       Eigen::MatrixXd::Constant(tiles, 1 + problem.functions(), kSmallestDirection);
-  for_each_own_tile(*problem.team, problem.channels(), [&](IndexRange tile) {
+  for_each_own_tile(*problem.team, problem.channels(), [&](DataRange tile) {
     auto weakest = found.row(tile.first / kTileChannels);
     for (const BasisGroup& group : groups)
       for (auto at = std::ranges::lower_bound(group.channels, tile.first);

@@ -38,7 +38,7 @@ void raise(ParameterCovariance& covariance, double correlated_lines) {
 
 /// Whether all weighted channels are finite; channels without weight are unknown and do not affect the others.
 bool weighted_are_finite(const FitProblem& problem, const ParameterCovariance& covariance) {
-  return number_over_tiles(*problem.team, problem.channels(), [&](IndexRange tile) {
+  return number_over_tiles(*problem.team, problem.channels(), [&](DataRange tile) {
            Eigen::Index infinite = 0;
            for (Eigen::Index c = tile.first; c < tile.first + tile.count; ++c) {
              const bool finite = covariance.numerator_variance.row(c).allFinite() &&

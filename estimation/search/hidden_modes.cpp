@@ -18,7 +18,7 @@ double noise_of(const FrfEstimate& frf, const Eigen::MatrixXd& weights, const Fi
                 int threads) {
   const double all = fit.model.fit.cost / static_cast<double>(frf.response.rows());
   if (!has_line_scatter(frf.lines())) return all;
-  const auto of_tile = [&](IndexRange tile) {
+  const auto of_tile = [&](DataRange tile) {
     const auto [first, count] = tile;
     const Eigen::MatrixXcd E = frf.response.middleRows(first, count) -
                                response(fit.model, frf.frequency_hz, fit.model.hold, first, count);

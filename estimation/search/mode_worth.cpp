@@ -63,7 +63,7 @@ double in_squares(double squares, double cost, double data) {
 
 Eigen::VectorXd squares_of_lines(const FrfEstimate& frf, const AdditiveModel& model,
                                  const Eigen::MatrixXd& weights, const Team& team) {
-  return sum_over_tiles(team, weights.rows(), weights.cols(), [&](IndexRange tile) {
+  return sum_over_tiles(team, weights.rows(), weights.cols(), [&](DataRange tile) {
     const Eigen::MatrixXcd E =
         frf.response.middleRows(tile.first, tile.count) -
         response(model, frf.frequency_hz, model.hold, tile.first, tile.count);

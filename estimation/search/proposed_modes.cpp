@@ -89,7 +89,7 @@ Eigen::MatrixXd own_functions(const FrfEstimate& frf, const AdditiveModel& model
 /// Square root of the mean over channels, each scaled to the same size.
 Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights, const Team& team) {
   const Eigen::VectorXd sum =
-      sum_over_tiles(team, weights.rows(), weights.cols(), [&](IndexRange tile) {
+      sum_over_tiles(team, weights.rows(), weights.cols(), [&](DataRange tile) {
         const auto W = weights.middleRows(tile.first, tile.count);
         const Eigen::VectorXd channel_scale = W.rowwise().mean().cwiseInverse();
         Eigen::VectorXd part(W.cols());
@@ -102,7 +102,7 @@ Eigen::VectorXd mean_root_weight(const Eigen::MatrixXd& weights, const Team& tea
 
 /// W E of some channels; real parts of all lines, then imaginary parts.
 Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& model,
-                                  const Eigen::MatrixXd& weights, const IndexRange& channels) {
+                                  const Eigen::MatrixXd& weights, const DataRange& channels) {
   const auto [first, rows] = channels;
   const Eigen::MatrixXcd E = frf.response.middleRows(first, rows) -
                              response(model, frf.frequency_hz, model.hold, first, rows);
@@ -131,7 +131,7 @@ std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveM
   Eigen::VectorXd share = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(grid.size()));
   const auto blocks = static_cast<int>((grid.size() + kBlock - 1) / kBlock);
   bool share_is_known = own.cols() == 0;
-  const auto raw_gain = [&](IndexRange channels) {
+  const auto raw_gain = [&](DataRange channels) {
     const Eigen::MatrixXd WE = weighted_residual(frf, model, weights, channels);
     const auto W = weights.middleRows(channels.first, channels.count);
     Eigen::VectorXd raw(share.size());

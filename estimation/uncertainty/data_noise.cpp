@@ -29,7 +29,7 @@ DataNoise data_noise(const FrfEstimate& frf, Weighting weighting) {
 }
 
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                         IndexRange lines, SplitMatrix columns) {
+                         DataRange lines, SplitMatrix columns) {
   Eigen::ArrayXd scale = problem.W->row(c).segment(lines.first, lines.count).transpose();
   if (noise.variance) {
     const auto variance = noise.variance->matrix->row(c).segment(lines.first, lines.count);

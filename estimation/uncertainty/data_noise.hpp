@@ -47,7 +47,7 @@ class NoiseCorrelation {
   /// S of one line, n_u x n_u. @pre between_inputs()
   Eigen::MatrixXcd of_inputs(Eigen::Index line) const;
   /// (S kron R)(c, d) of two channels on some lines, lines x 1; empty: zero. @pre known()
-  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const;
+  SplitMatrix of_channels(Eigen::Index c, Eigen::Index d, DataRange lines) const;
 
  private:
   std::complex<double> R(Eigen::Index y, Eigen::Index z, Eigen::Index line) const;
@@ -81,17 +81,17 @@ FitProblem middle_problem(const FitProblem& problem, const DataNoise& noise);
 
 /// Columns of one channel on some lines, times W C^1/2; for correlated_gram().
 SplitMatrix noise_scaled(const FitProblem& problem, const DataNoise& noise, Eigen::Index c,
-                         IndexRange lines, SplitMatrix columns);
+                         DataRange lines, SplitMatrix columns);
 
 /// Columns X = C_diag^1/2 W J of channels, as required by correlated_gram().
 struct CorrelatedColumns {
   /// Per input: the parameters of its columns, in order.
   std::vector<std::vector<Eigen::Index>> parameters;
   /// Columns of an output (0-based) of an input, lines x parameters[u].
-  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, IndexRange lines)> columns;
+  std::function<SplitMatrix(Eigen::Index u, Eigen::Index output, DataRange lines)> columns;
   /// Called with (S kron R) X of an input, tile by tile in the order of the lines, inputs in parallel; may be empty.
   /// Its columns belong to parameters[u], or to all parameters if inputs are correlated.
-  std::function<void(Eigen::Index u, IndexRange lines, const OutputColumns& Z)> use = {};
+  std::function<void(Eigen::Index u, DataRange lines, const OutputColumns& Z)> use = {};
 };
 
 /// J^H W C W J = sum_k Re{X^H (S kron R) X}, n x n parameters, in tiles of lines.

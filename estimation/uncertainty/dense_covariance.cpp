@@ -45,9 +45,9 @@ Ended ended_fit(const FrfEstimate& frf, const FitResult& result, const FitOption
 /// Columns X_c of every channel, all of one width, and the weights between two channels.
 struct ChannelPairs {
   Eigen::Index lines = 0;
-  std::function<SplitMatrix(Eigen::Index c, IndexRange lines)> columns;
+  std::function<SplitMatrix(Eigen::Index c, DataRange lines)> columns;
   /// W(c, d) on some lines, lines x 1; empty: zero.
-  std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, IndexRange lines)> between;
+  std::function<SplitMatrix(Eigen::Index c, Eigen::Index d, DataRange lines)> between;
 };
 
 // The columns of a block of channels and of one further channel remain in the cache.
@@ -59,8 +59,8 @@ Eigen::Index pair_place(Eigen::Index c, Eigen::Index d) { return d * (d + 1) / 2
 
 /// Adds the products of a block of channels and the following ones on a tile of lines.
 /// @param sums per pair of channels, the products of every range, by columns
-void add_channels(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, IndexRange block,
-                  IndexRange lines, const std::vector<IndexRange>& ranges, Eigen::MatrixXd& sums) {
+void add_channels(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, DataRange block,
+                  DataRange lines, const std::vector<DataRange>& ranges, Eigen::MatrixXd& sums) {
   SplitMatrix right;
   for (Eigen::Index d = block.first; d < std::ssize(X); ++d)
     for (Eigen::Index c = block.first; c <= std::min(d, block.first + block.count - 1); ++c) {
@@ -86,14 +86,14 @@ void add_channels(const ChannelPairs& pairs, const std::vector<SplitMatrix>& X, 
 /// sum_k Re{X_c^H W(c, d) X_d} of the columns in a range, for every range: element (c + n_c p, d + n_c q) belongs to
 /// its columns p and q, in the order of vec of channels x columns. W must be Hermitian.
 std::vector<Eigen::MatrixXd> pair_grams(const FitProblem& problem, const ChannelPairs& pairs,
-                                        const std::vector<IndexRange>& ranges) {
+                                        const std::vector<DataRange>& ranges) {
   const Eigen::Index channels = problem.channels();
   Eigen::Index products = 0;
-  for (const IndexRange& range : ranges) products += range.count * range.count;
+  for (const DataRange& range : ranges) products += range.count * range.count;
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(products, pair_place(0, channels));
   std::vector<SplitMatrix> X(channels);
-  const std::vector<IndexRange> blocks = ranges_of(channels, kBlockChannels);
-  for (const IndexRange lines : ranges_of(pairs.lines, kBlockLines)) {
+  const std::vector<DataRange> blocks = ranges_of(channels, kBlockChannels);
+  for (const DataRange lines : ranges_of(pairs.lines, kBlockLines)) {
     for_each_task(problem.threads, static_cast<int>(channels),
                   [&](int c) { X[c] = pairs.columns(c, lines); });
     for_each_task(problem.threads, static_cast<int>(blocks.size()),
@@ -102,7 +102,7 @@ std::vector<Eigen::MatrixXd> pair_grams(const FitProblem& problem, const Channel
 
   std::vector<Eigen::MatrixXd> out;
   Eigen::Index row = 0;
-  for (const IndexRange& range : ranges) {
+  for (const DataRange& range : ranges) {
     const Eigen::Index n = range.count;
     Eigen::MatrixXd& all = out.emplace_back(channels * n, channels * n);
     for (Eigen::Index d = 0; d < channels; ++d)
@@ -134,19 +134,19 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& nu,
 /// diagonal blocks are those of the channels, which are known.
 std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise& noise, double half,
                                               const CovarianceParts& known,
-                                              const std::vector<IndexRange>& ranges) {
+                                              const std::vector<DataRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, fit.groups);
   ChannelPairs pairs;
   pairs.lines = noise.correlation.known() ? problem.size() : 0;
-  pairs.columns = [&](Eigen::Index c, IndexRange lines) {
+  pairs.columns = [&](Eigen::Index c, DataRange lines) {
     const Eigen::MatrixXd& inverse = known.channels[c].equations_inverse;
     const auto& [F_re, F_im] = group_of[c]->F;
     return noise_scaled(problem, noise, c, lines,
                         {F_re.middleRows(lines.first, lines.count) * inverse,
                          F_im.middleRows(lines.first, lines.count) * inverse});
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, DataRange lines) {
     return c == d ? SplitMatrix{} : noise.correlation.of_channels(c, d, lines);
   };
   std::vector<Eigen::MatrixXd> out = pair_grams(problem, pairs, ranges);
@@ -156,7 +156,7 @@ std::vector<Eigen::MatrixXd> between_channels(const Ended& fit, const DataNoise&
 
 std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ended& fit,
                                               const FitResult& result, const FitOptions& options,
-                                              const std::vector<IndexRange>& ranges) {
+                                              const std::vector<DataRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const DataNoise noise = data_noise(frf, options.weighting);
   const std::shared_ptr<const CovarianceParts> parts =
@@ -192,7 +192,7 @@ std::vector<FitCovariance> of_free_numerators(const FrfEstimate& frf, const Ende
 
 /// The rows of T, d (globals, numerators of the range) / d free parameters, times C times T^T.
 Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
-                           const ResidueFactors& factors, const IndexRange& range,
+                           const ResidueFactors& factors, const DataRange& range,
                            const Eigen::MatrixXd& C) {
   const Eigen::Index globals = problem.globals();
   Eigen::MatrixXd T = Eigen::MatrixXd::Zero(globals + problem.channels() * range.count, C.cols());
@@ -208,7 +208,7 @@ Eigen::MatrixXd of_factors(const FitProblem& problem, const FitParameters& beta,
 
 std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<IndexRange>& ranges) {
+                                          const std::vector<DataRange>& ranges) {
   ResidueFactors factors(fit.problem, fit.beta, options);
   factors.project(fit.beta, Eigen::MatrixXd::Ones(fit.problem.channels(), fit.problem.functions()));
   const FitCovariance free =
@@ -216,7 +216,7 @@ std::vector<FitCovariance> of_given_ranks(const FrfEstimate& frf, const Ended& f
                           data_noise(frf, options.weighting), result.frozen);
   std::vector<FitCovariance> out;
   if (free.sandwich.size() == 0) return out;
-  for (const IndexRange& range : ranges)
+  for (const DataRange& range : ranges)
     out.push_back({of_factors(fit.problem, fit.beta, factors, range, free.sandwich),
                    of_factors(fit.problem, fit.beta, factors, range, free.likelihood)});
   return out;
@@ -230,10 +230,10 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
                                  residual(problem, fit.groups, fit.beta.B));
   ChannelPairs pairs;
   pairs.lines = problem.size();
-  pairs.columns = [&](Eigen::Index c, IndexRange lines) {
+  pairs.columns = [&](Eigen::Index c, DataRange lines) {
     return group_of[c]->F.middle_rows(lines.first, lines.count);
   };
-  pairs.between = [&](Eigen::Index c, Eigen::Index d, IndexRange lines) {
+  pairs.between = [&](Eigen::Index c, Eigen::Index d, DataRange lines) {
     return fit.matrices->between(c, d, lines.first, lines.count);
   };
   const Eigen::Index globals = problem.globals();
@@ -249,7 +249,7 @@ Eigen::MatrixXd joint_matrix(const Ended& fit) {
 
 std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult& result,
                                               const FitOptions& options,
-                                              const std::vector<IndexRange>& ranges) {
+                                              const std::vector<DataRange>& ranges) {
   const FitProblem& problem = fit.problem;
   const double half =
       0.5 * covariance_scale(problem, result.model.fit.cost, problem.parameters(),
@@ -258,7 +258,7 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
   const Eigen::MatrixXd inverse = free_inverse(joint_matrix(fit), result.frozen);
   if (!inverse.allFinite()) return {};
   std::vector<FitCovariance> out;
-  for (const IndexRange& range : ranges) {
+  for (const DataRange& range : ranges) {
     std::vector<Eigen::Index> places = indices(0, problem.globals());
     for (Eigen::Index i = 0; i < problem.channels() * range.count; ++i)
       places.push_back(problem.globals() + problem.channels() * range.first + i);
@@ -269,10 +269,10 @@ std::vector<FitCovariance> of_weight_matrices(const Ended& fit, const FitResult&
 }
 
 /// Whether the ranges together have no more numbers than one covariance of kMostParameters.
-bool are_affordable(const FitProblem& problem, const std::vector<IndexRange>& ranges) {
+bool are_affordable(const FitProblem& problem, const std::vector<DataRange>& ranges) {
   const auto most = static_cast<double>(kMostParameters);
   double numbers = 0.0;
-  for (const IndexRange& range : ranges)
+  for (const DataRange& range : ranges)
     numbers += std::pow(problem.globals() + problem.channels() * range.count, 2);
   return numbers <= most * most;
 }
@@ -285,7 +285,7 @@ bool has_deviations(const FitResult& result) {
 
 std::vector<FitCovariance> covariances_of(const FrfEstimate& frf, const Ended& fit,
                                           const FitResult& result, const FitOptions& options,
-                                          const std::vector<IndexRange>& ranges) {
+                                          const std::vector<DataRange>& ranges) {
   const bool low_rank = options.residue_rank > 0 || options.rigid_body_rank > 0;
   if (!are_affordable(fit.problem, ranges) ||
       (fit.matrices && fit.problem.parameters() > kMostParameters))
@@ -350,7 +350,7 @@ void fill_response_errors(const Ended& fit, FitCovariance& covariance) {
     const BasisGroup& group = *group_of[c];
     const std::vector<Eigen::Index> own = own_parameters(problem, c);
     const Eigen::MatrixXd C = covariance.sandwich(own, own);
-    for (const IndexRange lines : ranges_of(problem.size(), kTileLines)) {
+    for (const DataRange lines : ranges_of(problem.size(), kTileLines)) {
       const SplitMatrix of_globals = global_columns(problem, fit.beta, group, c, lines);
       Eigen::MatrixXd re(lines.count, C.rows());
       Eigen::MatrixXd im(lines.count, C.rows());
@@ -378,7 +378,7 @@ bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel&
 
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<IndexRange>& ranges) {
+                                             const std::vector<DataRange>& ranges) {
   if (!has_deviations(result)) return {};
   return covariances_of(frf, ended_fit(frf, result, options), result, options, ranges);
 }
@@ -419,8 +419,8 @@ double disc_radius_95(double real, double imaginary, double between) {
   return std::sqrt(variance) * quantile(std::hypot(real - imaginary, 2.0 * between) / variance);
 }
 
-std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model) {
-  std::vector<IndexRange> out;
+std::vector<DataRange> functions_of_submodels(const AdditiveModel& model) {
+  std::vector<DataRange> out;
   Eigen::Index next = 0;
   for (const Submodel& s : model.submodels) {
     out.push_back({next, std::ssize(s.numerator)});

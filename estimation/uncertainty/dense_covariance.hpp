@@ -24,7 +24,7 @@ bool have_affordable_covariances(const FitProblem& problem, const AdditiveModel&
 /// @returns empty if the fit has no standard deviations, or the ranges exceed kMostParameters
 std::vector<FitCovariance> dense_covariances(const FrfEstimate& frf, const FitResult& result,
                                              const FitOptions& options,
-                                             const std::vector<IndexRange>& ranges);
+                                             const std::vector<DataRange>& ranges);
 
 /// Fills FitResult::covariance, or adds a decision with the reason why there is none.
 void fill_covariance(const FrfEstimate& frf, const FitOptions& options, FitResult& result);
@@ -39,6 +39,6 @@ double error_quantile_95(double relation);
 double disc_radius_95(double real, double imaginary, double between);
 
 /// The functions of every submodel among those of a channel.
-std::vector<IndexRange> functions_of_submodels(const AdditiveModel& model);
+std::vector<DataRange> functions_of_submodels(const AdditiveModel& model);
 
 }  // namespace stageid

@@ -27,7 +27,7 @@ std::vector<Eigen::Index> parameters_of(const FitProblem& problem, const FitPara
 /// Columns d vec(P)_c / d own parameters, lines x own.
 SplitMatrix free_columns(const FitProblem& problem, const FitParameters& beta,
                          const ResidueFactors& factors, const BasisGroup& group, Eigen::Index c,
-                         const std::vector<Eigen::Index>& own, IndexRange lines) {
+                         const std::vector<Eigen::Index>& own, DataRange lines) {
   SplitMatrix out = global_columns(problem, beta, group, c, lines);
   const auto n = std::ssize(own);
   out.re.conservativeResizeLike(Eigen::MatrixXd::Zero(lines.count, n));
@@ -49,7 +49,7 @@ Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters
   CorrelatedColumns inputs;
   for (Eigen::Index u = 0; u < problem.n_inputs; ++u)
     inputs.parameters.push_back(parameters_of(problem, beta, factors, n_y * u, n_y));
-  inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, DataRange lines) {
     const Eigen::Index c = y + n_y * u;
     return noise_scaled(
         problem, noise, c, lines,

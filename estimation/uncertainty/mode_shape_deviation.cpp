@@ -130,8 +130,8 @@ std::optional<ModeShapeDeviation> mode_shape_deviation(const Submodel& mode,
 }
 
 void fill_shape_deviations(const FrfEstimate& frf, const FitOptions& options, FitResult& result) {
-  const std::vector<IndexRange> all = functions_of_submodels(result.model);
-  std::vector<IndexRange> ranges;
+  const std::vector<DataRange> all = functions_of_submodels(result.model);
+  std::vector<DataRange> ranges;
   std::vector<std::size_t> modes;
   for (std::size_t i = 0; i < result.model.submodels.size(); ++i)
     if (result.model.submodels[i].is_mode()) {

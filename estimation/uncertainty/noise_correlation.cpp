@@ -26,8 +26,8 @@ std::complex<double> correlation_of(const Eigen::MatrixXcd& columns,
 }
 
 /// The numbers without gaps between them. @param sorted without repetition
-std::vector<IndexRange> runs_of(const std::vector<Eigen::Index>& sorted) {
-  std::vector<IndexRange> runs;
+std::vector<DataRange> runs_of(const std::vector<Eigen::Index>& sorted) {
+  std::vector<DataRange> runs;
   for (const Eigen::Index i : sorted) {
     if (runs.empty() || i != runs.back().first + runs.back().count) runs.push_back({i, 0});
     ++runs.back().count;
@@ -51,7 +51,7 @@ class GramOfTiles {
       runs_.push_back(runs_of(parameters));
   }
 
-  void add(IndexRange lines) {
+  void add(DataRange lines) {
     R_.clear();
     S_.clear();
     for (Eigen::Index i = lines.first; i < lines.first + lines.count; ++i) {
@@ -76,7 +76,7 @@ class GramOfTiles {
     return correlation_.between_inputs() ? indices(0, n_) : inputs_.parameters[u];
   }
 
-  void read(int u, IndexRange lines) {
+  void read(int u, DataRange lines) {
     const Eigen::Index n_y = problem_.n_outputs;
     OutputColumns& X = X_[u];
     X.resize(2 * n_y * lines.count, std::ssize(inputs_.parameters[u]));
@@ -91,7 +91,7 @@ class GramOfTiles {
       Y.middleRows(2 * n_y * i, 2 * n_y).noalias() = R_[i] * X.middleRows(2 * n_y * i, 2 * n_y);
   }
 
-  OutputColumns with_other_inputs(int u, IndexRange lines) const {
+  OutputColumns with_other_inputs(int u, DataRange lines) const {
     const Eigen::Index n_y = problem_.n_outputs;
     OutputColumns Z = OutputColumns::Zero(2 * n_y * lines.count, n_);
     for (Eigen::Index i = 0; i < lines.count; ++i)
@@ -100,7 +100,7 @@ class GramOfTiles {
         const auto re = Y_[v].middleRows(2 * n_y * i, n_y);
         const auto im = Y_[v].middleRows(2 * n_y * i + n_y, n_y);
         Eigen::Index first = 0;
-        for (const IndexRange to : runs_[v]) {
+        for (const DataRange to : runs_[v]) {
           const auto Y_re = re.middleCols(first, to.count);
           const auto Y_im = im.middleCols(first, to.count);
           Z.block(2 * n_y * i, to.first, n_y, to.count) += s.real() * Y_re - s.imag() * Y_im;
@@ -111,7 +111,7 @@ class GramOfTiles {
     return Z;
   }
 
-  void multiply(int u, IndexRange lines) {
+  void multiply(int u, DataRange lines) {
     OutputColumns together;
     if (correlation_.between_inputs()) together = with_other_inputs(u, lines);
     const OutputColumns& Z = together.size() > 0 ? together : Y_[u];
@@ -125,8 +125,8 @@ class GramOfTiles {
   const NoiseCorrelation& correlation_;
   Eigen::Index n_;
   const CorrelatedColumns& inputs_;
-  std::vector<std::vector<IndexRange>> runs_;  ///< of the parameters of each input
-  std::vector<Eigen::MatrixXd> R_;             ///< per line of the tile
+  std::vector<std::vector<DataRange>> runs_;  ///< of the parameters of each input
+  std::vector<Eigen::MatrixXd> R_;            ///< per line of the tile
   std::vector<Eigen::MatrixXcd> S_;
   std::vector<OutputColumns> X_;
   std::vector<OutputColumns> Y_;
@@ -169,7 +169,7 @@ Eigen::MatrixXcd NoiseCorrelation::of_inputs(Eigen::Index line) const {
       n_u, n_u, [&](Eigen::Index u, Eigen::Index v) { return S(u, v, line); });
 }
 
-SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, IndexRange lines) const {
+SplitMatrix NoiseCorrelation::of_channels(Eigen::Index c, Eigen::Index d, DataRange lines) const {
   const Eigen::Index n_y = frf_->n_outputs();
   const Eigen::Index u = c / n_y;
   const Eigen::Index v = d / n_y;
@@ -190,7 +190,7 @@ Eigen::MatrixXd correlated_gram(const FitProblem& problem, const NoiseCorrelatio
   const auto channels = std::ssize(inputs.parameters) * problem.n_outputs;
   const Eigen::Index most =
       std::max<Eigen::Index>(8, kTileEntries / std::max<Eigen::Index>(1, n * channels));
-  for (const IndexRange lines : ranges_of(problem.size(), most)) gram.add(lines);
+  for (const DataRange lines : ranges_of(problem.size(), most)) gram.add(lines);
   return gram.sum();
 }
 

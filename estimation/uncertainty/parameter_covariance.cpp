@@ -25,7 +25,7 @@ constexpr double kColumnTolerance = 1e-2;
 /// of M_bb^-1 M_ba of the channel.
 SplitMatrix projected_columns(const FitProblem& problem, const FitParameters& beta,
                               const BasisGroup& group, const Eigen::MatrixXd& Z, Eigen::Index c,
-                              IndexRange lines) {
+                              DataRange lines) {
   SplitMatrix out = global_columns(problem, beta, group, c, lines);
   out.re -= group.F.re.middleRows(lines.first, lines.count) * Z;
   out.im -= group.F.im.middleRows(lines.first, lines.count) * Z;
@@ -33,7 +33,7 @@ SplitMatrix projected_columns(const FitProblem& problem, const FitParameters& be
 }
 
 /// Channels whose equations are stored together: all that are correlated with each other.
-std::vector<IndexRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
+std::vector<DataRange> channel_parts(const FitProblem& problem, const DataNoise& noise) {
   const Eigen::Index together = noise.correlation.between_inputs() ? problem.channels()
                                 : noise.correlation.known()        ? problem.n_outputs
                                                                    : 1;
@@ -49,7 +49,7 @@ struct PartEquations {
 };
 
 /// K for the globals without the part of their columns that the numerators can follow, J_a - F Z.
-Eigen::MatrixXd projected_middle(const PartEquations& part, IndexRange range) {
+Eigen::MatrixXd projected_middle(const PartEquations& part, DataRange range) {
   Eigen::MatrixXd K = part.middle().M_globals();
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c) {
     const Eigen::MatrixXd& Z = part.gn.channel(c).Z;
@@ -64,20 +64,20 @@ Eigen::MatrixXd projected_middle(const PartEquations& part, IndexRange range) {
 /// this part are filled
 Eigen::MatrixXd correlated_middle(const FitProblem& problem, const FitParameters& beta,
                                   const std::vector<const BasisGroup*>& group_of,
-                                  const PartEquations& part, IndexRange range,
+                                  const PartEquations& part, DataRange range,
                                   const DataNoise& noise, std::vector<Eigen::MatrixXd>& cross) {
   const Eigen::Index n_y = problem.n_outputs;
   for (Eigen::Index c = range.first; c < range.first + range.count; ++c)
     cross[c].setZero(problem.globals(), problem.functions());
   CorrelatedColumns inputs;
   inputs.parameters.assign(range.count / n_y, indices(0, problem.globals()));
-  inputs.columns = [&](Eigen::Index u, Eigen::Index y, IndexRange lines) {
+  inputs.columns = [&](Eigen::Index u, Eigen::Index y, DataRange lines) {
     const Eigen::Index c = range.first + n_y * u + y;
     return noise_scaled(
         problem, noise, c, lines,
         projected_columns(problem, beta, *group_of[c], part.gn.channel(c).Z, c, lines));
   };
-  inputs.use = [&](Eigen::Index u, IndexRange lines, const OutputColumns& Z) {
+  inputs.use = [&](Eigen::Index u, DataRange lines, const OutputColumns& Z) {
     for (Eigen::Index y = 0; y < n_y; ++y) {
       const Eigen::Index c = range.first + n_y * u + y;
       const SplitMatrix of_output = columns_of_output(Z, y, n_y);
@@ -184,7 +184,7 @@ void resize(const FitProblem& problem, bool with_response, ParameterCovariance& 
 }
 
 /// Calls task(channel) for some channels. @returns whether all calls returned true
-bool fill_channels(IndexRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
+bool fill_channels(DataRange range, int threads, const std::function<bool(Eigen::Index)>& task) {
   std::atomic<bool> determined = true;
   for_each_task(threads, static_cast<int>(range.count), [&](int r) {
     if (!task(range.first + r)) determined = false;
@@ -240,11 +240,11 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   const double half = 0.5 * out.residual_scale;
   const bool correlate = problem.globals() > 0 && noise.correlation.known();
   const std::vector<const BasisGroup*> group_of = groups_of_channels(problem, groups);
-  const std::vector<IndexRange> parts = channel_parts(problem, noise);
+  const std::vector<DataRange> parts = channel_parts(problem, noise);
   std::optional<FitProblem> weighed;
   if (noise.variance) weighed = middle_problem(problem, noise);
   std::optional<PartEquations> equations;
-  const auto make_equations = [&](IndexRange part) {
+  const auto make_equations = [&](DataRange part) {
     equations.emplace(
         PartEquations{ArrowSystem(problem, beta, groups, FitMethod::gn, part), std::nullopt});
     if (weighed)
@@ -261,7 +261,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   std::vector<Eigen::MatrixXd> cross(correlate ? static_cast<std::size_t>(problem.channels())
                                                : std::size_t{0});
   for (Eigen::Index p = own.first; p < own.first + own.count; ++p) {
-    const IndexRange part = parts[p];
+    const DataRange part = parts[p];
     make_equations(part);
     Eigen::VectorXd& sum = sums.emplace_back(Eigen::VectorXd::Zero(2 * globals * globals + 1));
     if (!equations->gn.regular()) {
@@ -292,7 +292,7 @@ ParameterCovariance parameter_covariance(const FitProblem& problem, const FitPar
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(problem.functions(), problem.functions());
   bool all_determined = true;
   for (Eigen::Index p = own.first; p < own.first + own.count && all_determined; ++p) {
-    const IndexRange part = parts[p];
+    const DataRange part = parts[p];
     if (own.count > 1) make_equations(part);
     all_determined = fill_channels(part, problem.threads, [&](Eigen::Index c) {
       const ArrowSystem::Channel& gn = equations->gn.channel(c);

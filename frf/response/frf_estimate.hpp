@@ -59,7 +59,7 @@ struct LeftOutRealization {
 
 class Team;
 
-/// Neighbouring channels or lines.
+/// Neighbouring lines, channels, inputs or functions.
 struct DataRange {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
