@@ -1,18 +1,16 @@
 #include "estimation/equations/residue_form.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <cmath>
 #include <stdexcept>
 
+#include "estimation/equations/weighted_low_rank.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
 
 using Complex = std::complex<double>;
-
-constexpr int kSweeps = 30;  // of the alternating least squares; the fit continues from there
 
 /// The pole of 1 + a_1 s + a_2 s^2 with positive imaginary part, and its derivatives.
 struct Pole {
@@ -27,29 +25,6 @@ Pole pole_of(const Eigen::VectorXd& a) {
   const double d2_re = -re / a[1];
   const Complex d2(d2_re, (-0.5 / (a[1] * a[1]) - re * d2_re) / im);
   return {{re, im}, d1, d2};
-}
-
-/// Minimizes sum weight |L - phi psi^T|^2 by alternating least squares from the singular vectors.
-void weighted_low_rank(const Eigen::MatrixXcd& L, const Eigen::MatrixXd& weight, Eigen::Index rank,
-                       Eigen::MatrixXcd& phi, Eigen::MatrixXcd& psi) {
-  psi = svd(L, Eigen::ComputeThinU | Eigen::ComputeThinV).matrixV().leftCols(rank).conjugate();
-  phi.resize(L.rows(), rank);
-  // Rows of x with  L(row, .) = x(row, .) fixed^T.
-  const auto solve_rows = [rank](const Eigen::MatrixXcd& data, const Eigen::MatrixXd& w,
-                                 const Eigen::MatrixXcd& fixed, Eigen::MatrixXcd& x) {
-    for (Eigen::Index r = 0; r < data.rows(); ++r) {
-      const Eigen::MatrixXcd weighted =
-          w.row(r).transpose().cast<Complex>().asDiagonal() * fixed.conjugate();
-      Eigen::MatrixXcd normal = weighted.transpose() * fixed;
-      normal.diagonal().array() += 1e-14 * normal.diagonal().real().maxCoeff() + 1e-300;
-      const Eigen::VectorXcd rhs = weighted.transpose() * data.row(r).transpose();
-      x.row(r) = normal.ldlt().solve(rhs).transpose().head(rank);
-    }
-  };
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    solve_rows(L, weight, psi, phi);
-    solve_rows(L.transpose(), weight.transpose(), phi, psi);
-  }
 }
 
 }  // namespace
@@ -88,7 +63,9 @@ void ResidueForm::project(const Eigen::VectorXd& a, const Eigen::MatrixXd& B,
     L.real() = re.reshaped(n_y_, n_u_);
     L.imag() = im.reshaped(n_y_, n_u_);
   }
-  weighted_low_rank(L, weight, rank_, phi_, psi_);
+  const auto [phi, psi] = WeightedLowRank(L, weight).factors(rank_);
+  phi_ = phi;
+  psi_ = psi;
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXcd> qr(psi_.transpose());
   free_input_.assign(n_u_, 0);
   Eigen::MatrixXcd held(rank_, rank_);

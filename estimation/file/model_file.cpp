@@ -254,6 +254,17 @@ ChannelList channels_from_json(const JsonNode& root, const std::string& key) {
   return out;
 }
 
+/// JSON as a file has it, within so many levels.
+std::string in_lines(const Json& json, std::size_t levels) {
+  const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace);
+  std::string out;
+  for (const char c : text) {
+    out += c;
+    if (c == '\n') out.append(levels, ' ');
+  }
+  return out;
+}
+
 }  // namespace
 
 void write_model(const std::filesystem::path& file, const AdditiveModel& model) {
@@ -273,7 +284,6 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
     root["output_delay_std_s"] = to_list(model.output_delay_std_s, model.n_outputs());
   }
   root["submodels"] = Json::array();
-  for (const Submodel& s : model.submodels) root["submodels"].push_back(submodel_to_json(s));
   root["fit"] = {{"cost", model.fit.cost},
                  {"weighting", model.fit.weighting},
                  {"iterations", model.fit.iterations},
@@ -291,7 +301,20 @@ void write_model(const std::filesystem::path& file, const AdditiveModel& model) 
     root["fit"]["relative_rms_error"] = model.fit.relative_rms_error;
   root["cost_history"] = model.cost_history;
   root["provenance"] = Json::parse(model.provenance_json);
-  write_text_file(file, root.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+
+  // One submodel at a time: as JSON, those of a million channels would take gigabytes.
+  const std::string around = in_lines(root, 0) + "\n";
+  const std::string list = "\n \"submodels\": [";  // in texts, the end of a line is escaped
+  const std::size_t place = around.find(list) + list.size();
+  OutputFile out(file);
+  out.append(around.substr(0, place));
+  const char* before = "\n  ";
+  for (const Submodel& s : model.submodels) {
+    out.append(before + in_lines(submodel_to_json(s), 2));
+    before = ",\n  ";
+  }
+  out.append((model.submodels.empty() ? "" : "\n ") + around.substr(place));
+  out.commit();
 }
 
 AdditiveModel read_model(const std::filesystem::path& file) {

@@ -5,9 +5,13 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <optional>
+#include <ranges>
 
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/residue_form.hpp"
+#include "estimation/equations/weighted_low_rank.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/search_constants.hpp"
 #include "frf/statistics/distributions.hpp"
@@ -41,6 +45,9 @@ class RankDistance {
       inverse_variance_.col(m) =
           inverse_variance_.col(m).cwiseMax(std::max(least, 1e-300)).cwiseAbs2().cwiseInverse();
     }
+    if (B_.cols() == 1)
+      bound_.emplace(B_.reshaped(n_outputs_, n_inputs_).cast<std::complex<double>>(),
+                     inverse_variance_.reshaped(n_outputs_, n_inputs_));
   }
 
   double operator()(int rank) const {
@@ -49,6 +56,11 @@ class RankDistance {
     weight /= weight.maxCoeff();
     form.project(a_, B_, weight.reshaped(n_outputs_, n_inputs_));
     return (form.numerators(a_) - B_).cwiseAbs2().cwiseProduct(inverse_variance_).sum();
+  }
+
+  /// Whether the sum is larger than a limit. Most ranks that are too low are found without minimization.
+  bool exceeds(double limit, int rank) const {
+    return (bound_ && bound_->least_distance(rank) > limit) || (*this)(rank) > limit;
   }
 
   int parameters(int rank) const {
@@ -67,6 +79,7 @@ class RankDistance {
   Eigen::VectorXd a_;
   Eigen::MatrixXd B_;  // n_c x m+1
   Eigen::MatrixXd inverse_variance_;
+  std::optional<WeightedLowRank> bound_;  // of modes with a single numerator
 };
 
 bool is_tested(const Submodel& s, const AdditiveModel& model) {
@@ -92,9 +105,14 @@ std::vector<ResidueRankTest> residue_rank_tests(const AdditiveModel& model, doub
     test.chi_square = distance(1);
     test.parameters = distance.parameters(1);
     test.probability = tail_of_chi_square(test.chi_square, test.parameters);
-    for (double beyond = test.chi_square; beyond > price * distance.parameters(test.rank);
-         beyond = distance(test.rank))
-      if (++test.rank > distance.highest()) break;
+    if (test.chi_square > price * test.parameters) {
+      const auto higher = std::views::iota(2, std::max(2, distance.highest() + 1));
+      const auto contradicted = [&](int rank) {
+        return distance.exceeds(price * distance.parameters(rank), rank);
+      };
+      test.rank =
+          2 + static_cast<int>(std::ranges::partition_point(higher, contradicted) - higher.begin());
+    }
     out.push_back(test);
   }
   return out;

@@ -187,27 +187,24 @@ FitReason with_advice(FitReason reason, const FrfEstimate& whole, const FitOptio
   reason.remedy = without_silent_channels(whole);
   if (!reason.remedy.empty()) return reason;
   // A dozen fits to all of many channels would take longer than the search.
-  FitOptions trial = trial_options(whole, options);
-  const bool is_part = channel_tiles(whole.response.rows()) > 1;
-  const PartOfData part = is_part ? part_of_data(whole, trial, fit.model) : PartOfData();
-  if (is_part) trial = part.options;
-  const FrfEstimate& frf = is_part ? part.frf : whole;
+  const PartOfData part = part_of_channels(whole, trial_options(whole, options), fit.model);
+  const FrfEstimate& frf = part.frf;
+  FitOptions trial = part.options;
   trial.limit.reset();
   // In a search that ended early, poles have not converged.
   FitOptions with_deviations = trial;
   with_deviations.uncertainty = true;
   with_deviations.response_variance = false;
-  const FitResult same = fit_additive_model(frf, is_part ? part.model : fit.model, with_deviations);
+  const FitResult same = fit_additive_model(frf, part.model, with_deviations);
   if (!cut_short) reason.remedy = of_reversed_time(frf, trial, same.model);
   if (!reason.remedy.empty()) return reason;
   advise_structure(frf, options, trial, same, number, cut_short, reason);
   if (reason.flags.empty())
     reason.remedy =
         "No other structure fits better: look there for disturbed lines or a disturbed channel";
-  if (is_part)
+  if (!part.all)
     reason.remedy +=
-        fmt::format(" (tried on {} of {} channels, {} of {} lines)", frf.response.rows(),
-                    whole.response.rows(), frf.lines(), whole.lines());
+        fmt::format(" (tried on {} of {} channels)", frf.response.rows(), whole.response.rows());
   return reason;
 }
 

@@ -36,6 +36,12 @@ struct PartOfChannels {
     FrfEstimate out;
     out.frequency_hz = whole.frequency_hz(lines);
     out.response = chosen_channels(*whole.team, whole.response, channels, lines);
+    if (whole.noise_variance.size() > 0)
+      out.noise_variance = chosen_channels(*whole.team, whole.noise_variance, channels, lines);
+    if (whole.total_variance.size() > 0)
+      out.total_variance = chosen_channels(*whole.team, whole.total_variance, channels, lines);
+    out.noise_dof = whole.noise_dof;
+    out.total_dof = whole.total_dof;
     out.correlated_lines = whole.correlated_lines;
     out.inputs = pick(whole.inputs, inputs);
     out.outputs = pick(whole.outputs, outputs);
@@ -61,6 +67,20 @@ AdditiveModel of_channels(AdditiveModel model, const FrfEstimate& part,
   return model;
 }
 
+PartOfData part(const FrfEstimate& frf, const FitOptions& options, const AdditiveModel& model,
+                Eigen::Index step) {
+  const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
+  const PartOfChannels some(frf);
+  PartOfData out;
+  out.all = step == 1 && std::ssize(some.channels) == frf.response.rows();
+  out.options = options;
+  out.options.user_weights =
+      chosen_channels(*frf.team, *options.user_weights, some.channels, lines);
+  out.frf = some.frf(frf, lines);
+  out.model = of_channels(model, out.frf, some.outputs, some.inputs);
+  return out;
+}
+
 }  // namespace
 
 FitOptions trial_options(const FrfEstimate& frf, const FitOptions& options) {
@@ -82,26 +102,16 @@ PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
                         const AdditiveModel& model) {
   const Eigen::Index wanted =
       std::max<Eigen::Index>(kPartLines, kPartLinesOfAMode * count_modes(model));
-  const Eigen::Index step = std::max<Eigen::Index>(1, frf.lines() / wanted);
-  const auto lines = Eigen::seqN(0, (frf.lines() - 1) / step + 1, step);
-  const PartOfChannels part(frf);
-  PartOfData out;
-  out.all = step == 1 && std::ssize(part.channels) == frf.response.rows();
-  out.options = options;
-  out.options.user_weights =
-      chosen_channels(*frf.team, *options.user_weights, part.channels, lines);
-  out.frf = part.frf(frf, lines);
-  out.model = of_channels(model, out.frf, part.outputs, part.inputs);
-  return out;
+  return part(frf, options, model, std::max<Eigen::Index>(1, frf.lines() / wanted));
+}
+
+PartOfData part_of_channels(const FrfEstimate& frf, const FitOptions& options,
+                            const AdditiveModel& model) {
+  return part(frf, options, model, 1);
 }
 
 FrfEstimate some_channels(const FrfEstimate& frf) {
-  const PartOfChannels part(frf);
-  const auto lines = Eigen::seqN(0, frf.lines());
-  FrfEstimate out = part.frf(frf, lines);
-  if (frf.noise_variance.size() > 0)
-    out.noise_variance = chosen_channels(*frf.team, frf.noise_variance, part.channels, lines);
-  return out;
+  return PartOfChannels(frf).frf(frf, Eigen::seqN(0, frf.lines()));
 }
 
 AdditiveModel with_all_channels(const FrfEstimate& frf, AdditiveModel model) {

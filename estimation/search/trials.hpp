@@ -25,7 +25,11 @@ struct PartOfData {
 PartOfData part_of_data(const FrfEstimate& frf, const FitOptions& options,
                         const AdditiveModel& model);
 
-/// The channels of part_of_data() with their noise variance, on all lines.
+/// The same channels on all lines.
+PartOfData part_of_channels(const FrfEstimate& frf, const FitOptions& options,
+                            const AdditiveModel& model);
+
+/// Their FRF alone.
 FrfEstimate some_channels(const FrfEstimate& frf);
 
 /// use(frf) with those channels, for first guesses of poles; with all, if they are one tile.

@@ -1,6 +1,5 @@
 #include "estimation/tracking/change_detector.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/multisine/random_stream.hpp"
 #include "excitation/words/require.hpp"
 
@@ -115,7 +115,7 @@ int ChangeDetector::add(const Eigen::VectorXd& scores) {
 }
 
 void ChangeDetector::calibrate(const Eigen::MatrixXd& correlation, double false_alarms_per_period) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+  const auto eigen = symmetric_eigen(correlation);
   const Eigen::MatrixXd root =
       eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   RandomScores random(1);

@@ -1,8 +1,9 @@
 #include "estimation/tracking/forgetting_filter.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <utility>
+
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 
@@ -18,7 +19,7 @@ void ForgettingFilter::add(const Eigen::MatrixXd& A, const Eigen::MatrixXd& K,
   const double kept = std::pow(forgetting_, periods);
   information_ = kept * information_ + periods * A;
   scatter_ = kept * kept * scatter_ + periods * K;
-  x_ += Eigen::LDLT<Eigen::MatrixXd>(information()).solve(gradient - (1.0 - kept) * (prior_ * x_));
+  x_ += solve_symmetric(information(), gradient - (1.0 - kept) * (prior_ * x_));
 }
 
 void ForgettingFilter::forget() {
@@ -28,9 +29,8 @@ void ForgettingFilter::forget() {
 }
 
 Eigen::MatrixXd ForgettingFilter::covariance() const {
-  const Eigen::LDLT<Eigen::MatrixXd> factor(information());
-  const Eigen::MatrixXd half = factor.solve(scatter_ + prior_);
-  return factor.solve(half.transpose());
+  const Eigen::MatrixXd half = solve_symmetric(information(), scatter_ + prior_);
+  return solve_symmetric(information(), half.transpose());
 }
 
 }  // namespace stageid

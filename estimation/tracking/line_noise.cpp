@@ -1,9 +1,8 @@
 #include "estimation/tracking/line_noise.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/require.hpp"
 
 namespace stageid {
@@ -15,8 +14,7 @@ constexpr int kPasses = 10;
 
 Eigen::MatrixXcd inverse_root(Eigen::MatrixXcd C) {
   C.diagonal().array() += 1e-12 * C.diagonal().real().maxCoeff() + 1e-300;  // noise-free outputs
-  return Eigen::LLT<Eigen::MatrixXcd>(C).matrixL().solve(
-      Eigen::MatrixXcd::Identity(C.rows(), C.cols()));
+  return inverse_cholesky(C);
 }
 
 }  // namespace
@@ -106,7 +104,7 @@ SumCovariance LineNoise::covariance(const Eigen::MatrixXd& J) const {
       const Eigen::MatrixXcd others = inverse_factor(scatter_[k] - d * d.adjoint(), k, n - 3.0);
       // J is whitened by all periods: L^H W d, W of the others, gives J^T of the residual under their weights.
       const Eigen::VectorXcd w =
-          inverse_factor_[k].adjoint().inverse() * (others.adjoint() * (others * d));
+          inverse(inverse_factor_[k].adjoint()) * (others.adjoint() * (others * d));
       white.col(t) << w.real(), w.imag();
     }
     const Eigen::MatrixXd sums = J.middleRows(2 * k * n_y_, 2 * n_y_).transpose() * white;

@@ -1,11 +1,10 @@
 #include "estimation/tracking/tracking_reference.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <cmath>
 #include <utility>
 
 #include "estimation/tracking/free_motion.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {
 namespace {
@@ -14,7 +13,7 @@ namespace {
 constexpr double kMoves = 2.0;
 
 Eigen::MatrixXd basis_of(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& factors) {
-  return factors.householderQ() * Eigen::MatrixXd::Identity(factors.rows(), factors.rank());
+  return leading_columns(factors, factors.rank());
 }
 
 template <typename Matrix>
@@ -75,7 +74,7 @@ Eigen::VectorXd TrackingReference::whitened(const Eigen::MatrixXcd& of) const {
 }
 
 void TrackingReference::remove_motions(Eigen::MatrixXcd& of) const {
-  of.reshaped() -= motions_ * white_motions_.solve(whitened(of));
+  of.reshaped() -= motions_ * least_squares(white_motions_, whitened(of));
 }
 
 Eigen::MatrixXd TrackingReference::beside_motions(const Eigen::MatrixXd& white) const {
@@ -111,11 +110,11 @@ std::vector<Eigen::MatrixXcd> TrackingReference::learn_beside(
   motions_ = std::move(motions);
   // The noise beside the motions gives the weights to remove them.
   for (int pass = 0; pass < 2; ++pass) {
-    white_motions_.compute(noise_->whitened(motions_));
+    white_motions_ = pivoted_qr(noise_->whitened(motions_));
     for (Eigen::MatrixXcd& r : residuals) remove_motions(r);
     noise_.emplace(residuals);
   }
-  white_motions_.compute(noise_->whitened(motions_));
+  white_motions_ = pivoted_qr(noise_->whitened(motions_));
   motion_basis_ = basis_of(white_motions_);
   return residuals;
 }
@@ -129,7 +128,7 @@ Eigen::MatrixXcd TrackingReference::add_motions(const std::vector<Eigen::MatrixX
   Eigen::MatrixXcd others(motions_.rows(), 0);
   for (std::size_t i = 1; i < all_motions_.size(); ++i) {
     const Eigen::MatrixXd white = beside_motions(noise_->whitened(all_motions_[i]));
-    const Eigen::MatrixXd basis = basis_of(white.colPivHouseholderQr());
+    const Eigen::MatrixXd basis = basis_of(pivoted_qr(white));
     const Eigen::MatrixXd part = basis.transpose() * scatter;
     const double chance = (periods_ - 1.0) * static_cast<double>(basis.cols());
     const bool moves = part.squaredNorm() > kMoves * chance;
@@ -149,7 +148,7 @@ std::vector<Eigen::MatrixXcd> TrackingReference::learn_noise(
   noise_.emplace(raw);
   const Eigen::MatrixXcd others = add_motions(learn_beside(all_motions_.front(), raw));
   std::vector<Eigen::MatrixXcd> residuals = learn_beside(std::move(motions_), std::move(raw));
-  other_basis_ = basis_of(beside_motions(noise_->whitened(others)).colPivHouseholderQr());
+  other_basis_ = basis_of(pivoted_qr(beside_motions(noise_->whitened(others))));
   return residuals;
 }
 
@@ -175,10 +174,9 @@ void TrackingReference::settle(const PeriodSpectra& mean, const ForgettingFilter
   double now = cost(x_);
   for (int iteration = 0; iteration < 20; ++iteration) {
     linearize(mean.U);
-    const Eigen::VectorXd step =
-        Eigen::LDLT<Eigen::MatrixXd>(periods_ * A_ + known)
-            .solve(periods_ * gradient(raw_residual(mean, response_.at(x_))) -
-                   known * (x_ - before.estimate()));
+    const Eigen::VectorXd step = solve_symmetric(
+        periods_ * A_ + known, periods_ * gradient(raw_residual(mean, response_.at(x_))) -
+                                   known * (x_ - before.estimate()));
     double length = 1.0;
     double next = cost(x_ + step);
     while (!(next < now) && length > 1e-3) {

@@ -1,15 +1,15 @@
 #include "estimation/tracking/watch_design.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <iterator>
 #include <limits>
 
 #include "estimation/tracking/change_detector.hpp"
 #include "estimation/tracking/change_naming.hpp"
 #include "estimation/tracking/free_motion.hpp"
+#include "excitation/decompositions/decompositions.hpp"
 #include "excitation/words/require.hpp"
 
 namespace stageid {
@@ -25,8 +25,7 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& M) {
   // Scaled, because a delay in s and a relative gain differ by many decades.
   const Eigen::VectorXd d = M.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = d.asDiagonal() * M * d.asDiagonal();
-  return d.asDiagonal() *
-         Eigen::LDLT<Eigen::MatrixXd>(scaled).solve(Eigen::MatrixXd::Identity(M.rows(), M.cols())) *
+  return d.asDiagonal() * solve_symmetric(scaled, Eigen::MatrixXd::Identity(M.rows(), M.cols())) *
          d.asDiagonal();
 }
 
@@ -44,7 +43,9 @@ Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXcd>& lines) {
 
 /// Of `columns` onto the space of B.
 Eigen::MatrixXd projection(const Eigen::MatrixXd& B, const Eigen::MatrixXd& columns) {
-  return B * B.colPivHouseholderQr().solve(columns);
+  const auto factors = pivoted_qr(B);
+  const Eigen::MatrixXd basis = leading_columns(factors, factors.rank());
+  return basis * (basis.transpose() * columns);
 }
 
 /// Periods until the expected statistic of ChangeDetector, with windows of 1, 2, 4, ... periods, reaches the threshold.
@@ -66,14 +67,15 @@ std::vector<LineSensitivity> line_sensitivities(const TrackedResponse& response,
                                                 const std::vector<Eigen::MatrixXcd>& C) {
   const Index n_y = response.model().n_outputs();
   const Eigen::VectorXd at_model = Eigen::VectorXd::Zero(response.size());
-  std::vector<Eigen::LLT<Eigen::MatrixXcd>> noise(C.begin(), C.end());
+  std::vector<Eigen::MatrixXcd> whitening;
+  std::ranges::transform(C, std::back_inserter(whitening), inverse_cholesky);
   std::vector<LineSensitivity> out(U.size());
   for (Index j = 0; j < U.front().cols(); ++j) {
     Eigen::MatrixXcd of_signal(U.front().rows(), std::ssize(U));
     for (Index k = 0; k < of_signal.cols(); ++k) of_signal.col(k) = U[k].col(j);
     const Eigen::MatrixXcd J = response.derivatives(at_model, of_signal);
     for (std::size_t k = 0; k < U.size(); ++k)
-      out[k].emplace_back(noise[k].matrixL().solve(J.middleRows(static_cast<Index>(k) * n_y, n_y)));
+      out[k].emplace_back(whitening[k] * J.middleRows(static_cast<Index>(k) * n_y, n_y));
   }
   return out;
 }
@@ -84,8 +86,7 @@ std::vector<Eigen::MatrixXcd> line_motions(const TrackedResponse& response,
   std::vector<Eigen::MatrixXcd> out;
   for (const Eigen::MatrixXcd& of_line : C) {
     const Index n_y = of_line.rows();
-    out.emplace_back(Eigen::LLT<Eigen::MatrixXcd>(of_line).matrixL().solve(
-        motions.middleRows(std::ssize(out) * n_y, n_y)));
+    out.emplace_back(inverse_cholesky(of_line) * motions.middleRows(std::ssize(out) * n_y, n_y));
   }
   return out;
 }

@@ -1,5 +1,6 @@
 #include "excitation/decompositions/decompositions.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -107,6 +108,17 @@ Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& m, const Eigen::Ve
 
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& m) {
   return m.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& m, const Eigen::MatrixXd& b) {
+  return m.ldlt().solve(b);
+}
+
+Eigen::MatrixXcd inverse_cholesky(const Eigen::MatrixXcd& m) {
+  const Eigen::LLT<Eigen::MatrixXcd> factors(m);
+  if (factors.info() != Eigen::Success)
+    return Eigen::MatrixXcd::Constant(m.rows(), m.cols(), std::numeric_limits<double>::quiet_NaN());
+  return factors.matrixL().solve(Eigen::MatrixXcd::Identity(m.rows(), m.cols()));
 }
 
 Eigen::MatrixXcd inverse(const Eigen::MatrixXcd& m) { return m.partialPivLu().inverse(); }

@@ -55,6 +55,12 @@ Eigen::MatrixXd leading_columns(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd
 Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& m, const Eigen::VectorXd& b);
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& m);
 
+/// x of m x = b for a symmetric m, by LDL^T.
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& m, const Eigen::MatrixXd& b);
+
+/// L^-1 of a Hermitian m = L L^H; NaN if m is not positive definite.
+Eigen::MatrixXcd inverse_cholesky(const Eigen::MatrixXcd& m);
+
 /// By LU decomposition with row pivoting.
 Eigen::MatrixXcd inverse(const Eigen::MatrixXcd& m);
 Eigen::MatrixXcd solve(const Eigen::MatrixXcd& m, const Eigen::MatrixXcd& b);

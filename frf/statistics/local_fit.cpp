@@ -1,6 +1,5 @@
 #include "frf/statistics/local_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -251,10 +250,8 @@ class Fitting {
     }
     information *=
         static_cast<double>(p_.independent_noise) / static_cast<double>(p_.pole_channels);
-    const Eigen::LLT<Eigen::MatrixXcd> factor(information);
-    if (factor.info() != Eigen::Success)  // poles that the data do not determine: rejected
-      return Eigen::MatrixXcd::Constant(g.rows(), poles, std::numeric_limits<double>::quiet_NaN());
-    return factor.matrixL().solve(g.adjoint()).adjoint();
+    // NaN for poles that the data do not determine: rejected.
+    return g * inverse_cholesky(information).adjoint();
   }
 
   const LocalProblem& p_;

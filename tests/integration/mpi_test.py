@@ -41,7 +41,7 @@ COMMANDS = {
 }
 
 
-def write_wide_frf(path, noise, outputs=460, lines=150, realizations=0):
+def write_wide_frf(path, noise, outputs=390, lines=80, realizations=0):
     """By default more channels than three tiles of 256, of two inputs."""
     random = np.random.default_rng(1)
     frequency_hz = np.linspace(5.0, 100.0, lines)

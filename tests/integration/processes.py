@@ -1,5 +1,7 @@
 """A test of the program and of other processes, which end with it."""
+import concurrent.futures
 import subprocess
+import time
 import unittest
 
 
@@ -28,3 +30,19 @@ class ProcessTest(unittest.TestCase):
         process.kill()
         process.wait()
         process.stdout.close()
+
+
+def run_side_by_side(case, at_once):
+    """Runs the tests of a class that mostly wait, some at a time, each in a folder of its own. @returns how many failed"""
+    def run(name):
+        result, began = unittest.TestResult(), time.monotonic()
+        case(name).run(result)
+        return result, time.monotonic() - began
+
+    names, failed = unittest.defaultTestLoader.getTestCaseNames(case), 0
+    with concurrent.futures.ThreadPoolExecutor(at_once) as pool:
+        for name, (result, took_s) in zip(names, pool.map(run, names)):
+            wrong = [text for _, text in result.failures + result.errors]
+            failed += bool(wrong)
+            print(f"{'FAIL' if wrong else 'ok  '} {name} ({took_s:.1f} s)", *wrong, sep="\n", flush=True)
+    return failed

@@ -88,6 +88,22 @@ TEST(PartOfData, FewInputsLeaveMoreOutputs) {
   EXPECT_EQ(part.frf.n_outputs(), 64);
 }
 
+TEST(PartOfData, OfChannelsHasAllLinesAndTheVariances) {
+  FrfEstimate frf = frf_of(300, 2, 1100);
+  frf.noise_variance = frf.response.cwiseAbs();
+  frf.total_variance = 2.0 * frf.noise_variance;
+  frf.noise_dof = 8.0;
+  frf.total_dof = 3.0;
+  const PartOfData part = part_of_channels(frf, weighed(frf), one_mode(frf));
+  EXPECT_FALSE(part.all);
+  EXPECT_EQ(part.frf.response.rows(), 128);
+  EXPECT_EQ(part.frf.frequency_hz, frf.frequency_hz);
+  EXPECT_EQ(part.frf.noise_variance, Eigen::MatrixXd(part.frf.response.cwiseAbs()));
+  EXPECT_EQ(part.frf.total_variance, 2.0 * part.frf.noise_variance);
+  EXPECT_EQ(part.frf.noise_dof, 8.0);
+  EXPECT_EQ(part.frf.total_dof, 3.0);
+}
+
 TEST(PartOfData, ManyModesNeedManyLines) {
   const FrfEstimate frf = frf_of(1, 1, 4000);
   AdditiveModel model = one_mode(frf);

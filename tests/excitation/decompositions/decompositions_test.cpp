@@ -145,5 +145,25 @@ TEST(Decompositions, InverseAndSolutionOfComplexEquations) {
   EXPECT_TRUE((m * solve(m, b)).isApprox(b));
 }
 
+TEST(Decompositions, SolutionOfSymmetricEquationsThatAreNotDefinite) {
+  MatrixXd m(2, 2);
+  m << 2.0, 1.0, 1.0, -3.0;
+  const MatrixXd b = MatrixXd::Identity(2, 2);
+  EXPECT_TRUE(MatrixXd(m * solve_symmetric(m, b)).isApprox(b));
+}
+
+TEST(Decompositions, InverseCholeskyFactorWhitens) {
+  test::RandomNumbers random(1);
+  const MatrixXcd root = circular_matrix(random, 4, 6);
+  const MatrixXcd root_adjoint = root.adjoint();
+  const MatrixXcd C = root * root_adjoint;
+  const MatrixXcd W = inverse_cholesky(C);
+  const MatrixXcd W_adjoint = W.adjoint();
+  const MatrixXcd WC = W * C;
+  EXPECT_TRUE(MatrixXcd(WC * W_adjoint).isIdentity(1e-11));
+  EXPECT_EQ(W(0, 3), 0.0);
+  EXPECT_TRUE(inverse_cholesky(-C).array().isNaN().all());
+}
+
 }  // namespace
 }  // namespace stageid::decompositions_test

@@ -24,6 +24,7 @@ from pymodbus.client import ModbusTcpClient
 
 from bench import Bench, BOOT_ID, RTU, STATE, STATUS, number, registers, wait_for_state
 from peers import ModbusConnection, resident_bytes
+from processes import run_side_by_side
 
 PROGRAM, SOURCE, WORK = sys.argv[1:4]
 MAP = (pathlib.Path(SOURCE) / 'docs/modbus-map.md').read_text()
@@ -76,7 +77,7 @@ def flood_with_requests(port, rounds, connections):
     return answered
 
 
-class ModbusTest(unittest.TestCase):
+class BenchTest(unittest.TestCase):
     def setUp(self):
         folder = pathlib.Path(WORK) / self._testMethodName
         shutil.rmtree(folder, ignore_errors=True)
@@ -88,6 +89,42 @@ class ModbusTest(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return done
 
+
+class CrowdTest(BenchTest):
+    # 1 000 idle and 100 slow clients, 10 000 forged requests of two connections, 100 000 random ones.
+    def test_a_run_is_the_same_beside_a_crowd_and_forged_requests(self):
+        node, port = self.bench.node()
+        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
+        experiment = self.bench.experiment(stage, short=True)
+        experiment.write_text(experiment.read_text().replace('  periods: 1', '  periods: 2000'))
+
+        def samples(name, meanwhile=lambda run: None):
+            run = self.bench.start_run(experiment, self.bench.work / f'{name}.slog', '--pace', 0)
+            meanwhile(run)
+            out, err = run.communicate(timeout=100)
+            self.assertEqual(run.returncode, 0, out + err)
+            self.succeed('log', 'convert', self.bench.work / f'{name}.slog', '-o', self.bench.work / f'{name}.csv')
+            return (self.bench.work / f'{name}.csv').read_bytes()
+
+        def attack(run):
+            self.assertEqual(wait_for_state(port, {'measuring'}), 'measuring')
+            before = resident_bytes(node.pid)
+            for number_of in range(1100):
+                client = socket.create_connection(('127.0.0.1', port))
+                self.addCleanup(client.close)
+                if number_of % 11 == 0:
+                    client.sendall(bytes(5))  # half a header
+            answered = flood_with_requests(port, 1000, connections=10)
+            self.assertIsNone(run.poll(), 'the run lasts longer than the attack')
+            self.assertEqual(answered, 110_000)
+            self.assertLess(resident_bytes(node.pid) - before, 8 << 20)
+
+        quiet = samples('quiet')
+        self.assertGreater(quiet.count(b'\n'), 150_000)
+        self.assertEqual(samples('loud', attack), quiet)
+
+
+class PeerTest(BenchTest):
     def frf(self, stage, name, *options):
         log, frf = self.bench.work / f'{name}.slog', self.bench.work / f'{name}.h5'
         for command in (('run', self.bench.experiment(stage, name), '-o', log, '--pace', 0, *options),
@@ -235,38 +272,6 @@ class ModbusTest(unittest.TestCase):
         self.assertIn('1 of 1 run complete', out)
         self.assertIn(' 0 missing', out)
 
-    # 1 000 idle and 100 slow clients, 10 000 forged requests of two connections, 100 000 random ones.
-    def test_a_run_is_the_same_beside_a_crowd_and_forged_requests(self):
-        node, port = self.bench.node()
-        stage = self.bench.stage('stage', door=f'tcp: {{port: {port}}}')
-        experiment = self.bench.experiment(stage, short=True)
-        experiment.write_text(experiment.read_text().replace('  periods: 1', '  periods: 2000'))
-
-        def samples(name, meanwhile=lambda run: None):
-            run = self.bench.start_run(experiment, self.bench.work / f'{name}.slog', '--pace', 0)
-            meanwhile(run)
-            out, err = run.communicate(timeout=100)
-            self.assertEqual(run.returncode, 0, out + err)
-            self.succeed('log', 'convert', self.bench.work / f'{name}.slog', '-o', self.bench.work / f'{name}.csv')
-            return (self.bench.work / f'{name}.csv').read_bytes()
-
-        def attack(run):
-            self.assertEqual(wait_for_state(port, {'measuring'}), 'measuring')
-            before = resident_bytes(node.pid)
-            for number_of in range(1100):
-                client = socket.create_connection(('127.0.0.1', port))
-                self.addCleanup(client.close)
-                if number_of % 11 == 0:
-                    client.sendall(bytes(5))  # half a header
-            answered = flood_with_requests(port, 1000, connections=10)
-            self.assertIsNone(run.poll(), 'the run lasts longer than the attack')
-            self.assertEqual(answered, 110_000)
-            self.assertLess(resident_bytes(node.pid) - before, 8 << 20)
-
-        quiet = samples('quiet')
-        self.assertGreater(quiet.count(b'\n'), 150_000)
-        self.assertEqual(samples('loud', attack), quiet)
-
     def test_a_node_ends_beside_clients_that_stall(self):
         node, port = self.bench.node()
         clients = [socket.create_connection(('127.0.0.1', port)) for _ in range(16)]
@@ -312,4 +317,5 @@ class ModbusTest(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
+    # The crowd takes both cores.
+    sys.exit(run_side_by_side(PeerTest, 4) + run_side_by_side(CrowdTest, 1))
