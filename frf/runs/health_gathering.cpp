@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <set>
+#include <utility>
 
 #include "acquisition/files/file_error.hpp"
 
@@ -92,7 +93,7 @@ void HealthPart::end() {
       scan.forget_constant();
   }
   drive_ = DriveMask();
-  start_ = recorder_.finish();
+  start_ = std::exchange(recorder_, StartRecorder()).finish();
 }
 
 void HealthPart::take(int period, RunWorkspace& w, const KnownSpectra* known) {

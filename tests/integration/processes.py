@@ -1,5 +1,6 @@
 """A test of the program and of other processes, which end with it."""
 import concurrent.futures
+import shutil
 import subprocess
 import time
 import unittest
@@ -32,17 +33,20 @@ class ProcessTest(unittest.TestCase):
         process.stdout.close()
 
 
-def run_side_by_side(case, at_once):
-    """Runs the tests of a class that mostly wait, some at a time, each in a folder of its own. @returns how many failed"""
+def run_side_by_side(case, at_once, alone):
+    """Runs the tests of a class that mostly wait, some at a time, each in a folder of its own; then those of `alone`, which
+    take all cores. @returns how many failed"""
     def run(name):
         result, began = unittest.TestResult(), time.monotonic()
-        case(name).run(result)
-        return result, time.monotonic() - began
+        own = type(case.__name__, (case,), {"folder": case.folder / name})
+        shutil.rmtree(own.folder, ignore_errors=True)
+        own.folder.mkdir(parents=True)
+        own(name).run(result)
+        wrong = [text for _, text in result.failures + result.errors]
+        print(f"{'FAIL' if wrong else 'ok  '} {name} ({time.monotonic() - began:.1f} s)", *wrong, sep="\n", flush=True)
+        return bool(wrong)
 
-    names, failed = unittest.defaultTestLoader.getTestCaseNames(case), 0
+    case.setUpClass()
+    names = [name for name in unittest.defaultTestLoader.getTestCaseNames(case) if name not in alone]
     with concurrent.futures.ThreadPoolExecutor(at_once) as pool:
-        for name, (result, took_s) in zip(names, pool.map(run, names)):
-            wrong = [text for _, text in result.failures + result.errors]
-            failed += bool(wrong)
-            print(f"{'FAIL' if wrong else 'ok  '} {name} ({took_s:.1f} s)", *wrong, sep="\n", flush=True)
-    return failed
+        return sum(pool.map(run, names)) + sum(map(run, alone))

@@ -19,12 +19,11 @@ import struct
 import subprocess
 import sys
 import time
-import unittest
 
 from example_firmware import CAN, ExampleFirmware
 from peers import (ARM, CAN_COMMAND, CAN_STATE, DOWNLOAD, HELLO, START, STOP, TRIGGER, UPLOAD, ZeroMqHub, ZeroMqPeer,
                    can_command, resident_bytes, sealed)
-from processes import ProcessTest
+from processes import ProcessTest, run_side_by_side
 
 PROGRAM, SOURCE, WORK = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 UPLOAD_CHUNK = 0x300
@@ -79,15 +78,14 @@ class ZeroMq(ProcessTest):
     def setUp(self):
         self.port = free_port()
         stage = (WORK / "stage_zeromq.yaml").read_text().replace("5555", str(self.port))
-        (WORK / "stage.yaml").write_text(stage)
-        for file in ("run.slog", "run.csv"):
-            (WORK / file).unlink(missing_ok=True)
+        (self.folder / "stage.yaml").write_text(stage)
         short = (WORK / "experiment.yaml").read_text()
+        (self.folder / "experiment.yaml").write_text(short)
         for old, new in (("axes: [z1, z2]", "axes: [z1]"), ("period_s: 10", "period_s: 4"), ("band_hz: [0.4", "band_hz: [0.5"),
                          ("transient_periods: 3", "transient_periods: 1")):
             self.assertIn(old, short)
             short = short.replace(old, new)
-        (WORK / "short.yaml").write_text(short)
+        (self.folder / "short.yaml").write_text(short)
 
     def node(self, name="node"):
         node = self.spawn(WORK / name, f"tcp://127.0.0.1:{self.port}")
@@ -116,7 +114,7 @@ class ZeroMq(ProcessTest):
         if text:
             self.assertRegex(err, text)
         self.assertEqual(len(said), int(code != 0) + warnings, err)
-        if (WORK / "run.slog").exists():
+        if (self.folder / "run.slog").exists():
             self.succeed("log", "verify", "run.slog")
 
     def test_the_modes_are_those_of_the_stage(self):
@@ -124,13 +122,13 @@ class ZeroMq(ProcessTest):
         self.check_modes()
 
     def test_a_feed_forward_of_the_node_is_in_the_record(self):
-        stage = (WORK / "stage.yaml").read_text()
+        stage = (self.folder / "stage.yaml").read_text()
         self.assertIn("controller: {}", stage)
-        (WORK / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
+        (self.folder / "stage.yaml").write_text(re.sub(r"controller: \{\}.*", "controller: peer", stage))
         self.node("forward_node")
         self.check_modes(warnings=2)  # that the loop of the node is not tested, and its signals not predicted
         self.succeed("log", "convert", "run.slog", "-o", "run.csv")
-        with open(WORK / "run.csv", newline="") as file:
+        with open(self.folder / "run.csv", newline="") as file:
             forces = [float(row["actuator z1 [N]"]) for row in csv.DictReader(file)]
         self.assertAlmostEqual(sum(forces) / len(forces), 0.05, delta=0.01)
 
@@ -143,7 +141,7 @@ class ZeroMq(ProcessTest):
 
     def test_nobody_is_there(self):
         self.ends(self.start(), 1, "no node answered")
-        self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
+        self.assertFalse((self.folder / "run.slog").exists(), "nothing was measured: no log")
 
     def test_a_killed_node(self):
         node, host = self.measuring()
@@ -156,7 +154,7 @@ class ZeroMq(ProcessTest):
         node.wait()
         self.node("slow_node")
         self.ends(host, 1, "restarted")
-        (WORK / "run.slog").unlink()
+        (self.folder / "run.slog").unlink()
         self.ends(self.start(), 0)
 
     def test_a_killed_host_leaves_the_stage_without_forces(self):
@@ -166,7 +164,7 @@ class ZeroMq(ProcessTest):
         killed = time.monotonic()
         self.assertRegex(self.wait_for(node, "state 8,"), "cause 1, forces 0 0 N")
         self.assertLess(time.monotonic() - killed, 3.0)
-        (WORK / "run.slog").unlink(missing_ok=True)
+        (self.folder / "run.slog").unlink(missing_ok=True)
         self.ends(self.start(), 1, "in fault .*--reset-fault")
         self.ends(self.start("short", "run.slog", "--reset-fault"), 0)
 
@@ -186,12 +184,12 @@ class ZeroMq(ProcessTest):
 
     # 10 000 commands and 20 000 chunks that are sealed but forged, 100 000 random messages, 20 connections of no ZeroMQ.
     def test_forged_and_random_messages_change_nothing(self):
-        (WORK / "long.yaml").write_text((WORK / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
+        (self.folder / "long.yaml").write_text((self.folder / "short.yaml").read_text().replace("  periods: 3", "  periods: 16"))
         quiet = self.node()
         self.ends(self.start("long"), 0)
         self.succeed("log", "convert", "run.slog", "-o", "quiet.csv")
         self.end(quiet)
-        (WORK / "run.slog").unlink()
+        (self.folder / "run.slog").unlink()
         node, host = self.measuring("long")
         dice, sizes = random.Random(5), (0, 1, 8, 71, 72, 72, 73, 300)
         peer = Peer(self.port)
@@ -217,7 +215,7 @@ class ZeroMq(ProcessTest):
         peer.close()
         self.ends(host, 0)
         self.succeed("log", "convert", "run.slog", "-o", "loud.csv")
-        self.assertEqual((WORK / "quiet.csv").read_bytes(), (WORK / "loud.csv").read_bytes(), "a sample differs")
+        self.assertEqual((self.folder / "quiet.csv").read_bytes(), (self.folder / "loud.csv").read_bytes(), "a sample differs")
 
     def test_a_thousand_idle_and_a_hundred_slow_clients_change_nothing(self):
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -235,7 +233,7 @@ class ZeroMq(ProcessTest):
                 clients.callback(peer.close)
                 peer.send(command(HELLO, 1))
             self.ends(host, 0)
-            (WORK / "run.slog").unlink()
+            (self.folder / "run.slog").unlink()
             self.ends(self.start(), 0)
             self.assertLess(resident_bytes(node.pid) - before, 64 << 20)
 
@@ -257,7 +255,7 @@ class ZeroMq(ProcessTest):
     def test_two_nodes_behind_one_address_are_refused(self):
         with self.behind_a_hub(2) as (_, host, _):
             self.ends(host, 1, "two nodes answer")
-        self.assertFalse((WORK / "run.slog").exists(), "nothing was measured: no log")
+        self.assertFalse((self.folder / "run.slog").exists(), "nothing was measured: no log")
 
     def end_under_a_flood(self, code, text, number=None):
         with self.behind_a_hub(1, "slow_node") as (node, host, hub):
@@ -288,8 +286,8 @@ class ZeroMq(ProcessTest):
             peer.close()
 
     def test_streaming_is_refused(self):
-        stage = (WORK / "stage.yaml").read_text()
-        (WORK / "stage.yaml").write_text(stage.replace("mode: resident ", "mode: streaming "))
+        stage = (self.folder / "stage.yaml").read_text()
+        (self.folder / "stage.yaml").write_text(stage.replace("mode: resident ", "mode: streaming "))
         self.ends(self.start(), 2, "ZeroMQ carries resident experiments over a single bus; set mode: resident")
 
     def test_the_header_describes_the_messages(self):
@@ -334,4 +332,4 @@ class ZeroMq(ProcessTest):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)
+    sys.exit(run_side_by_side(ZeroMq, 3, alone=["test_forged_and_random_messages_change_nothing"]))
