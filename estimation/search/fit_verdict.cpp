@@ -59,6 +59,8 @@ std::string reason_of(const FitResult& fit, std::size_t i, ModeVerdict verdict) 
     return fit.model.submodels[i].damping_ratio() < kBroad
                ? "at its bound: narrower than the line spacing, undamped or unstable"
                : "at its bound";
+  if (fit.model.submodels[i].held == HeldPole::guess)
+    return "held, because the data need it but do not determine it";
   if (has_held_pole(fit.model.submodels[i])) return "hidden by noise and held";
   return pole_doubt(fit, i) < 1.0 ? "does not justify its parameters (BIC)"
                                   : "with a standard deviation as large";
@@ -173,7 +175,8 @@ ModeVerdict mode_verdict(const FrfEstimate& frf, ModeNumber number, const FitRes
   const bool asked = number == ModeNumber::asked;
   const bool beside = !is_between_lines(s, fit.model.fit, asked);
   if (!beside && fit.is_held(submodel) && !has_held_pole(s)) return ModeVerdict::at_bound;
-  if (asked && has_held_pole(s)) return ModeVerdict::weak;  // hold_hidden_modes()
+  // Hidden by noise, or open until the last fit held it.
+  if (asked ? has_held_pole(s) : !beside && s.held == HeldPole::guess) return ModeVerdict::weak;
   const bool open = !beside && pole_doubt(fit, submodel) >= 1.0;
   const bool unselected = number != ModeNumber::chosen;
   if (!has_held_pole(s) && (open || (unselected && is_worth_nothing(frf, fit, submodel))))

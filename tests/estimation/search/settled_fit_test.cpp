@@ -113,6 +113,16 @@ TEST_F(SettledFit, AModeAtABoundThatIsWorthNothingIsLeftOut) {
   EXPECT_THAT(fit.decisions.front(), HasSubstr("which the data do not support"));
 }
 
+TEST_F(SettledFit, AModeOnTheLinesWhosePoleIsHeldIsAFindingAndItsFitUndetermined) {
+  FitResult fit = fit_additive_model(frf_, true_, options_);
+  fit.model.submodels[0].held = HeldPole::guess;
+  judge(frf_, {}, fit);
+  ASSERT_EQ(fit.findings.size(), 1U);
+  EXPECT_THAT(fit.findings[0], HasSubstr("held, because the data need it"));
+  EXPECT_EQ(fit.model.submodels[0].verdict, ModeVerdict::weak);
+  EXPECT_EQ(fit.status(), FitStatus::undetermined);
+}
+
 // Requested modes are kept, and such a fit is not trustworthy.
 TEST_F(SettledFit, AModeThatTheDataDoNotDetermineIsAFindingAndItsFitUndetermined) {
   FitResult fit = fit_additive_model(frf_, true_, options_);
