@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "estimation/equations/weighted_low_rank.hpp"
 #include "excitation/decompositions/decompositions.hpp"
@@ -63,9 +64,9 @@ void ResidueForm::project(const Eigen::VectorXd& a, const Eigen::MatrixXd& B,
     L.real() = re.reshaped(n_y_, n_u_);
     L.imag() = im.reshaped(n_y_, n_u_);
   }
-  const auto [phi, psi] = WeightedLowRank(L, weight).factors(rank_);
-  phi_ = phi;
-  psi_ = psi;
+  WeightedLowRank::Factors factors = WeightedLowRank(L, weight).factors(rank_);
+  phi_ = std::move(factors.phi);
+  psi_ = std::move(factors.psi);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXcd> qr(psi_.transpose());
   free_input_.assign(n_u_, 0);
   Eigen::MatrixXcd held(rank_, rank_);

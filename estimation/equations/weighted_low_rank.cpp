@@ -40,7 +40,7 @@ WeightedLowRank::WeightedLowRank(const Eigen::MatrixXcd& L, const Eigen::MatrixX
   column_scale_ = (0.5 * (logarithm.colwise().mean().array() - logarithm.mean())).exp();
   const Eigen::MatrixXd scale = row_scale * column_scale_.transpose();
   const Eigen::MatrixXcd scaled = L.cwiseProduct(scale);
-  const auto decomposition = svd(scaled, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const auto decomposition = svd(scaled, Eigen::ComputeThinV);
   singular_values_ = decomposition.singularValues();
   right_ = decomposition.matrixV();
   least_ratio_ = weight.cwiseQuotient(scale.cwiseAbs2()).minCoeff();
@@ -49,13 +49,13 @@ WeightedLowRank::WeightedLowRank(const Eigen::MatrixXcd& L, const Eigen::MatrixX
 WeightedLowRank::Factors WeightedLowRank::factors(Eigen::Index rank) const {
   Factors f;
   f.psi = column_scale_.cwiseInverse().asDiagonal() * right_.leftCols(rank).conjugate();
-  double distance = std::numeric_limits<double>::infinity();
+  f.distance = std::numeric_limits<double>::infinity();
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     f.phi = solve_rows(L_, weight_, f.psi);
     f.psi = solve_rows(L_.transpose(), weight_.transpose(), f.phi);
-    const double before = distance;
-    distance = (L_ - f.phi * f.psi.transpose()).cwiseAbs2().cwiseProduct(weight_).sum();
-    if (!(distance < (1.0 - kGainOfASweep) * before)) break;
+    const double before = f.distance;
+    f.distance = (L_ - f.phi * f.psi.transpose()).cwiseAbs2().cwiseProduct(weight_).sum();
+    if (!(f.distance < (1.0 - kGainOfASweep) * before)) break;
   }
   return f;
 }

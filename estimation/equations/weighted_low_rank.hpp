@@ -13,6 +13,7 @@ class WeightedLowRank {
   struct Factors {
     Eigen::MatrixXcd phi;  ///< n x rank
     Eigen::MatrixXcd psi;  ///< m x rank
+    double distance;       ///< the sum below
   };
   /// A minimum of sum weight |L - phi psi^T|^2, by alternating least squares. Separable weights (a product of one number
   /// per row and one per column) have their minimum in the singular vectors of the scaled matrix, where it begins.

@@ -46,11 +46,12 @@ class RankDistance {
           inverse_variance_.col(m).cwiseMax(std::max(least, 1e-300)).cwiseAbs2().cwiseInverse();
     }
     if (B_.cols() == 1)
-      bound_.emplace(B_.reshaped(n_outputs_, n_inputs_).cast<std::complex<double>>(),
-                     inverse_variance_.reshaped(n_outputs_, n_inputs_));
+      single_.emplace(B_.reshaped(n_outputs_, n_inputs_).cast<std::complex<double>>(),
+                      inverse_variance_.reshaped(n_outputs_, n_inputs_));
   }
 
   double operator()(int rank) const {
+    if (single_) return single_->factors(rank).distance;
     ResidueForm form(shape_, rank, n_outputs_, n_inputs_);
     Eigen::VectorXd weight = inverse_variance_.col(0);
     weight /= weight.maxCoeff();
@@ -60,7 +61,7 @@ class RankDistance {
 
   /// Whether the sum is larger than a limit. Most ranks that are too low are found without minimization.
   bool exceeds(double limit, int rank) const {
-    return (bound_ && bound_->least_distance(rank) > limit) || (*this)(rank) > limit;
+    return (single_ && single_->least_distance(rank) > limit) || (*this)(rank) > limit;
   }
 
   int parameters(int rank) const {
@@ -79,7 +80,7 @@ class RankDistance {
   Eigen::VectorXd a_;
   Eigen::MatrixXd B_;  // n_c x m+1
   Eigen::MatrixXd inverse_variance_;
-  std::optional<WeightedLowRank> bound_;  // of modes with a single numerator
+  std::optional<WeightedLowRank> single_;  // of modes with a single numerator
 };
 
 bool is_tested(const Submodel& s, const AdditiveModel& model) {

@@ -98,13 +98,13 @@ SumCovariance LineNoise::covariance(const Eigen::MatrixXd& J) const {
   Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(J.cols());
   Eigen::MatrixXd white(2 * n_y_, periods);
   for (std::size_t k = 0; k < deviations_.size(); ++k) {
+    // J is whitened by all periods: L^H W d, W of the others, gives J^T of the residual under their weights.
+    const Eigen::MatrixXcd L_adjoint = inverse(inverse_factor_[k].adjoint());
     for (Eigen::Index t = 0; t < periods; ++t) {
       // The scatter of the others is that of all without d d^H.
       const Eigen::VectorXcd d = deviations_[k].col(t);
       const Eigen::MatrixXcd others = inverse_factor(scatter_[k] - d * d.adjoint(), k, n - 3.0);
-      // J is whitened by all periods: L^H W d, W of the others, gives J^T of the residual under their weights.
-      const Eigen::VectorXcd w =
-          inverse(inverse_factor_[k].adjoint()) * (others.adjoint() * (others * d));
+      const Eigen::VectorXcd w = L_adjoint * (others.adjoint() * (others * d));
       white.col(t) << w.real(), w.imag();
     }
     const Eigen::MatrixXd sums = J.middleRows(2 * k * n_y_, 2 * n_y_).transpose() * white;

@@ -46,6 +46,7 @@ TEST(WeightedLowRank, WithOtherWeightsNoChangeOfTheFactorsIsBetterAndNoneBelowTh
   for (const Eigen::Index rank : {1, 2, 4}) {
     const WeightedLowRank::Factors f = low_rank.factors(rank);
     const double best = distance(L, weight, f);
+    EXPECT_NEAR(f.distance, best, 1e-12 * best) << rank;
     EXPECT_LE(low_rank.least_distance(rank), best) << rank;
     for (int trial = 0; trial < 20; ++trial) {
       WeightedLowRank::Factors other = f;
