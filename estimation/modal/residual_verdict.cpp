@@ -281,7 +281,7 @@ ResidualVerdict judge_by_itself(const FrfEstimate& frf, const ModelBlockResponse
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
                                const Eigen::MatrixXd& weights, int threads, const Distortion& known,
                                const Team* of_processes) {
-  const Team& team = of_processes != nullptr ? *of_processes : Team::one();
+  const Team& team = of_processes != nullptr ? *of_processes : *frf.team;
   if (weights.size() > 0 &&
       (weights.rows() != frf.response.rows() || weights.cols() != frf.response.cols()))
     fail_request("residual: the weights must have the shape of the response");

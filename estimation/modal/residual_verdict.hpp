@@ -66,7 +66,7 @@ using ModelBlockResponse = std::function<Eigen::MatrixXcd(const ResponseBlock& b
 /// distribution.
 /// @param known distortion of one realization, from the fit of the model; used if there is no total variance
 /// @param weights of a fit, (n_y n_u) x N: entries of weight 0 are not judged; empty: all are judged
-/// @param team of processes that share the channels; null: one
+/// @param team of processes that share the channels; null: that of the data
 /// @throws std::invalid_argument if shapes do not match
 ResidualVerdict judge_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
                                const Eigen::MatrixXd& weights = {}, int threads = 0,

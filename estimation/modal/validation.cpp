@@ -3,42 +3,56 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <complex>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "acquisition/files/fail.hpp"
 #include "estimation/modal/line_correlation.hpp"
+#include "frf/response/channel_tiles.hpp"
 #include "frf/response/confidence.hpp"
 #include "frf/response/responding_channels.hpp"
 
 namespace stageid {
 
-Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
-  if (frf.hold == Hold::none) {
-    // Continuous data have neither hold nor delay, unless the model was fitted to such data.
-    AdditiveModel bare = model;
-    if (model.hold != HoldModel::none) {
-      bare.input_delay_s.setZero(model.n_inputs());
-      bare.output_delay_s.setZero(model.n_outputs());
-    }
-    return response(bare, frf.frequency_hz, HoldModel::none);
-  }
-  const HoldModel sampled = model.hold == HoldModel::none ? HoldModel::exact : model.hold;
-  if (frf.compensated == Compensation::none) return response(model, frf.frequency_hz, sampled);
-  if (model.hold == HoldModel::none) return response(model, frf.frequency_hz, HoldModel::none);
+namespace {
+
+/// The delays of a model are not in continuous data, unless it was fitted to such data.
+bool is_without_delay(const AdditiveModel& model, const FrfEstimate& frf) {
+  return frf.hold == Hold::none && model.hold != HoldModel::none;
+}
+
+AdditiveModel without_delay(AdditiveModel model) {
+  model.input_delay_s.setZero(model.n_inputs());
+  model.output_delay_s.setZero(model.n_outputs());
+  return model;
+}
+
+/// How the samples are held in data like these.
+HoldModel hold_like(const AdditiveModel& model, const FrfEstimate& frf) {
+  if (frf.hold == Hold::none) return HoldModel::none;
+  if (model.hold != HoldModel::none) return model.hold;
+  return frf.compensated == Compensation::none ? HoldModel::exact : HoldModel::none;
+}
+
+/// The response to data like these in a block. @param model without_delay() if is_without_delay()
+Eigen::MatrixXcd block_like(const AdditiveModel& model, HoldModel hold, const FrfEstimate& frf,
+                            const ResponseBlock& block) {
+  const auto [first_channel, channels, first, lines] = block;
+  Eigen::MatrixXcd P =
+      response(model, frf.frequency_hz.segment(first, lines), hold, first_channel, channels);
+  if (hold == HoldModel::none || frf.compensated == Compensation::none) return P;
   // The model contains the delay, but it was removed from the data: remove it here too.
-  Eigen::MatrixXcd P = response(model, frf.frequency_hz, sampled);
   const double period = 1.0 / frf.sample_rate_hz;
-  const Eigen::VectorXd omega = frf.omega_rad_s();
-  for (Eigen::Index k = 0; k < P.cols(); ++k) {
-    const double x = 0.5 * omega[k] * period;
+  for (Eigen::Index k = 0; k < lines; ++k) {
+    const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[first + k];
+    const double x = 0.5 * omega * period;
     const double magnitude = frf.compensated == Compensation::hold ? x / std::sin(x) : 1.0;
-    P.col(k) *= std::polar(magnitude, omega[k] * (frf.delay_s + 0.5 * period));
+    P.col(k) *= std::polar(magnitude, omega * (frf.delay_s + 0.5 * period));
   }
   return P;
 }
-
-namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -52,18 +66,69 @@ void require_same_units(const char* kind, const ChannelList& model, const Channe
   }
 }
 
-/// Largest |autocorrelation| of whitened residuals over lines, all channels together, lags 1 to 10.
-void fill_whiteness(const Eigen::MatrixXcd& white, Validation& out) {
-  const double power = white.cwiseAbs2().sum();
-  if (!(power > 0.0) || white.cols() < 20) return;
-  for (Eigen::Index lag = 1; lag <= 10; ++lag)
-    out.whiteness = std::max(out.whiteness, std::abs(product_at_lag(white, lag)) / power);
-  // r|^2 of circular white noise is exponential with mean 1/count; ten lags share the probability of 1 %.
-  const double count = static_cast<double>(white.size());
+/// Sums over the lines of each channel, as columns; the first two are relative_squares().
+enum Of : Eigen::Index { kRelative, kError = 2, kResponse, kResponds, kSums };
+
+/// Of all channels, in every process.
+Eigen::MatrixXd sums_of_channels(const FrfEstimate& frf, const ModelBlockResponse& model) {
+  Eigen::MatrixXd sums(frf.response.rows(), Eigen::Index{kSums});
+  sums.col(kResponds) = responding_channels(frf).cast<double>().matrix();
+  for_each_own_tile(*frf.team, sums.rows(), [&](const DataRange& tile) {
+    const auto [first, count] = tile;
+    const Eigen::MatrixXcd G = frf.response.middleRows(first, count);
+    const Eigen::ArrayXXd error = (G - model({first, count, 0, frf.lines()})).cwiseAbs2();
+    const Eigen::ArrayXXd power = G.cwiseAbs2();
+    sums.block(first, kRelative, count, 2) = relative_squares(error, power);
+    sums.col(kError).segment(first, count) = error.rowwise().sum();
+    sums.col(kResponse).segment(first, count) = power.rowwise().sum();
+  });
+  frf.team->gather_rows(kTileChannels, sums);
+  return sums;
+}
+
+constexpr Eigen::Index kLags = 10;
+
+/// How white the residual is, and how many of its numbers exceed their 95 % point.
+void fill_whiteness(const FrfEstimate& frf, const ModelBlockResponse& model,
+                    const Eigen::MatrixXd& variance, double dof, Validation& out) {
+  const auto [own, of_own] = frf.own();
+  if (variance.size() == 0 || frf.any(!(variance.middleRows(own, of_own).array() > 0.0).all()))
+    return;
+  const double limit = squared_error_quantile(0.95, dof);
+  const Eigen::Index lags = frf.lines() < 20 ? 0 : kLags;
+  const auto of_tile = [&](const DataRange& tile) {
+    const auto [first, count] = tile;
+    const Eigen::MatrixXcd E =
+        frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
+    const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
+    const Eigen::MatrixXcd white = E.array() / of_noise.sqrt();
+    Eigen::VectorXd part(2 + 2 * lags);
+    part[0] = static_cast<double>((E.cwiseAbs2().array() / of_noise > limit).count());
+    part[1] = white.squaredNorm();
+    for (Eigen::Index lag = 1; lag <= lags; ++lag) {
+      const std::complex<double> product = product_at_lag(white, lag);
+      part.segment<2>(2 * lag) << product.real(), product.imag();
+    }
+    return part;
+  };
+  const Eigen::VectorXd sums =
+      sum_over_tiles(*frf.team, frf.response.rows(), 2 + 2 * lags, of_tile);
+  const auto count = static_cast<double>(frf.response.size());
+  out.whitened_above_95 = sums[0] / count;
+  if (!(sums[1] > 0.0) || lags == 0) return;
+  for (Eigen::Index lag = 1; lag <= lags; ++lag)
+    out.whiteness = std::max(out.whiteness, sums.segment<2>(2 * lag).norm() / sums[1]);
+  // |r|^2 of circular white noise is exponential with mean 1/count; ten lags share the probability of 1 %.
   out.whiteness_limit = std::sqrt(-std::log(1.0 - std::pow(0.99, 0.1)) / count);
 }
 
 }  // namespace
+
+Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
+  const ResponseBlock all{0, frf.response.rows(), 0, frf.lines()};
+  return block_like(is_without_delay(model, frf) ? without_delay(model) : model,
+                    hold_like(model, frf), frf, all);
+}
 
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Distortion& known) {
   if (model.inputs.names != frf.inputs.names || model.outputs.names != frf.outputs.names)
@@ -72,24 +137,23 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Di
         "outputs in the same order");
   require_same_units("input", model.inputs, frf.inputs);
   require_same_units("output", model.outputs, frf.outputs);
-  const Eigen::MatrixXcd E = frf.response - response_like(model, frf);
+  const bool bare = is_without_delay(model, frf);
+  const AdditiveModel without = bare ? without_delay(model) : AdditiveModel{};
+  const HoldModel hold = hold_like(model, frf);
+  const ModelBlockResponse in_block = [&](const ResponseBlock& block) {
+    return block_like(bare ? without : model, hold, frf, block);
+  };
+
+  const Eigen::MatrixXd sums = sums_of_channels(frf, in_block);
+  const ChannelFlags responds = sums.col(kResponds).array() > 0.0;
+  const Eigen::ArrayX2d relative = sums.middleCols(kRelative, 2);
   Validation out;
-  const Eigen::ArrayXXd squared = E.cwiseAbs2().array();
-  const Eigen::ArrayXXd power = frf.response.cwiseAbs2().array();
-  const ChannelFlags responding = responding_channels(frf);
-  out.relative_rms_error = relative_rms_error(squared, power, responding);
-  out.normalized_error = power.sum() > 0.0 ? std::sqrt(squared.sum() / power.sum()) : kUnknown;
-  out.channel_error =
-      responding.select(relative_channel_error(squared, power).array(), kUnknown).matrix();
-  ResidualVerdict verdict = judge_residual(
-      frf,
-      [&](const ResponseBlock& block) {
-        const auto of = [&](const Eigen::MatrixXcd& matrix) {
-          return matrix.block(block.first_channel, block.first_line, block.channels, block.lines);
-        };
-        return Eigen::MatrixXcd(of(frf.response) - of(E));
-      },
-      {}, 0, known);
+  out.relative_rms_error = relative_rms_error(relative, responds);
+  const double power = sums.col(kResponse).sum();
+  out.normalized_error = power > 0.0 ? std::sqrt(sums.col(kError).sum() / power) : kUnknown;
+  out.channel_error = responds.select((relative.col(0) / relative.col(1)).sqrt(), kUnknown);
+
+  ResidualVerdict verdict = judge_residual(frf, in_block, {}, 0, known);
   out.variance = verdict.variance;
   out.chi_square_per_dof = verdict.chi_square;
   out.expected_chi_square = verdict.expected;
@@ -105,13 +169,7 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Di
                                     : verdict.variance == ResidualVariance::total
                                         ? frf.total_variance
                                         : frf.noise_variance;
-  if (variance.size() > 0 && variance.minCoeff() > 0.0) {
-    out.whitened_above_95 =
-        static_cast<double>(
-            (squared / variance.array() > squared_error_quantile(0.95, verdict.dof)).count()) /
-        static_cast<double>(squared.size());
-    fill_whiteness(E.cwiseQuotient(variance.cwiseSqrt().cast<std::complex<double>>()), out);
-  }
+  fill_whiteness(frf, in_block, variance, verdict.dof, out);
   return out;
 }
 

@@ -70,16 +70,17 @@ template <typename Scalar, typename Lines>
 auto chosen_channels(const Team& team,
                      const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& matrix,
                      const std::vector<Eigen::Index>& channels, const Lines& lines) {
-  Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> out = matrix(channels, lines);
-  if (!team.divides(channel_tiles(matrix.rows()))) return out;
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  if (!team.divides(channel_tiles(matrix.rows()))) return Matrix(matrix(channels, lines));
+  Matrix out(std::ssize(channels), matrix(channels, lines).cols());
   for (int owner = 0; owner < team.size(); ++owner) {
     const DataRange sent = channels_of(team, owner, matrix.rows());
-    const Eigen::Index first = std::ranges::lower_bound(channels, sent.first) - channels.begin();
-    const Eigen::Index end =
-        std::ranges::lower_bound(channels, sent.first + sent.count) - channels.begin();
-    auto rows = out.middleRows(first, end - first).eval();
+    const auto first = std::ranges::lower_bound(channels, sent.first);
+    const auto end = std::ranges::lower_bound(channels, sent.first + sent.count);
+    Matrix rows;
+    if (owner == team.rank()) rows = matrix(std::vector(first, end), lines);
     broadcast(team, owner, rows);
-    out.middleRows(first, end - first) = rows;
+    out.middleRows(first - channels.begin(), rows.rows()) = rows;
   }
   return out;
 }

@@ -1,32 +1,10 @@
 #include "frf/response/responding_channels.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "frf/response/confidence.hpp"
 
 namespace stageid {
-namespace {
-
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-struct RatioSum {
-  double sum = 0.0;
-  Eigen::Index count = 0;
-
-  double rms() const { return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : kUnknown; }
-};
-
-void add_channel(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
-                 Eigen::Index channel, RatioSum& ratios) {
-  for (Eigen::Index k = 0; k < power.cols(); ++k) {
-    if (!(power(channel, k) > 0.0)) continue;
-    ratios.sum += error_power(channel, k) / power(channel, k);
-    ++ratios.count;
-  }
-}
-
-}  // namespace
 
 ChannelFlags responding_channels(const FrfEstimate& frf) {
   const auto [first, count] = frf.own();
@@ -45,23 +23,18 @@ ChannelFlags responding_channels(const FrfEstimate& frf) {
   return flags;
 }
 
-Eigen::VectorXd relative_channel_error(const Eigen::ArrayXXd& error_power,
-                                       const Eigen::ArrayXXd& power) {
-  Eigen::VectorXd out(power.rows());
-  for (Eigen::Index c = 0; c < power.rows(); ++c) {
-    RatioSum ratios;
-    add_channel(error_power, power, c, ratios);
-    out[c] = ratios.rms();
-  }
-  return out;
+Eigen::ArrayX2d relative_squares(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power) {
+  Eigen::ArrayX2d squares(power.rows(), 2);
+  squares.col(0) = (power > 0.0).select(error_power / power, 0.0).rowwise().sum();
+  squares.col(1) = (power > 0.0).cast<double>().rowwise().sum();
+  return squares;
 }
 
-double relative_rms_error(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
+double relative_rms_error(const Eigen::Ref<const Eigen::ArrayX2d>& squares,
                           const ChannelFlags& channels) {
-  RatioSum ratios;
-  for (Eigen::Index c = 0; c < power.rows(); ++c)
-    if (channels[c]) add_channel(error_power, power, c, ratios);
-  return ratios.rms();
+  const Eigen::Array2d sums =
+      (squares.colwise() * channels.cast<double>()).colwise().sum().transpose();
+  return std::sqrt(sums[0] / sums[1]);  // 0 / 0: NaN
 }
 
 }  // namespace stageid

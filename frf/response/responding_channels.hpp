@@ -13,13 +13,12 @@ using ChannelFlags = Eigen::Array<bool, Eigen::Dynamic, 1>;
 /// channels that are not all zero. Of FrfEstimate::own(); the others are false.
 ChannelFlags responding_channels(const FrfEstimate& frf);
 
-/// sqrt(mean |E|^2 / |G|^2) over the lines with nonzero G, per channel, n_y n_u; NaN if there is none.
-/// @param error_power, power |E|^2 and |G|^2, (n_y n_u) x N
-Eigen::VectorXd relative_channel_error(const Eigen::ArrayXXd& error_power,
-                                       const Eigen::ArrayXXd& power);
+/// The sum of |E|^2 / |G|^2 over the lines with nonzero G, and the number of these lines; one row per channel.
+/// @param error_power, power |E|^2 and |G|^2, channels x lines
+Eigen::ArrayX2d relative_squares(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power);
 
-/// The same over the lines of all flagged channels.
-double relative_rms_error(const Eigen::ArrayXXd& error_power, const Eigen::ArrayXXd& power,
+/// sqrt(mean |E|^2 / |G|^2) over all of these lines of the flagged channels; NaN if there are none.
+double relative_rms_error(const Eigen::Ref<const Eigen::ArrayX2d>& squares,
                           const ChannelFlags& channels);
 
 }  // namespace stageid

@@ -38,7 +38,11 @@ COMMANDS = {
     "wide_exact.json": ["fit", "../exact.h5", "--modes", "3"],
     "wide_given.json": ["fit", "../wide.h5", "--modes", "20,41,73", "--band", "10", "90"],
     "wide_realizations.json": ["fit", "../realizations.h5", "--modes", "20,41,73"],
+    "narrow.json": ["fit", "../narrow.h5", "--modes", "20,41,73"],
 }
+# One tile; several, with realizations; without variances; a model of some channels, and of another stage.
+VALIDATIONS = (("model.json", "held.h5"), ("wide.json", "../realizations.h5"), ("wide_given.json", "../exact.h5"),
+               ("narrow.json", "../wide.h5"))
 
 
 def write_wide_frf(path, noise, outputs=390, lines=80, realizations=0):
@@ -93,6 +97,7 @@ def setUpModule():
     write_wide_frf(WORK / "wide.h5", 1e-3)
     write_wide_frf(WORK / "exact.h5", 0.0)
     write_wide_frf(WORK / "realizations.h5", 1e-3, realizations=4)
+    write_wide_frf(WORK / "narrow.h5", 1e-3, outputs=3)
 
 
 class SameResults(unittest.TestCase):
@@ -104,8 +109,9 @@ class SameResults(unittest.TestCase):
             done = call([*words, "-o", output], folder, processes)
             self.assertIn(done.returncode, (0, 3), f"{words}: {done.stderr}")
             said[output] = done.returncode, without_times(done.stdout)
-        done = call(["--json", "validate", "model.json", "held.h5"], folder, processes)
-        said["validate"] = done.returncode, json.loads(done.stdout)
+        for model, data in VALIDATIONS:
+            done = call(["--json", "validate", model, data], folder, processes)
+            said[model, data] = done.returncode, json.loads(done.stdout)
         return folder, said
 
     def test_any_number_of_processes_gives_the_files_and_the_output_of_one(self):

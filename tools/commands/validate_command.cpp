@@ -83,6 +83,17 @@ void require_channels(const ValidateFlags& flags, const std::vector<std::string>
                   kind, name, flags.model.string(), fmt::join(of_data, ", "));
 }
 
+bool has_channels_of(const AdditiveModel& model, const FrfEstimate& frf) {
+  return frf.inputs.names == model.inputs.names && frf.outputs.names == model.outputs.names;
+}
+
+/// With other channels than the model's, every process reads all of them.
+FrfEstimate read_for(const AdditiveModel& model, const std::filesystem::path& file,
+                     const Team* team) {
+  FrfEstimate frf = read_frf(file, team);
+  return has_channels_of(model, frf) ? frf : read_frf(file);
+}
+
 void validate_model(const ValidateFlags& flags, Console& console) {
   const AdditiveModel model = read_model(flags.model);
   if (is_uff_name(flags.data)) {
@@ -101,13 +112,15 @@ void validate_model(const ValidateFlags& flags, Console& console) {
   options.team = console.team;
   FrfStep step;
   if (from_frf)
-    step.frf = read_frf(flags.data);
+    step.frf = read_for(model, flags.data, console.team);
   else
     step = estimate_frf({flags.data}, options, {true, flags.stage}, console);
   const std::vector<Finding> health = health_of(step.frf.provenance_json);
   require_channels(flags, step.frf.outputs.names, model.outputs.names, "output");
   require_channels(flags, step.frf.inputs.names, model.inputs.names, "input");
-  FrfEstimate frf = select_channels(step.frf, model.inputs.names, model.outputs.names);
+  FrfEstimate frf = has_channels_of(model, step.frf)
+                        ? std::move(step.frf)
+                        : select_channels(step.frf, model.inputs.names, model.outputs.names);
   std::array<double, 2> band_hz = {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]};
   if (model.fit.band_hz[1] > 0.0) std::ranges::copy(model.fit.band_hz, band_hz.begin());
   std::ranges::copy(flags.band_hz, band_hz.begin());  // none or two

@@ -136,7 +136,7 @@ TruthComparison compare_with_truth(const AdditiveModel& model, const FrfEstimate
   const Eigen::MatrixXcd G = exact_response(frf, info, plant);
   const Eigen::MatrixXcd E = response_like(model, frf) - G;
   out.relative_rms_error =
-      relative_rms_error(E.cwiseAbs2().array(), G.cwiseAbs2().array(), responding_channels(frf));
+      relative_rms_error(relative_squares(E.cwiseAbs2(), G.cwiseAbs2()), responding_channels(frf));
   out.normalized_error = std::sqrt(E.squaredNorm() / G.squaredNorm());
   return out;
 }

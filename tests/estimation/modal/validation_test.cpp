@@ -8,7 +8,10 @@
 #include <stdexcept>
 
 #include "tests/estimation/noisy_stage.hpp"
+#include "tests/support/models/divided_frf.hpp"
 #include "tests/support/process/error_message.hpp"
+#include "tests/support/process/thread_team.hpp"
+#include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test_validation {
 
@@ -284,6 +287,30 @@ TEST_F(ValidationOfAStage, AChannelOfNoiseDoesNotDecideTheRelativeError) {
   EXPECT_NEAR(result.relative_rms_error, 0.01, 0.001);
   EXPECT_TRUE(std::isnan(result.channel_error[5]));
   EXPECT_NEAR(result.channel_error[0], 0.01, 0.002);
+}
+
+/// More channels than two tiles. Without variances, with noise, and with the scatter of the lines instead of it.
+TEST(Validation, IsTheSameInEveryTeam) {
+  const test::RandomStage stage = test::draw_random_stage(
+      3, {.outputs = 300, .inputs = 2, .least_modes = 4, .most_modes = 4, .line_spacing_hz = 8.0});
+  FrfEstimate without = stage.frf;
+  without.noise_variance.resize(0, 0);
+  FrfEstimate distorted = stage.frf;
+  distorted.noise_variance *= 0.01;
+  for (const FrfEstimate& frf : {stage.frf, without, distorted}) {
+    const Validation alone = validate(stage.truth, frf);
+    for (const int size : {2, 4})
+      test::run_team(size, [&](const Team& team) {
+        const Validation shared = validate(stage.truth, test::divided(frf, team));
+        EXPECT_EQ(shared.relative_rms_error, alone.relative_rms_error);
+        EXPECT_EQ(shared.normalized_error, alone.normalized_error);
+        EXPECT_EQ(shared.channel_error, alone.channel_error);
+        EXPECT_EQ(shared.chi_square_per_dof, alone.chi_square_per_dof);
+        EXPECT_EQ(shared.reason, alone.reason);
+        EXPECT_EQ(shared.whitened_above_95, alone.whitened_above_95);
+        EXPECT_EQ(shared.whiteness, alone.whiteness);
+      });
+  }
 }
 
 TEST_F(ValidationOfAStage, OfAZeroResponseThereIsNoRelativeError) {

@@ -47,11 +47,12 @@ TEST(RespondingChannels, WithoutVariancesOnlyZeroIsNone) {
 TEST(RespondingChannels, ErrorsAreOverWhatIsFlaggedAndNotZero) {
   const Eigen::ArrayXXd error{{1.0, 4.0}, {9.0, 9.0}};
   const Eigen::ArrayXXd power{{4.0, 0.0}, {9.0, 36.0}};
-  EXPECT_DOUBLE_EQ(relative_rms_error(error, power, ChannelFlags{{true, false}}), 0.5);
-  EXPECT_DOUBLE_EQ(relative_rms_error(error, power, ChannelFlags{{true, true}}),
+  const Eigen::ArrayX2d squares = relative_squares(error, power);
+  EXPECT_DOUBLE_EQ(relative_rms_error(squares, ChannelFlags{{true, false}}), 0.5);
+  EXPECT_DOUBLE_EQ(relative_rms_error(squares, ChannelFlags{{false, true}}), std::sqrt(1.25 / 2.0));
+  EXPECT_DOUBLE_EQ(relative_rms_error(squares, ChannelFlags{{true, true}}),
                    std::sqrt((0.25 + 1.0 + 0.25) / 3.0));
-  EXPECT_TRUE(std::isnan(relative_rms_error(error, power, ChannelFlags{{false, false}})));
-  EXPECT_DOUBLE_EQ(relative_channel_error(error, power)[1], std::sqrt(1.25 / 2.0));
+  EXPECT_TRUE(std::isnan(relative_rms_error(squares, ChannelFlags{{false, false}})));
 }
 
 }  // namespace stageid::test_responding_channels
