@@ -15,12 +15,7 @@ constexpr double kClearlyPositive = 5.0;  // standard deviations of the correlat
 Eigen::ArrayXd autocorrelation(const FrfEstimate& frf, const ModelBlockResponse& model,
                                const Eigen::MatrixXd& variance, Eigen::Index lags) {
   const auto of_tile = [&](DataRange tile) {
-    const auto [first, count] = tile;
-    const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
-    const Eigen::ArrayXXcd E =
-        frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
-    const Eigen::MatrixXcd white =
-        (of_noise > 0.0).select(E / of_noise.sqrt(), std::complex<double>(0.0));  // 0: unknown
+    const Eigen::MatrixXcd white = white_residual(frf, model, variance, tile);
     Eigen::VectorXd part(lags + 1);
     for (Eigen::Index lag = 0; lag <= lags; ++lag) part[lag] = product_at_lag(white, lag).real();
     return part;
@@ -30,6 +25,15 @@ Eigen::ArrayXd autocorrelation(const FrfEstimate& frf, const ModelBlockResponse&
 }
 
 }  // namespace
+
+Eigen::MatrixXcd white_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
+                                const Eigen::MatrixXd& variance, DataRange channels) {
+  const auto [first, count] = channels;
+  const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
+  const Eigen::ArrayXXcd E =
+      frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
+  return (of_noise > 0.0).select(E / of_noise.sqrt(), std::complex<double>(0.0));
+}
 
 std::complex<double> product_at_lag(const Eigen::MatrixXcd& x, Eigen::Index lag) {
   const Eigen::Index n = x.cols() - lag;

@@ -6,6 +6,11 @@
 
 namespace stageid {
 
+/// The residual of some channels on all lines, divided by the root of its variance; 0 where that is 0: unknown.
+/// @param variance n_c x N
+Eigen::MatrixXcd white_residual(const FrfEstimate& frf, const ModelBlockResponse& model,
+                                const Eigen::MatrixXd& variance, DataRange channels);
+
 /// sum conj(x_k) x_{k + lag} over the lines of all channels. @param x n_c x N  @pre lag < N
 std::complex<double> product_at_lag(const Eigen::MatrixXcd& x, Eigen::Index lag);
 

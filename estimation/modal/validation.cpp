@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -15,44 +16,7 @@
 #include "frf/response/responding_channels.hpp"
 
 namespace stageid {
-
 namespace {
-
-/// The delays of a model are not in continuous data, unless it was fitted to such data.
-bool is_without_delay(const AdditiveModel& model, const FrfEstimate& frf) {
-  return frf.hold == Hold::none && model.hold != HoldModel::none;
-}
-
-AdditiveModel without_delay(AdditiveModel model) {
-  model.input_delay_s.setZero(model.n_inputs());
-  model.output_delay_s.setZero(model.n_outputs());
-  return model;
-}
-
-/// How the samples are held in data like these.
-HoldModel hold_like(const AdditiveModel& model, const FrfEstimate& frf) {
-  if (frf.hold == Hold::none) return HoldModel::none;
-  if (model.hold != HoldModel::none) return model.hold;
-  return frf.compensated == Compensation::none ? HoldModel::exact : HoldModel::none;
-}
-
-/// The response to data like these in a block. @param model without_delay() if is_without_delay()
-Eigen::MatrixXcd block_like(const AdditiveModel& model, HoldModel hold, const FrfEstimate& frf,
-                            const ResponseBlock& block) {
-  const auto [first_channel, channels, first, lines] = block;
-  Eigen::MatrixXcd P =
-      response(model, frf.frequency_hz.segment(first, lines), hold, first_channel, channels);
-  if (hold == HoldModel::none || frf.compensated == Compensation::none) return P;
-  // The model contains the delay, but it was removed from the data: remove it here too.
-  const double period = 1.0 / frf.sample_rate_hz;
-  for (Eigen::Index k = 0; k < lines; ++k) {
-    const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[first + k];
-    const double x = 0.5 * omega * period;
-    const double magnitude = frf.compensated == Compensation::hold ? x / std::sin(x) : 1.0;
-    P.col(k) *= std::polar(magnitude, omega * (frf.delay_s + 0.5 * period));
-  }
-  return P;
-}
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -64,6 +28,41 @@ void require_same_units(const char* kind, const ChannelList& model, const Channe
     fail_request("validate: {} {} is in {} in the model and in {} in the data; convert the data",
                  kind, model.names[i], model.units[i], data.units[i]);
   }
+}
+
+/// How the samples are held in data like these.
+HoldModel hold_like(const AdditiveModel& model, const FrfEstimate& frf) {
+  if (frf.hold == Hold::none) return HoldModel::none;
+  if (model.hold != HoldModel::none) return model.hold;
+  return frf.compensated == Compensation::none ? HoldModel::exact : HoldModel::none;
+}
+
+/// The response of the model as it would have been measured. Both must outlive the result.
+ModelBlockResponse blocks_like(const AdditiveModel& model, const FrfEstimate& frf) {
+  const AdditiveModel* seen = &model;
+  std::shared_ptr<AdditiveModel> without_delay;
+  if (frf.hold == Hold::none && model.hold != HoldModel::none) {
+    // Delays are not in continuous data, unless the model was fitted to such data.
+    without_delay = std::make_shared<AdditiveModel>(model);
+    without_delay->input_delay_s.setZero(model.n_inputs());
+    without_delay->output_delay_s.setZero(model.n_outputs());
+    seen = without_delay.get();
+  }
+  return [&frf, seen, without_delay, hold = hold_like(model, frf)](const ResponseBlock& block) {
+    const auto [first_channel, channels, first, lines] = block;
+    Eigen::MatrixXcd P =
+        response(*seen, frf.frequency_hz.segment(first, lines), hold, first_channel, channels);
+    if (hold == HoldModel::none || frf.compensated == Compensation::none) return P;
+    // The model contains the delay, but it was removed from the data: remove it here too.
+    const double period = 1.0 / frf.sample_rate_hz;
+    for (Eigen::Index k = 0; k < lines; ++k) {
+      const double omega = 2.0 * std::numbers::pi * frf.frequency_hz[first + k];
+      const double x = 0.5 * omega * period;
+      const double magnitude = frf.compensated == Compensation::hold ? x / std::sin(x) : 1.0;
+      P.col(k) *= std::polar(magnitude, omega * (frf.delay_s + 0.5 * period));
+    }
+    return P;
+  };
 }
 
 /// Sums over the lines of each channel, as columns; the first two are relative_squares().
@@ -97,13 +96,9 @@ void fill_whiteness(const FrfEstimate& frf, const ModelBlockResponse& model,
   const double limit = squared_error_quantile(0.95, dof);
   const Eigen::Index lags = frf.lines() < 20 ? 0 : kLags;
   const auto of_tile = [&](const DataRange& tile) {
-    const auto [first, count] = tile;
-    const Eigen::MatrixXcd E =
-        frf.response.middleRows(first, count) - model({first, count, 0, frf.lines()});
-    const Eigen::ArrayXXd of_noise = variance.middleRows(first, count).array();
-    const Eigen::MatrixXcd white = E.array() / of_noise.sqrt();
+    const Eigen::MatrixXcd white = white_residual(frf, model, variance, tile);
     Eigen::VectorXd part(2 + 2 * lags);
-    part[0] = static_cast<double>((E.cwiseAbs2().array() / of_noise > limit).count());
+    part[0] = static_cast<double>((white.cwiseAbs2().array() > limit).count());
     part[1] = white.squaredNorm();
     for (Eigen::Index lag = 1; lag <= lags; ++lag) {
       const std::complex<double> product = product_at_lag(white, lag);
@@ -125,9 +120,7 @@ void fill_whiteness(const FrfEstimate& frf, const ModelBlockResponse& model,
 }  // namespace
 
 Eigen::MatrixXcd response_like(const AdditiveModel& model, const FrfEstimate& frf) {
-  const ResponseBlock all{0, frf.response.rows(), 0, frf.lines()};
-  return block_like(is_without_delay(model, frf) ? without_delay(model) : model,
-                    hold_like(model, frf), frf, all);
+  return blocks_like(model, frf)({0, frf.response.rows(), 0, frf.lines()});
 }
 
 Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Distortion& known) {
@@ -137,13 +130,7 @@ Validation validate(const AdditiveModel& model, const FrfEstimate& frf, const Di
         "outputs in the same order");
   require_same_units("input", model.inputs, frf.inputs);
   require_same_units("output", model.outputs, frf.outputs);
-  const bool bare = is_without_delay(model, frf);
-  const AdditiveModel without = bare ? without_delay(model) : AdditiveModel{};
-  const HoldModel hold = hold_like(model, frf);
-  const ModelBlockResponse in_block = [&](const ResponseBlock& block) {
-    return block_like(bare ? without : model, hold, frf, block);
-  };
-
+  const ModelBlockResponse in_block = blocks_like(model, frf);
   const Eigen::MatrixXd sums = sums_of_channels(frf, in_block);
   const ChannelFlags responds = sums.col(kResponds).array() > 0.0;
   const Eigen::ArrayX2d relative = sums.middleCols(kRelative, 2);

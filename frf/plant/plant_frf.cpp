@@ -112,8 +112,8 @@ class PlantEstimation {
           frf, {scatter, alignment_->of_residuals(info_.sample_rate_hz / info_.period_samples)});
     frf.provenance_json = provenance_->json();
     if (options_.covariance_lines != 1) frf = smooth_covariance(frf, options_.covariance_lines);
-    if (channels_.inputs == frf.inputs.names) return frf;
-    return select_channels(frf, channels_.inputs, frf.outputs.names);
+    const std::vector<std::string> outputs = frf.outputs.names;
+    return select_channels(std::move(frf), channels_.inputs, outputs);
   }
 
   const std::vector<RealizationRuns>& realizations() const noexcept { return realizations_; }

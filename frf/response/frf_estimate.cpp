@@ -121,8 +121,9 @@ Eigen::MatrixXcd output_covariance(const FrfEstimate& frf, Eigen::Index k) {
   return frf.residual_covariance.col(k).reshaped(frf.n_outputs(), frf.n_outputs());
 }
 
-FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
+FrfEstimate select_channels(FrfEstimate frf, const std::vector<std::string>& inputs,
                             const std::vector<std::string>& outputs) {
+  if (frf.inputs.names == inputs && frf.outputs.names == outputs) return frf;
   const Indices input_at = positions(frf.inputs, inputs, "inputs", "input");
   const Indices output_at = positions(frf.outputs, outputs, "outputs", "output");
   Indices entries;

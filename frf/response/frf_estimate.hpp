@@ -155,9 +155,9 @@ FrfEstimate select_band(FrfEstimate frf, double low_hz, double high_hz);
 /// C_E of line k, n_y x n_y. @pre the residual covariance is known
 Eigen::MatrixXcd output_covariance(const FrfEstimate& frf, Eigen::Index k);
 
-/// The named channels, in the given order. @throws std::invalid_argument naming an unknown channel and the existing
+/// The named channels, in the given order; an estimate that is moved in and has them so is not copied. @throws std::invalid_argument naming an unknown channel and the existing
 /// ones.
-FrfEstimate select_channels(const FrfEstimate& frf, const std::vector<std::string>& inputs,
+FrfEstimate select_channels(FrfEstimate frf, const std::vector<std::string>& inputs,
                             const std::vector<std::string>& outputs);
 
 /// Checks that shapes agree, frequencies increase, numbers are finite and variances are not negative.

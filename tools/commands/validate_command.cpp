@@ -83,15 +83,13 @@ void require_channels(const ValidateFlags& flags, const std::vector<std::string>
                   kind, name, flags.model.string(), fmt::join(of_data, ", "));
 }
 
-bool has_channels_of(const AdditiveModel& model, const FrfEstimate& frf) {
-  return frf.inputs.names == model.inputs.names && frf.outputs.names == model.outputs.names;
-}
-
 /// With other channels than the model's, every process reads all of them.
 FrfEstimate read_for(const AdditiveModel& model, const std::filesystem::path& file,
                      const Team* team) {
   FrfEstimate frf = read_frf(file, team);
-  return has_channels_of(model, frf) ? frf : read_frf(file);
+  const bool same =
+      frf.inputs.names == model.inputs.names && frf.outputs.names == model.outputs.names;
+  return same ? frf : read_frf(file);
 }
 
 void validate_model(const ValidateFlags& flags, Console& console) {
@@ -118,9 +116,7 @@ void validate_model(const ValidateFlags& flags, Console& console) {
   const std::vector<Finding> health = health_of(step.frf.provenance_json);
   require_channels(flags, step.frf.outputs.names, model.outputs.names, "output");
   require_channels(flags, step.frf.inputs.names, model.inputs.names, "input");
-  FrfEstimate frf = has_channels_of(model, step.frf)
-                        ? std::move(step.frf)
-                        : select_channels(step.frf, model.inputs.names, model.outputs.names);
+  FrfEstimate frf = select_channels(std::move(step.frf), model.inputs.names, model.outputs.names);
   std::array<double, 2> band_hz = {frf.frequency_hz[0], frf.frequency_hz[frf.lines() - 1]};
   if (model.fit.band_hz[1] > 0.0) std::ranges::copy(model.fit.band_hz, band_hz.begin());
   std::ranges::copy(flags.band_hz, band_hz.begin());  // none or two
