@@ -65,6 +65,11 @@ std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candi
   return out;
 }
 
+int side_of_lines(const FrfEstimate& frf, double frequency_hz) {
+  if (frequency_hz < frf.frequency_hz[0]) return -1;
+  return frequency_hz > frf.frequency_hz[frf.lines() - 1] ? 1 : 0;
+}
+
 bool is_searched_mode(const Submodel& submodel) noexcept {
   return submodel.role == SubmodelRole::searched && submodel.is_mode();
 }

@@ -45,6 +45,9 @@ std::vector<Submodel> fixed_submodels(const FrfEstimate& frf, const ModelStructu
 std::vector<ModeCandidate> without_given(const std::vector<ModeCandidate>& candidates,
                                          const ModelStructure& structure);
 
+/// -1 below the lines, 1 above them, else 0.
+int side_of_lines(const FrfEstimate& frf, double frequency_hz);
+
 /// A mode that was found by a search and may be dropped again.
 bool is_searched_mode(const Submodel& submodel) noexcept;
 

@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/fit/hidden_modes.hpp"
+#include "estimation/fit/ranked_fit.hpp"
+#include "estimation/fit/residue_ranks.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/growth.hpp"
-#include "estimation/search/hidden_modes.hpp"
-#include "estimation/search/ranked_fit.hpp"
-#include "estimation/search/residue_ranks.hpp"
 #include "estimation/search/search_advice.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/search/search_moves.hpp"
 #include "estimation/search/search_start.hpp"
 #include "estimation/search/search_state.hpp"

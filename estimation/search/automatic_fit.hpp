@@ -3,9 +3,9 @@
 #include <memory>
 #include <vector>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/model/cmif.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 
 namespace stageid {
 

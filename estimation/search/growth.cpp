@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "estimation/search/fit_verdict.hpp"
-#include "estimation/search/search_constants.hpp"
+#include "estimation/fit/fit_verdict.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/search/search_moves.hpp"
 
 namespace stageid {
@@ -15,9 +15,8 @@ namespace {
 bool wanted_more(const SearchState& state) {
   const int modes = count_modes(state.best.model);
   if (state.selection.exactly > 0) return modes < state.target;
-  return modes < state.affordable_modes() && state.may_overtake() &&
-         !state.worth.at_rounding(state.best) && state.delay_denied.empty() &&
-         !state.limit_reached();
+  return modes < state.affordable_modes() && state.may_overtake() && !state.at_rounding() &&
+         state.delay_denied.empty() && !state.limit_reached();
 }
 
 FitResult fit_with(const SearchState& state, const std::vector<ProposedMode>& more) {

@@ -114,11 +114,6 @@ Eigen::MatrixXd weighted_residual(const FrfEstimate& frf, const AdditiveModel& m
 
 }  // namespace
 
-int side_of_lines(const FrfEstimate& frf, double frequency_hz) {
-  if (frequency_hz < frf.frequency_hz[0]) return -1;
-  return frequency_hz > frf.frequency_hz[frf.lines() - 1] ? 1 : 0;
-}
-
 std::vector<ProposedMode> proposed_modes(const FrfEstimate& frf, const AdditiveModel& model,
                                          const Eigen::MatrixXd& weights, std::size_t most,
                                          const Workers& workers) {

@@ -9,9 +9,6 @@
 
 namespace stageid {
 
-/// -1 below the lines, 1 above them, else 0.
-int side_of_lines(const FrfEstimate& frf, double frequency_hz);
-
 /// Poles that start beyond the lines start within these factors of their lowest and highest frequency.
 inline constexpr double kBelowBand = 0.5;
 inline constexpr double kAboveBand = 1.8;

@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/mode_worth.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/cmif.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/mode_worth.hpp"
 #include "estimation/search/proposed_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/search/trials.hpp"
 

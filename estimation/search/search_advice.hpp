@@ -1,7 +1,7 @@
 #pragma once
 
+#include "estimation/fit/fit_verdict.hpp"
 #include "estimation/problem/fit_options.hpp"
-#include "estimation/search/fit_verdict.hpp"
 #include "frf/response/frf_estimate.hpp"
 
 namespace stageid {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/problem/fit_problem.hpp"
 #include "estimation/problem/fit_start.hpp"
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/search/structure_moves.hpp"
 #include "estimation/search/trials.hpp"
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
-#include "estimation/search/search_constants.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/search/trials.hpp"
 #include "estimation/start/pole_relocation.hpp"
 

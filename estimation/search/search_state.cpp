@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/search/search_constants.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/search/trials.hpp"
 
 namespace stageid {

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "estimation/fit/mode_worth.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "estimation/search/mode_worth.hpp"
 #include "estimation/search/proposed_modes.hpp"
 
 namespace stageid {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
 
 namespace stageid {
 namespace {

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/modal/line_correlation.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/search/proposed_modes.hpp"
 #include "estimation/search/search_advice.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/mode_shape_deviation.hpp"
 

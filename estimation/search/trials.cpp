@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/fit_problem.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "frf/response/channel_positions.hpp"
 
 namespace stageid {

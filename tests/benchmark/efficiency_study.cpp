@@ -16,7 +16,7 @@
 #include <cmath>
 #include <vector>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/benchmark/arguments.hpp"
 #include "tests/support/models/cramer_rao_bound.hpp"
 #include "tests/support/models/model_blind_fit.hpp"

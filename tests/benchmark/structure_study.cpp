@@ -19,8 +19,8 @@
 #include <cstring>
 #include <vector>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/model_reference.hpp"
 #include "tests/support/stages/dense_plant.hpp"
 #include "tests/support/stages/varied_plant.hpp"

@@ -21,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/tracking/model_tracker.hpp"
 #include "estimation/tracking/tracked_response.hpp"
 #include "frf/response/line_estimate.hpp"

@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 
 namespace stageid::test {

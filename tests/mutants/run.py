@@ -28,7 +28,7 @@ MUTANTS = [
      'factor * scatter * factor.adjoint()', 'factor * scatter * factor.transpose()', ['frf']),
     ('factor one half in the variance', 'frf/plant/plant_average.cpp',
      'frf.noise_variance = noise_sum_ / (M * M)', 'frf.noise_variance = 0.5 * noise_sum_ / (M * M)', ['frf']),
-    ('lines of a zippered fit taken for independent', 'estimation/search/fit_additive_model.cpp',
+    ('lines of a zippered fit taken for independent', 'estimation/fit/fit_additive_model.cpp',
      'raise(covariance, frf.correlated_lines);', 'raise(covariance, 1.0);', ['estimation']),
     ('a pole in the mean costs no degrees of freedom', 'frf/statistics/local_fit.cpp',
      'mean.variance_dof = variance_dof(problem, fits, share);', 'mean.variance_dof = mean.dof + 0.0 * variance_dof(problem, fits, share);', ['frf']),

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "tools/terminal/console.hpp"
 #include "tools/terminal/json.hpp"
 

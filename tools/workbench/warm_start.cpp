@@ -2,9 +2,9 @@
 
 #include <memory>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 
 namespace stageid {
 

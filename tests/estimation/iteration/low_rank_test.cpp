@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "estimation/equations/residue_form.hpp"
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 #include "tests/support/models/expect_same_fit.hpp"

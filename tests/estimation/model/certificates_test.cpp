@@ -6,9 +6,9 @@
 #include <numbers>
 #include <vector>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/model/basis.hpp"
 #include "estimation/model/hold_integral.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "tests/support/models/certificate.hpp"
 #include "tests/support/models/model_fit_problem.hpp"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/estimation/covariance_stage.hpp"
 
 namespace stageid::test_parameter_bounds {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/request/fit_request.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/varied_plant.hpp"
 

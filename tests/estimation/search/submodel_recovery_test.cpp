@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/estimation/submodel_cases.hpp"
 
 namespace stageid::test_submodel_recovery {

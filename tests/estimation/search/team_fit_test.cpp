@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "estimation/equations/arrow_system.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/support/models/divided_frf.hpp"
 #include "tests/support/models/expect_same_fit.hpp"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/support/models/cramer_rao_bound.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/random_stage.hpp"

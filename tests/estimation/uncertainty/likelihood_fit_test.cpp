@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "estimation/equations/joint_equations.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/support/models/expect_same_fit.hpp"

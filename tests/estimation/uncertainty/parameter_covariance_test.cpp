@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/estimation/correlated_stage.hpp"
 #include "tests/estimation/covariance_stage.hpp"
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/support/stages/random_stage.hpp"
 
 namespace stageid::test {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/support/models/estimate_trials.hpp"
 
 /// Fits of one loop, measured from rest again and again with other noise.

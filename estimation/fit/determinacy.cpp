@@ -1,14 +1,14 @@
-#include "estimation/search/determinacy.hpp"
+#include "estimation/fit/determinacy.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "estimation/fit/mode_worth.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/model/poles.hpp"
-#include "estimation/search/mode_worth.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "estimation/uncertainty/parameter_covariance.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 

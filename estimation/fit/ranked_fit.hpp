@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "estimation/search/fit_verdict.hpp"
+#include "estimation/fit/fit_verdict.hpp"
 
 namespace stageid {
 

@@ -1,10 +1,10 @@
 // Modes that noise hides: which are, what becomes of their poles, and what shrinking their numerators is worth.
 
-#include "estimation/search/hidden_modes.hpp"
+#include "estimation/fit/hidden_modes.hpp"
 
 #include <gtest/gtest.h>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 

@@ -1,4 +1,4 @@
-#include "estimation/search/fit_verdict.hpp"
+#include "estimation/fit/fit_verdict.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

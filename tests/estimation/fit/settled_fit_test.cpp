@@ -1,6 +1,6 @@
 // A search may take noise for a mode, and such a mode may keep the last fit from converging.
 
-#include "estimation/search/settled_fit.hpp"
+#include "estimation/fit/settled_fit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <complex>
 #include <numbers>
 
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/mode_worth.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/mode_worth.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 
 namespace stageid::test_settled_fit {

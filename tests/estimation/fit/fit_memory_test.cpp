@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/problem/fit_start.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/support/process/heap_use.hpp"
 #include "tests/support/stages/random_stage.hpp"

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 #include "tests/support/stages/random_stage.hpp"
 

@@ -1,10 +1,10 @@
-#include "estimation/search/hidden_modes.hpp"
+#include "estimation/fit/hidden_modes.hpp"
 
 #include <algorithm>
 
 #include "estimation/equations/numerators.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "frf/response/neighbour_scatter.hpp"
 #include "frf/statistics/distributions.hpp"
 

@@ -1,4 +1,4 @@
-#include "estimation/search/overlapping_modes.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
 
 #include <gtest/gtest.h>
 

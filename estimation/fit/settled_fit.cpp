@@ -1,4 +1,4 @@
-#include "estimation/search/settled_fit.hpp"
+#include "estimation/fit/settled_fit.hpp"
 
 #include <fmt/format.h>
 
@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/mode_worth.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/mode_worth.hpp"
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 namespace {

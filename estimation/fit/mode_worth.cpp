@@ -1,11 +1,10 @@
-#include "estimation/search/mode_worth.hpp"
+#include "estimation/fit/mode_worth.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/problem/fit_problem.hpp"
-#include "estimation/search/proposed_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 
 namespace stageid {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 #include "tests/support/models/expect_same_fit.hpp"

@@ -1,4 +1,4 @@
-#include "estimation/search/residue_ranks.hpp"
+#include "estimation/fit/residue_ranks.hpp"
 
 #include <fmt/format.h>
 
@@ -12,8 +12,8 @@
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/residue_form.hpp"
 #include "estimation/equations/weighted_low_rank.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "frf/statistics/distributions.hpp"
 
 namespace stageid {

@@ -1,14 +1,14 @@
-#include "estimation/search/coincident_modes.hpp"
+#include "estimation/fit/coincident_modes.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 
 namespace stageid {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/search/structured_fit.hpp"
 #include "tests/estimation/noisy_stage.hpp"
 #include "tests/support/process/error_message.hpp"

@@ -1,7 +1,7 @@
 // Structures that the data do not support: the fit ends, names the submodel, and returns neither an unstable pole nor
 // a number that is not finite.
 
-#include "estimation/search/determinacy.hpp"
+#include "estimation/fit/determinacy.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

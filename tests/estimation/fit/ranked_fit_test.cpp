@@ -1,15 +1,15 @@
 // Modes at the same frequency: the required rank of a residue, and the result of a fit with rank one.
 
-#include "estimation/search/ranked_fit.hpp"
+#include "estimation/fit/ranked_fit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "estimation/fit/coincident_modes.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 #include "estimation/search/automatic_fit.hpp"
-#include "estimation/search/coincident_modes.hpp"
-#include "estimation/search/fit_additive_model.hpp"
 #include "excitation/decompositions/decompositions.hpp"
 #include "tests/support/models/model_fit_problem.hpp"
 

@@ -1,4 +1,4 @@
-#include "estimation/search/ranked_fit.hpp"
+#include "estimation/fit/ranked_fit.hpp"
 
 #include <fmt/format.h>
 
@@ -7,14 +7,14 @@
 #include <utility>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/fit/coincident_modes.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/mode_worth.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
+#include "estimation/fit/settled_fit.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/coincident_modes.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/mode_worth.hpp"
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
-#include "estimation/search/settled_fit.hpp"
 
 namespace stageid {
 namespace {

@@ -1,4 +1,4 @@
-#include "estimation/search/mode_worth.hpp"
+#include "estimation/fit/mode_worth.hpp"
 
 #include <gtest/gtest.h>
 

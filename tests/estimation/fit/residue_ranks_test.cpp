@@ -1,6 +1,6 @@
 // The rank of a residue that its standard deviations require, also where there are many outputs and inputs.
 
-#include "estimation/search/residue_ranks.hpp"
+#include "estimation/fit/residue_ranks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "estimation/search/fit_verdict.hpp"
+#include "estimation/fit/fit_verdict.hpp"
 
 #include <fmt/format.h>
 
@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "acquisition/files/counted.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
+#include "estimation/fit/mode_worth.hpp"
+#include "estimation/fit/overlapping_modes.hpp"
+#include "estimation/fit/search_constants.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/problem/search_limit.hpp"
-#include "estimation/search/fit_additive_model.hpp"
-#include "estimation/search/mode_worth.hpp"
-#include "estimation/search/overlapping_modes.hpp"
-#include "estimation/search/search_constants.hpp"
 #include "frf/statistics/order_statistic.hpp"
 
 namespace stageid {

@@ -1,4 +1,4 @@
-#include "estimation/search/fit_additive_model.hpp"
+#include "estimation/fit/fit_additive_model.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +9,10 @@
 
 #include "acquisition/files/counted.hpp"
 #include "estimation/equations/numerators.hpp"
+#include "estimation/fit/determinacy.hpp"
+#include "estimation/fit/hidden_modes.hpp"
+#include "estimation/fit/ranked_fit.hpp"
+#include "estimation/fit/residue_ranks.hpp"
 #include "estimation/iteration/fit_iteration.hpp"
 #include "estimation/model/model_structure.hpp"
 #include "estimation/model/poles.hpp"
@@ -17,10 +21,6 @@
 #include "estimation/problem/residual.hpp"
 #include "estimation/problem/search_limit.hpp"
 #include "estimation/problem/weight_matrices.hpp"
-#include "estimation/search/determinacy.hpp"
-#include "estimation/search/hidden_modes.hpp"
-#include "estimation/search/ranked_fit.hpp"
-#include "estimation/search/residue_ranks.hpp"
 #include "estimation/start/delay_search.hpp"
 #include "estimation/uncertainty/dense_covariance.hpp"
 #include "estimation/uncertainty/low_rank_covariance.hpp"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimation/search/fit_verdict.hpp"
+#include "estimation/fit/fit_verdict.hpp"
 
 namespace stageid {
 
