@@ -15,7 +15,8 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
-# name, file, text, its replacement, test programs that should notice
+DAYS = ['acquisition:SimulatedDays.*']
+# name, file, text, its replacement, test programs that should notice, or PROGRAM:TESTS
 MUTANTS = [
     ('transient not dropped', 'frf/runs/run_periods.cpp',
      'wanted = (used_.transient_periods + p) * N_ - lost;', 'wanted = p * N_ - lost;', ['frf']),
@@ -105,6 +106,43 @@ MUTANTS = [
      'crc != block.header.payload_crc', 'false', ['acquisition']),
     ('slew limit not enforced', 'hal/stage/limited_stage.cpp',
      'std::abs(wanted - last) > step', 'std::abs(wanted - last) > 1e9 * step', ['hal']),
+    # What a simulated day finds.
+    ('forces beyond the thermal limit', 'hal/stage/limited_stage.cpp', 'std::min(largest, warm)', 'largest', DAYS),
+    ('forces faster than the slew limit', 'hal/stage/limited_stage.cpp',
+     'std::clamp(wanted, last - step, last + step)', 'wanted', DAYS),
+    ('the stage is not stopped', 'acquisition/loop/measurement_loop.cpp', 'stage_.stop();', '', DAYS),
+    ('a run that was stopped is complete', 'acquisition/loop/run_experiment.cpp',
+     'run.complete = loop_.complete() && loop_.reason() != StopReason::log', 'run.complete = true', DAYS),
+    ('a resumed log numbers its runs anew', 'acquisition/slog/slog_writer.cpp',
+     'runs = block.header.run + 1', 'runs = block.header.run', DAYS),
+    ('a resumed log repeats a sequence number', 'acquisition/slog/slog_appender.cpp',
+     'next_sequence_ = next_sequence;', 'next_sequence_ = next_sequence - 1;', DAYS),
+    ('a row has the measurement after its command', 'acquisition/loop/measurement_loop.cpp',
+     'take_measurement(outcome); if (wall_clock_) [[unlikely]]',
+     'std::copy(fresh_.begin(), fresh_.end(), row + u_.size()); take_measurement(outcome); if (wall_clock_)', DAYS),
+    ('the command in the log, not the force', 'acquisition/loop/measurement_loop.cpp',
+     '!inputs_.applied.empty()', 'false', DAYS),
+    ('an old answer of the bus is taken', 'hal/can/can_stage.cpp',
+     'header.sequence != expected_ || (frames_seen_', '(frames_seen_', DAYS),
+    ('a repeated setpoint moves the stage', 'hal/can/can_node.cpp',
+     'distance(header.sequence, last_sequence_) <= 0', 'distance(header.sequence, last_sequence_) < 0', DAYS),
+    ('a complete run is not synchronized', 'acquisition/loop/log_thread.cpp',
+     'log_.synchronize(); complete_runs_', 'complete_runs_', DAYS),
+    ('a sensor beyond its hard window is ignored', 'hal/stage/limit_guard.cpp',
+     'std::abs(y) > limits_.hard_window_m[i]', 'false', DAYS),
+    ('bad cycles are not counted', 'acquisition/loop/measurement_loop.cpp', 'kBadCycle = 2', 'kBadCycle = 0', DAYS),
+    ('the watchdog of a node sleeps', 'hal/node/stage_node.cpp',
+     'now_ns - last_sample_ns_ > watchdog_ns_', 'false', DAYS),
+    ('the last row of a block is lost', 'acquisition/loop/log_thread.cpp',
+     'log_.write(rows)', 'log_.write(rows.first(rows.size() - ring_.row_words()))', DAYS),
+    ('recovered rows at wrong places', 'acquisition/slog/slog_recover.cpp',
+     '!fill(block.header.first_row)', 'false', DAYS),
+    ('an interrupt is forgotten', 'acquisition/loop/run_experiment.cpp',
+     'if (interrupted()) loop_.request_stop', 'if (false) loop_.request_stop', DAYS),
+    ('a log that failed is taken for written', 'acquisition/loop/run_experiment.cpp',
+     'if (log_.failed()) take_log_failure();', '', DAYS),
+    ('the excitation of another run', 'acquisition/loop/run_experiment.cpp',
+     'plan_.excitation(id), actuators_', 'plan_.excitation(runs_.front()), actuators_', DAYS),
 ]
 
 
@@ -123,11 +161,12 @@ def run(*command, **options):
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
 
 
-def test(build, folder):
+def test(build, tests):
     """(compiled, passed, first failing test)"""
+    folder, _, only = tests.partition(':')
     if run('ninja', '-C', build, f'{folder}_tests').returncode != 0:
         return False, False, ''
-    result = run(f'{build}/tests/{folder}/{folder}_tests', '--gtest_brief=1', timeout=600)
+    result = run(f'{build}/tests/{folder}/{folder}_tests', '--gtest_brief=1', f'--gtest_filter={only or "*"}', timeout=600)
     failed = re.findall(r'\[  FAILED  \] (\S+)', result.stdout)
     return True, result.returncode == 0, failed[0] if failed else f'exit code {result.returncode}'
 

@@ -16,8 +16,11 @@ namespace stageid::test {
 class RandomNumbers {
  public:
   explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
+  std::uint64_t number() {
+    return splitmix64(std::exchange(state_, state_ + kSplitMix64Increment));
+  }
   double uniform(double low = 0.0, double high = 1.0) {
-    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
+    return low + (high - low) * static_cast<double>(number() >> 11) * 0x1p-53;
   }
   int integer(int low, int high) {  ///< both included
     return low + static_cast<int>(uniform() * static_cast<double>(high - low + 1));
@@ -44,8 +47,6 @@ class RandomNumbers {
   }
 
  private:
-  std::uint64_t next() { return splitmix64(std::exchange(state_, state_ + kSplitMix64Increment)); }
-
   std::uint64_t state_;
 };
 

@@ -1,0 +1,547 @@
+#include "tests/acquisition/days/simulated_day.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "acquisition/files/file_error.hpp"
+#include "acquisition/slog/slog_reader.hpp"
+#include "acquisition/slog/slog_recover.hpp"
+#include "acquisition/slog/slog_writer.hpp"
+#include "hal/can/can_node.hpp"
+#include "hal/can/can_stage.hpp"
+#include "tests/acquisition/days/stage_witness.hpp"
+#include "tests/hal/can/altered_can.hpp"
+#include "tests/support/process/random_numbers.hpp"
+#include "tests/support/process/temporary_directory.hpp"
+#include "tests/support/stages/can_pair.hpp"
+#include "tests/support/stages/stop_case.hpp"
+
+namespace stageid::test {
+
+namespace {
+
+constexpr int kPeriod = 400;
+constexpr double kActuatorRange_n = 1.25 * kStopForce;
+constexpr double kSensorRange_m = 4.0 * kStopWindow;
+constexpr double kCounts = 1 << 23;  // of a range in a CAN frame
+
+/// One axis whose limits of all kinds are a few times what a healthy experiment needs.
+SimulatedSpec day_stage(bool predicted) {
+  SimulatedSpec spec = stop_stage_spec();
+  if (!predicted) spec.limits.motion = {};
+  spec.limits.slew_n_s = Eigen::VectorXd::Constant(1, 4e5);
+  spec.limits.thermal_rms_n = Eigen::VectorXd::Constant(1, 100.0);
+  spec.limits.thermal_time_constant_s = 0.05;
+  return spec;
+}
+
+ExperimentPlan day_plan(RandomNumbers& random, const SimulatedSpec& stage, double level_n) {
+  ExperimentSpec spec;
+  spec.axes = {{stage.info.actuators[0].name, level_n, {}}};
+  spec.realizations = random.integer(2, 6);
+  spec.periods = random.integer(1, 3);
+  spec.transient_periods = random.integer(0, 1);
+  spec.seed = static_cast<std::uint64_t>(random.integer(0, 1 << 30));
+  return {
+      FrequencyGrid::band(stage.info.sample_rate_hz, kPeriod, {.low_hz = 50.0, .high_hz = 1000.0}),
+      spec};
+}
+
+/// What goes wrong in one attempt, and when: counted in exchanges of the attempt, or calls of the log.
+struct Misfortune {
+  std::set<Trouble> troubles;
+  std::uint64_t at = 0;
+  int log_call = -1;
+  double frames_spoiled = 0.0;
+  SimulationSpec::Fault fault;
+
+  bool has(Trouble trouble) const { return troubles.contains(trouble); }
+  std::string describe() const {
+    std::string text;
+    for (const Trouble trouble : troubles) text += fmt::format("{}, ", to_string(trouble));
+    return text + fmt::format("exchange {}, call {} of the log, fault {} {} from {} of run {}", at,
+                              log_call, to_string(fault.kind), fault.value, fault.from_cycle,
+                              fault.run);
+  }
+};
+
+SimulationSpec::Fault draw_fault(RandomNumbers& random, std::uint64_t samples) {
+  using Kind = SimulationSpec::Fault::Kind;
+  struct Choice {
+    Kind kind;
+    double low;
+    double high;
+  };
+  static constexpr std::array kChoices = {
+      Choice{Kind::dead_sensor, 0, 0},          Choice{Kind::nan_sensor, 0, 0},
+      Choice{Kind::missed_cycle, 0, 0},         Choice{Kind::interlock, 0, 0},
+      Choice{Kind::stuck_actuator, 0, 0},       Choice{Kind::stuck_sensor, 0, 0},
+      Choice{Kind::sensor_offset, -3e-4, 3e-4}, Choice{Kind::sensor_drift, -1e-2, 1e-2},
+      Choice{Kind::actuator_gain, -3.0, 3.0},   Choice{Kind::extra_delay, 1, 40},
+      Choice{Kind::sensor_gain, -1.0, 3.0},     Choice{Kind::sensor_noise, 1, 1e4}};
+  const Choice& choice =
+      kChoices[static_cast<std::size_t>(random.integer(0, static_cast<int>(kChoices.size()) - 1))];
+  SimulationSpec::Fault fault;
+  fault.kind = choice.kind;
+  fault.from_cycle = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples));
+  fault.cycles = static_cast<std::uint64_t>(random.integer(1, 30));
+  fault.run = random.integer(0, 2);
+  fault.value = random.uniform(choice.low, choice.high);
+  if (fault.kind == Kind::extra_delay) fault.value = std::round(fault.value);
+  return fault;
+}
+
+Misfortune draw_misfortune(RandomNumbers& random, bool over_can, const ExperimentPlan& plan) {
+  std::vector<Trouble> possible = {Trouble::stage_fault, Trouble::stage_fault, Trouble::loud,
+                                   Trouble::interrupted, Trouble::tripped,     Trouble::disk};
+  if (over_can)
+    possible.insert(possible.end(),
+                    {Trouble::wire, Trouble::cut, Trouble::bus, Trouble::interlock});
+  Misfortune out;
+  for (int n = random.integer(0, 2); n >= 0; --n)
+    out.troubles.insert(possible[static_cast<std::size_t>(
+        random.integer(0, static_cast<int>(possible.size()) - 1))]);
+  if (random.uniform() < 0.5) out.troubles.insert(Trouble::killed);
+  const auto samples = static_cast<std::uint64_t>(plan.samples_per_run());
+  const auto runs = plan.runs().size();
+  out.at = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples * runs));
+  out.log_call = random.integer(0, 4 * static_cast<int>(runs));
+  out.frames_spoiled = std::pow(10.0, random.uniform(-4.0, -0.7));
+  out.fault = draw_fault(random, samples);
+  return out;
+}
+
+/// A log on a disk that may fail. It knows what was synchronized when.
+class DiskLog final : public RunWriter {
+ public:
+  struct Synchronized {
+    std::uint64_t bytes = 0;
+    int complete_runs = 0;
+  };
+
+  static constexpr std::size_t kBlockRows = 100;
+
+  DiskLog(SlogWriter& log, int failing_call)
+      : log_(log), calls_left_(failing_call), synchronized_({{log.bytes(), 0}}) {}
+
+  const LogInfo& info() const noexcept override { return log_.info(); }
+  void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) override {
+    use();
+    log_.begin_run(run, excitation);
+  }
+  void write(std::span<const double> rows) override {
+    use();
+    // Smaller blocks than those of real logs, so that few of them can be lost.
+    const std::size_t block = kBlockRows * slog_row_words(info());
+    for (; !rows.empty(); rows = rows.subspan(std::min(block, rows.size())))
+      log_.write(rows.first(std::min(block, rows.size())));
+  }
+  void end_run(const LogRun& run) override {
+    use();
+    log_.end_run(run);
+    complete_runs_ += run.complete ? 1 : 0;
+  }
+  void synchronize() override {
+    log_.synchronize();
+    synchronized_.push_back({log_.bytes(), complete_runs_});
+  }
+
+  /// The last state of the medium that is certain when so many bytes were written.
+  Synchronized before(std::uint64_t bytes) const {
+    Synchronized last = synchronized_.front();
+    for (const Synchronized& state : synchronized_)
+      if (state.bytes <= bytes) last = state;
+    return last;
+  }
+  std::uint64_t bytes_before() const { return synchronized_.front().bytes; }
+
+ private:
+  void use() {
+    if (calls_left_-- == 0) throw FileError("the log cannot be written: the disk is full");
+  }
+
+  SlogWriter& log_;
+  int calls_left_;
+  int complete_runs_ = 0;
+  std::vector<Synchronized> synchronized_;
+};
+
+/// The host's stage, directly or over CAN. The simulated stage is at the far end, behind the witness.
+class DayLink {
+ public:
+  DayLink(SimulatedSpec spec, bool over_can, const Misfortune& misfortune, Testimony& testimony,
+          RandomNumbers& random)
+      : spec_(std::move(spec)), misfortune_(misfortune), random_(random) {
+    auto witness = std::make_unique<StageWitness>(
+        simulated(spec_), complete_limits(spec_.limits, spec_.info), testimony,
+        [this](std::uint64_t exchange) { strike(exchange); });
+    if (!over_can) {
+      host_ = std::make_unique<LimitedStage>(std::move(witness), spec_.limits);
+      return;
+    }
+    CanSpec can;
+    can.buses.push_back({"pair0", 10e6, 80e6, {0}, {0}});  // virtual: 10 kHz fit
+    can.actuator_range_n = {kActuatorRange_n};
+    can.sensor_range_m = {kSensorRange_m};
+    node_ = std::make_unique<StageNode>(std::move(witness), spec_.limits, spec_.controller,
+                                        NodePanel{}, NodeOptions{.watchdog_s = can.watchdog_s});
+    node_bus_ = std::make_unique<AlteredCan>(pair_.node(), spoil());
+    front_ = std::make_unique<CanNode>(*node_, can_layout(can, spec_.info), *node_bus_);
+    pair_.when_host_waits([this] { serve(); });
+    host_ = std::make_unique<LimitedStage>(
+        std::make_unique<CanStage>(spec_.info, can,
+                                   std::make_unique<AlteredCan>(pair_.host(), spoil()),
+                                   CanHostOptions{.reset_fault = true}),
+        spec_.limits);
+  }
+  DayLink(DayLink&&) = delete;
+
+  LimitedStage& host() { return *host_; }
+  std::atomic<bool> interrupt = false;
+  std::atomic<bool> tripped = false;
+
+  /// The host is gone; a node notices it by itself.
+  void pass_rest() {
+    if (node_ == nullptr) return;
+    for (int ms = 0; ms < kRest_ms; ++ms) {
+      pair_.pass_time(1'000'000);
+      serve();
+    }
+  }
+
+ private:
+  static constexpr int kRest_ms = 1000;
+
+  void strike(std::uint64_t exchange) {
+    if (exchange != misfortune_.at) return;
+    struck_ = true;
+    if (misfortune_.has(Trouble::interrupted)) interrupt = true;
+    if (misfortune_.has(Trouble::tripped)) tripped = true;
+  }
+
+  void serve() {
+    if (std::exchange(struck_, false)) {
+      cut_ = misfortune_.has(Trouble::cut);
+      if (misfortune_.has(Trouble::bus)) pair_.set_state(0, CanBusState::off);
+      if (misfortune_.has(Trouble::interlock)) {
+        NodePanel open;
+        open.interlock_closed = false;
+        node_->set_panel(open);
+      }
+    }
+    front_->serve(0);
+  }
+
+  AlteredCan::Alter spoil() {
+    return [this, late = std::optional<CanFrame>{}](std::span<CanFrame> frames,
+                                                    std::size_t count) mutable {
+      if (cut_) return std::size_t{0};
+      if (!misfortune_.has(Trouble::wire)) return count;
+      std::vector<CanFrame> after;
+      if (late && random_.uniform() < 0.5) after.push_back(*std::exchange(late, {}));
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        CanFrame& frame = frames[kept++] = frames[i];
+        switch (random_.uniform() < misfortune_.frames_spoiled ? random_.integer(0, 5) : -1) {
+          case 0:
+            frame.data[static_cast<std::size_t>(random_.integer(0, 63))] ^= 4;
+            break;
+          case 1:
+            frame.length /= 2;
+            break;
+          case 2:
+            frame.id ^= 1;
+            break;
+          case 3:
+            after.push_back(frame);  // arrives twice
+            break;
+          case 4:
+            late = frame;
+            [[fallthrough]];
+          case 5:
+            --kept;  // lost
+            break;
+          default:
+            break;
+        }
+      }
+      for (const CanFrame& frame : after)
+        if (kept < frames.size()) frames[kept++] = frame;
+      return kept;
+    };
+  }
+
+  SimulatedSpec spec_;
+  const Misfortune& misfortune_;
+  RandomNumbers& random_;
+  CanPair pair_{{"pair0"}};
+  std::unique_ptr<StageNode> node_;
+  std::unique_ptr<CanTransport> node_bus_;
+  std::unique_ptr<CanNode> front_;
+  std::unique_ptr<LimitedStage> host_;
+  bool struck_ = false;
+  bool cut_ = false;
+};
+
+/// One experiment: a plan, its log and the attempts to complete it.
+class DayExperiment {
+ public:
+  DayExperiment(RandomNumbers& random, const std::filesystem::path& directory, DayReport& report)
+      : random_(random),
+        over_can_(random.uniform() < 0.6),
+        stage_(day_stage(random.uniform() < 0.5)),
+        plan_(day_plan(random, stage_, 10.0)),
+        directory_(directory),
+        file_(directory / "0.slog"),
+        report_(report) {}
+
+  void perform() {
+    for (int attempts = random_.integer(1, 4); attempts > 0 && !complete(); --attempts)
+      attempt(draw_misfortune(random_, over_can_, plan_), RandomNumbers(random_.number()));
+    if (!complete()) attempt({}, RandomNumbers(0));
+    if (!complete()) blame("the experiment is not complete after an attempt without trouble");
+  }
+
+ private:
+  static constexpr double kLoud = 15.0;
+
+  bool complete() const { return done_.size() == plan_.runs().size(); }
+
+  /// How much is drawn from `random` may depend on when the loop notices that the log has failed.
+  void attempt(const Misfortune& misfortune, RandomNumbers random) {
+    ++report_.attempts;
+    misfortune_ = misfortune.describe();
+    for (const Trouble trouble : misfortune.troubles) ++report_.troubles[trouble];
+    SimulatedSpec spec = stage_;
+    if (misfortune.has(Trouble::stage_fault)) spec.simulation.faults = {misfortune.fault};
+    spec.controller.axes[2].gain *=
+        misfortune.has(Trouble::loud) ? random.uniform(1.0, kLoud) : 1.0;
+    testimony_ = {};
+    DayLink link(spec, over_can_, misfortune, testimony_, random);
+    MotionController controller(spec.controller);
+    const LogInfo info = experiment_log_info(plan_, link.host().info());
+    std::optional<SlogWriter> log = open(info);
+    DiskLog disk(*log, misfortune.has(Trouble::disk) ? misfortune.log_call : -1);
+    const ExperimentResult result = run_experiment(plan_, link.host(), controller, disk,
+                                                   {.skip = {done_.begin(), done_.end()},
+                                                    .interrupt = &link.interrupt,
+                                                    .plant_tripped = &link.tripped,
+                                                    .ramp_s = 0.01});
+    link.pass_rest();
+    if (testimony_.running) blame("the stage is not at rest");
+    for (const std::string& broken : testimony_.broken) blame(broken);
+    ++report_.ends[result.end];
+    report_.cycles += result.health.cycles;
+    judge_end(result, misfortune);
+    for (WitnessedRun& run : testimony_.runs) witnessed_.emplace(run.seed, std::move(run));
+    const bool killed = misfortune.has(Trouble::killed) || result.end == ExperimentEnd::log_failed;
+    if (!killed) log->close(0, result.message.c_str());
+    const std::uint64_t bytes = log->bytes();
+    log.reset();
+    check_log(logged_runs_, false);
+    const std::size_t before = done_.size();
+    done_ = complete_runs();
+    if (done_.size() != before + static_cast<std::size_t>(result.runs_done))
+      blame(fmt::format("{} complete runs were reported, the log has {} more", result.runs_done,
+                        static_cast<int>(done_.size()) - static_cast<int>(before)));
+    if (killed) {
+      const bool at_end = random.uniform() < 0.5;  // when it had reported
+      const auto part = at_end ? 0.0 : random.uniform();
+      const auto written = bytes - static_cast<std::uint64_t>(
+                                       part * static_cast<double>(bytes - disk.bytes_before()));
+      const DiskLog::Synchronized medium = disk.before(written);
+      tear(medium.bytes, written, random);
+      done_ = complete_runs();
+      const int certain = at_end ? result.runs_done : medium.complete_runs;
+      if (done_.size() < before + static_cast<std::size_t>(certain))
+        blame("a complete run is lost");
+    }
+  }
+
+  /// As `stageid run --resume` does, or after `stageid log recover`.
+  SlogWriter open(const LogInfo& info) {
+    if (!std::filesystem::exists(file_)) return SlogWriter::create(file_, info);
+    const auto resume = [&] {
+      SlogWriter log = SlogWriter::resume(file_, info);
+      check_log(0, true);
+      logged_runs_ = SlogReader(file_, false).runs().size();
+      if (complete_runs() != done_) blame("the resumed log has other complete runs");
+      return log;
+    };
+    try {
+      return resume();
+    } catch (const FormatError&) {
+      const auto recovered = directory_ / fmt::format("{}.slog", ++recoveries_);
+      recover_log(file_, recovered);
+      file_ = recovered;
+    }
+    return resume();
+  }
+
+  std::set<RunId> complete_runs() const {
+    const SlogReader reader(file_, false);
+    std::set<RunId> runs;
+    for (const LogRun& run : reader.runs())
+      if (run.complete) runs.insert({run.realization, run.experiment});
+    return runs;
+  }
+
+  void judge_end(const ExperimentResult& result, const Misfortune& misfortune) {
+    const auto has = [&](std::initializer_list<Trouble> causes) {
+      return std::any_of(causes.begin(), causes.end(),
+                         [&](Trouble cause) { return misfortune.has(cause); });
+    };
+    using enum Trouble;
+    bool plausible = true;
+    switch (result.end) {
+      case ExperimentEnd::complete:
+        plausible =
+            done_.size() + static_cast<std::size_t>(result.runs_done) == plan_.runs().size() &&
+            !must_stop(misfortune);
+        break;
+      case ExperimentEnd::interrupted:
+        plausible = has({interrupted});
+        break;
+      case ExperimentEnd::log_failed:
+        plausible = has({disk});
+        break;
+      case ExperimentEnd::limit:
+        plausible = has({stage_fault, loud, wire, cut, bus});
+        break;
+      case ExperimentEnd::fault:
+        plausible = has({stage_fault, loud, wire, cut, bus, interlock, tripped});
+        break;
+    }
+    if (!plausible)
+      blame(fmt::format("ended with {} ({})", static_cast<int>(result.end), result.message));
+    if (result.message.empty()) blame("ended without a message");
+  }
+
+  /// Whether something happened within the samples of a run that no run survives.
+  bool must_stop(const Misfortune& misfortune) const {
+    using enum Trouble;
+    using Kind = SimulationSpec::Fault::Kind;
+    const auto samples = static_cast<std::uint64_t>(plan_.samples_per_run());
+    const SimulationSpec::Fault& fault = misfortune.fault;
+    const bool fatal = misfortune.has(stage_fault) &&
+                       (fault.kind == Kind::interlock || fault.kind == Kind::nan_sensor ||
+                        fault.kind == Kind::dead_sensor);
+    const auto run = static_cast<std::size_t>(fault.run);
+    constexpr std::uint64_t kNoticed = 20;  // cycles later at the latest
+    if (fatal && run < testimony_.runs.size() && fault.from_cycle + kNoticed < samples) return true;
+    std::uint64_t first = 0;
+    for (const WitnessedRun& witnessed : testimony_.runs) {
+      const std::uint64_t end = first + witnessed.u.size();
+      if (misfortune.at >= first && misfortune.at < end)
+        return misfortune.at - first + kNoticed < samples &&
+               (misfortune.has(interrupted) || misfortune.has(tripped) || misfortune.has(cut) ||
+                misfortune.has(bus) || misfortune.has(interlock));
+      first = end;
+    }
+    return false;
+  }
+
+  /// Compares the runs from this one on with what the stage did. `damaged`: rows may be lost, and are marked.
+  void check_log(std::size_t run, bool damaged) {
+    const SlogReader reader(file_, false);
+    if (!damaged && !reader.damage().empty()) blame("the log is damaged");
+    for (; run < reader.runs().size(); ++run) {
+      const LogRun& logged = reader.runs()[run];
+      const RunId id{logged.realization, logged.experiment};
+      if (damaged && id.realization < 0) continue;  // its beginning is lost
+      LogSamples samples;
+      reader.read(run, 0, logged.samples, samples);
+      const auto marked = static_cast<std::uint64_t>((samples.marked != 0).count());
+      if (logged.complete && marked != logged.health.marked)
+        blame(fmt::format("{} samples are marked, the end of the run says {}", marked,
+                          logged.health.marked));
+      if (logged.complete && logged.samples != static_cast<std::uint64_t>(plan_.samples_per_run()))
+        blame("a complete run is too short or too long");
+      if (!damaged && reader.excitation(run) != plan_.excitation(id))
+        blame("the log has another excitation");
+      const auto [first, last] = witnessed_.equal_range(run_seed(plan_.spec().seed, id));
+      if (logged.samples > 0 && std::none_of(first, last, [&](const auto& witnessed) {
+            return is_record_of(samples, witnessed.second, damaged);
+          }))
+        blame(fmt::format("run {}.{} is not what the stage did", id.realization, id.experiment));
+    }
+  }
+
+  /// Whether the good samples are exchanges of the stage. Without a wire, sample n is exchange n, and the force of a bad
+  /// one is also that of the stage, unless it is lost. Over a wire, exchanges between good samples are left out only
+  /// where samples are bad.
+  bool is_record_of(const LogSamples& samples, const WitnessedRun& run, bool damaged) const {
+    const double u_count = over_can_ ? kActuatorRange_n / kCounts : 0.0;
+    const double y_count = over_can_ ? kSensorRange_m / kCounts : 0.0;
+    std::size_t exchange = 0;
+    bool may_skip = over_can_;
+    for (Eigen::Index row = 0; row < samples.actuators.rows(); ++row) {
+      const bool good = samples.marked[row] == 0;
+      const auto fits = [&](std::size_t n) {
+        return n < run.u.size() && std::abs(run.u[n][0] - samples.actuators(row, 0)) <= u_count &&
+               (!good || std::abs(run.y[n][0] - samples.sensors(row, 0)) <= y_count);
+      };
+      while (good && may_skip && exchange < run.u.size() && !fits(exchange)) ++exchange;
+      if ((good || !(over_can_ || damaged)) && !fits(exchange)) return false;
+      if (good || !over_can_) ++exchange;
+      may_skip = over_can_ && !good;
+    }
+    return true;
+  }
+
+  /// The process ended when so many bytes were written. Of those that were not synchronized, any part is on the disk.
+  void tear(std::uint64_t synchronized, std::uint64_t written, RandomNumbers& random) {
+    std::filesystem::resize_file(file_, written);
+    if (random.uniform() < 0.5) return;  // the system went on
+    std::fstream stream(file_, std::ios::binary | std::ios::in | std::ios::out);
+    const std::string zeros(512, '\0');
+    for (std::uint64_t at = (synchronized + 511) / 512 * 512; at + 512 <= written; at += 512) {
+      if (random.uniform() < 0.8) continue;
+      stream.seekp(static_cast<std::streamoff>(at));
+      stream.write(zeros.data(), static_cast<std::streamsize>(zeros.size()));
+    }
+  }
+
+  void blame(const std::string& what) {
+    report_.broken.push_back(fmt::format("experiment {}, attempt {}: {} (of: {})",
+                                         report_.experiments, report_.attempts, what, misfortune_));
+  }
+
+  RandomNumbers& random_;
+  bool over_can_;
+  SimulatedSpec stage_;
+  ExperimentPlan plan_;
+  std::filesystem::path directory_;
+  std::filesystem::path file_;
+  DayReport& report_;
+  Testimony testimony_;
+  std::string misfortune_;  // of the last attempt
+  std::set<RunId> done_;
+  std::size_t logged_runs_ = 0;
+  int recoveries_ = 0;
+  std::multimap<std::uint64_t, WitnessedRun> witnessed_;  // by seed, of all attempts
+};
+
+}  // namespace
+
+DayReport simulate_day(std::uint64_t seed, std::uint64_t day) {
+  constexpr int kExperiments = 24;  // one per hour
+  RandomNumbers random(splitmix64(splitmix64(seed) + day));
+  DayReport report;
+  while (report.experiments < kExperiments) {
+    const TemporaryDirectory directory;
+    ++report.experiments;
+    DayExperiment(random, directory / "", report).perform();
+  }
+  return report;
+}
+
+}  // namespace stageid::test

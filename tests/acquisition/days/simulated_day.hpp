@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "acquisition/loop/run_experiment.hpp"
+#include "excitation/words/words.hpp"
+
+namespace stageid::test {
+
+enum class Trouble : std::uint8_t {
+  stage_fault,  ///< of SimulationSpec
+  loud,         ///< the excitation exceeds limits
+  wire,         ///< frames are lost, damaged, repeated or come in another order
+  cut,          ///< no frame arrives any more
+  bus,          ///< the bus is off
+  interlock,    ///< of the node's panel
+  interrupted,  ///< by the user
+  tripped,      ///< by a condition of the plant
+  disk,         ///< the log cannot be written
+  killed        ///< or without power: what was not synchronized is lost or damaged
+};
+
+}  // namespace stageid::test
+
+namespace stageid {
+template <>
+inline constexpr std::array kWords<test::Trouble> = {
+    "stage fault", "loud",        "wire",    "cut",  "bus",
+    "interlock",   "interrupted", "tripped", "disk", "killed"};
+}  // namespace stageid
+
+namespace stageid::test {
+
+struct DayReport {
+  int experiments = 0;
+  int attempts = 0;
+  std::uint64_t cycles = 0;
+  std::map<Trouble, int> troubles;
+  std::map<ExperimentEnd, int> ends;
+  std::vector<std::string> broken;  ///< invariants that did not hold
+};
+
+/// One day of a stage in virtual time: experiments that fail for all kinds of reasons and are resumed until they are
+/// complete. The seed and the number decide everything that happens.
+///
+/// Invariants: no force exceeds its limits, or acts beyond the hard window; after every end the stage is at rest; what
+/// the log does not mark is what the stage did, sample by sample; a run that was reported as complete stays so,
+/// whatever happens to the end of the log; an attempt ends for one of its troubles and for nothing else, and the last
+/// one, without any, completes the experiment.
+DayReport simulate_day(std::uint64_t seed, std::uint64_t day);
+
+}  // namespace stageid::test

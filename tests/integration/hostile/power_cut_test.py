@@ -1,0 +1,241 @@
+#!/usr/bin/python3
+"""Power fails while a command writes. Of what was not synchronized, any names and any sectors of the disk survive, in any
+order. Then an output is as before or complete, a log has every row that was synchronized and no wrong one, and an
+experiment can be resumed.
+
+    power_cut_test.py PROGRAM CONFIGS RECORDER WORK_DIR ORDERS [SEED]
+RECORDER: the library made of sync_recorder.c
+ORDERS: how many states of the disk per format; ten times as many of the log
+"""
+
+import json
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+
+PROGRAM, CONFIGS, RECORDER, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
+ORDERS = int(sys.argv[5])
+DICE = random.Random(int(sys.argv[6]) if len(sys.argv) > 6 else 1)
+EXPERIMENT = "configs/experiment/small_stage_pilot.yaml"
+OUT = WORK / "out"
+SECTOR = 512
+MARKED = 1 << 8
+
+OUTPUTS = {
+    "o.rec.slog": ["log", "recover", "run.slog", "-o", "out/o.rec.slog"],
+    "o.log.h5": ["log", "convert", "run.slog", "-o", "out/o.log.h5"],
+    "o.log.mat": ["log", "convert", "run.slog", "-o", "out/o.log.mat"],
+    "o.log73.mat": ["log", "convert", "run.slog", "-o", "out/o.log73.mat", "--mat-version", "7.3"],
+    "o.log.csv": ["log", "convert", "run.slog", "-o", "out/o.log.csv"],
+    "o.design.h5": ["design", EXPERIMENT, "-o", "out/o.design.h5"],
+    "o.frf.h5": ["frf", "run.slog", "-o", "out/o.frf.h5"],
+    "o.modes.json": ["modes", "frf.h5", "-o", "out/o.modes.json"],
+    "o.fit.json": ["fit", "frf.h5", "--modes", "4", "-o", "out/o.fit.json"],
+    "o.model.h5": ["export", "model.json", "-o", "out/o.model.h5"],
+    "o.model.m": ["export", "model.json", "-o", "out/o.model.m"],
+    "o.frf.mat": ["export", "frf.h5", "-o", "out/o.frf.mat"],
+    "o.frf.npz": ["export", "frf.h5", "-o", "out/o.frf.npz"],
+    "o.frf.csv": ["export", "frf.h5", "-o", "out/o.frf.csv"],
+    "o.frf.uff": ["export", "frf.h5", "-o", "out/o.frf.uff"],
+    "o.report.html": ["report", "model.json", "frf.h5", "-o", "out/o.report.html"],
+}
+BLOCK = np.dtype([("magic", "S8"), ("type", "<u2"), ("version", "<u2"), ("log_id", "<u4"), ("sequence", "<u8"),
+                  ("run", "<u4"), ("cols", "<u4"), ("first_row", "<u8"), ("rows", "<u4"), ("bytes", "<u4"),
+                  ("time_ns", "<i8"), ("payload_crc", "<u4"), ("header_crc", "<u4")])
+
+
+def stageid(*arguments, **environment):
+    return subprocess.run([PROGRAM, *arguments], cwd=WORK, capture_output=True, text=True, errors="replace", check=False,
+                          env=os.environ | environment, timeout=300)
+
+
+class Trace:
+    """What a command did to the files in OUT: the durable names and bytes after each event, and those to come."""
+
+    def __init__(self, arguments):
+        to = WORK / "trace"
+        shutil.rmtree(to, ignore_errors=True)
+        to.mkdir()
+        self.initial = self.listing()
+        data = {inode: (OUT / name).read_bytes() for name, inode in self.initial.items()}
+        done = stageid(*arguments, LD_PRELOAD=str(RECORDER), STAGEID_SYNC_OF=str(OUT), STAGEID_SYNC_TO=str(to))
+        if done.returncode not in (0, 3):
+            sys.exit(f"{' '.join(arguments)}: {done.stderr}")
+        self.final = {name: (OUT / name).read_bytes() for name in self.listing()}
+        events = [line.split("\t") for line in (to / "trace").read_text().splitlines()]
+        names, visible = self.initial, [self.initial]
+        self.states = [(names, visible, dict(data))]
+        for kind, *words in events:
+            if kind == "data":
+                inode, copy, *words = words
+                data[int(inode)] = (to / copy).read_bytes()
+            seen = {name: int(inode) for name, inode in (word.rsplit("=", 1) for word in words)}
+            visible = [seen] if kind == "names" else [*visible, seen]
+            self.states.append((visible[0], visible, dict(data)))
+
+    @staticmethod
+    def listing():
+        return {file.name: file.stat().st_ino for file in OUT.iterdir()}
+
+    def cut(self):
+        """Power fails after a random event. Returns the files, and the bytes of each that were durable."""
+        at = DICE.randrange(len(self.states))
+        _, visible, data = self.states[at]
+        _, next_visible, next_data = self.states[min(at + 1, len(self.states) - 1)]
+        names = DICE.choice([*visible, next_visible[-1]])
+        files = {name: torn(data.get(inode, b""), self.coming(at, inode)) for name, inode in names.items()}
+        durable = {name: data.get(inode, b"") for name, inode in visible[0].items()}
+        return files, durable
+
+    def coming(self, at, inode):
+        """The bytes of a file at its next synchronization."""
+        for _, _, data in self.states[at:]:
+            if data.get(inode) != self.states[at][2].get(inode):
+                return data[inode]
+        return self.states[at][2].get(inode, b"")
+
+
+def torn(old, new):
+    """Any sectors of what is to come have reached the disk, and any size has."""
+    size = DICE.choice([len(old), len(new), DICE.randint(*sorted((len(old), len(new))))])
+    likely = DICE.choice([0.02, 0.5, 0.98])
+    out = bytearray(old[:size].ljust(size, b"\0"))
+    for at in range(0, size, SECTOR):
+        if DICE.random() < likely:
+            part = new[at:min(at + SECTOR, size)]
+            out[at:at + len(part)] = part
+    return bytes(out)
+
+
+def blocks(content):
+    at = 0
+    while at + BLOCK.itemsize <= len(content):
+        head = np.frombuffer(content, BLOCK, 1, at)[0]
+        if head["magic"] != b"\x89SLOG\r\n\x1a":
+            return
+        size = int(head["bytes"])
+        if at + BLOCK.itemsize + size > len(content):
+            return
+        yield head, content[at + BLOCK.itemsize:at + BLOCK.itemsize + size]
+        at += BLOCK.itemsize + -(-size // 64) * 64
+
+
+def rows_of(content):
+    """Unmarked rows of an undamaged log by realization, experiment and number, of complete runs and of all."""
+    everything, complete, run = {}, {}, {}
+    for head, payload in blocks(content):
+        if head["type"] == 2:
+            begin = json.loads(payload)
+            key, run = (begin["realization"], begin["experiment"]), {}
+        elif head["type"] == 4:
+            rows = np.frombuffer(payload, "<u8").reshape(head["rows"], head["cols"])
+            for n, row in enumerate(rows):
+                if not int(row[-1]) & MARKED:
+                    run[(*key, int(head["first_row"]) + n)] = row.tobytes()
+            everything |= run
+        elif head["type"] == 5 and json.loads(payload)["complete"]:
+            complete |= run
+    return everything, complete
+
+
+def resume(file):
+    return stageid("run", EXPERIMENT, "-o", file, "--resume")
+
+
+class LogCheck:
+    def __init__(self, truth):
+        self.truth = rows_of(truth)[0]
+        self.refused = 0
+
+    def problem(self, content, durable, also_resume):
+        cut, recovered = WORK / "cut.slog", WORK / "recovered.slog"
+        for file in WORK.glob("cut.slog*"):
+            file.unlink()
+        cut.write_bytes(content)
+        recovered.unlink(missing_ok=True)
+        acknowledged, _ = rows_of(durable)
+        done = stageid("log", "recover", cut, "-o", recovered)
+        if done.returncode == 0:
+            rows, _ = rows_of(recovered.read_bytes())
+            if wrong := [key for key, row in rows.items() if key[0] >= 0 and self.truth[key] != row]:
+                return f"{len(wrong)} wrong rows, e.g. {wrong[0]}"
+            if missing := acknowledged.keys() - rows.keys():
+                return f"{len(missing)} synchronized rows are lost, e.g. {min(missing)}"
+        elif acknowledged or done.returncode != 2:
+            return f"recover: exit code {done.returncode}: {done.stderr}"
+        else:
+            self.refused += 1
+        if not also_resume:
+            return ""
+        done = resume(cut)
+        if done.returncode == 2 and "log recover" in done.stderr and recovered.exists():
+            cut = recovered
+            done = resume(cut)
+        if done.returncode != 0:
+            return f"resume: exit code {done.returncode}: {done.stderr}"
+        _, complete = rows_of(cut.read_bytes())
+        return "" if complete == self.truth else "the resumed log differs from the one without a cut"
+
+
+def check_log(name, trace, truth, orders, failures):
+    check = LogCheck(truth)
+    for order in range(orders):
+        files, durable = trace.cut()
+        if name not in files:
+            if durable.get(name):
+                failures.append(f"{name}: order {order}: the synchronized log has no name")
+            continue
+        if what := check.problem(files[name], durable.get(name, b""), order % 20 == 0):
+            failures.append(f"{name}: order {order}: {what}")
+            (WORK / f"failed_{len(failures)}.slog").write_bytes(files[name])
+    print(f"{name}: {orders} orders, of {check.refused} nothing to recover")
+
+
+def check_output(name, arguments, existing, failures):
+    shutil.rmtree(OUT, ignore_errors=True)
+    OUT.mkdir()
+    old = b"another file"
+    if existing:
+        (OUT / name).write_bytes(old)
+    trace = Trace(arguments)
+    allowed = {trace.final[name], old if existing else None}
+    seen = set()
+    for order in range(ORDERS):
+        files, _ = trace.cut()
+        content = files.get(name)
+        seen.add(content)
+        if content not in allowed:
+            failures.append(f"{name}: order {order}: neither as before nor complete")
+            break
+    if seen != allowed:
+        failures.append(f"{name}: only {len(seen)} of 2 contents were seen: is the recorder at work?")
+
+
+def main():
+    shutil.rmtree(WORK, ignore_errors=True)
+    OUT.mkdir(parents=True)
+    shutil.copytree(CONFIGS, WORK / "configs")
+    failures = []
+    trace = Trace(["run", EXPERIMENT, "-o", "out/run.slog"])
+    truth = trace.final["run.slog"]
+    check_log("run.slog", trace, truth, 10 * ORDERS, failures)
+
+    (WORK / "run.slog").write_bytes(truth)
+    for arguments in (["frf", "run.slog", "-o", "frf.h5"], ["fit", "frf.h5", "--modes", "4", "-o", "model.json"]):
+        stageid(*arguments)
+    for name, arguments in OUTPUTS.items():
+        check_output(name, arguments, False, failures)
+        if not name.endswith(".slog"):  # logs are never overwritten
+            check_output(name, arguments, True, failures)
+    print(f"{len(OUTPUTS)} formats: {ORDERS} orders of a new file each, as many of a replaced one")
+    print("\n".join(failures[:50]), f"\n{len(failures)} failures")
+    sys.exit(1 if failures else 0)
+
+
+if __name__ == "__main__":
+    main()
