@@ -89,20 +89,12 @@ class Experiment {
     log_.drain();
     if (failure_) std::rethrow_exception(failure_);
     result_.runs_done = log_.complete_runs();
-    if (log_.failed()) take_log_failure();
+    if (log_.failed()) result_.take_log_failure(log_.error());
     tell_events();
     return std::move(result_);
   }
 
  private:
-  /// The reason for stopping the stage has priority over a failure of the log.
-  void take_log_failure() {
-    const bool stage_ended_it =
-        result_.end == ExperimentEnd::limit || result_.end == ExperimentEnd::fault;
-    result_.message = stage_ended_it ? result_.message + "; " + log_.error() : log_.error();
-    if (!stage_ended_it) result_.end = ExperimentEnd::log_failed;
-  }
-
   static std::unique_ptr<EventRecorder> make_recorder(const RunExperimentOptions& options) {
     return options.events == nullptr ? nullptr : std::make_unique<EventRecorder>(*options.events);
   }
@@ -370,6 +362,13 @@ class Experiment {
 };
 
 }  // namespace
+
+void ExperimentResult::take_log_failure(const std::string& error) {
+  const bool stage_ended_it = end == ExperimentEnd::limit || end == ExperimentEnd::fault;
+  message = stage_ended_it ? message + "; " + error : error;
+  if (!stage_ended_it) end = ExperimentEnd::log_failed;
+  log_failed = true;
+}
 
 LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
                             std::string metadata_json) {

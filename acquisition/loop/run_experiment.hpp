@@ -61,9 +61,13 @@ enum class ExperimentEnd : std::uint8_t { complete, limit, fault, interrupted, l
 struct ExperimentResult {
   ExperimentEnd end = ExperimentEnd::complete;
   std::string message = "run_experiment was not called";
-  RunHealth health;   ///< over all runs
-  RunTiming timing;   ///< over all runs
-  int runs_done = 0;  ///< number of complete runs, without skipped ones
+  RunHealth health;         ///< over all runs
+  RunTiming timing;         ///< over all runs
+  int runs_done = 0;        ///< number of complete runs, without skipped ones
+  bool log_failed = false;  ///< rows are missing from the log: do not close it
+
+  /// The reason for stopping the stage has priority over a failure of the log.
+  void take_log_failure(const std::string& error);
 };
 
 /// Description of a log of this plan on this stage. Its excitation channels are the plan's axes, in the plan's

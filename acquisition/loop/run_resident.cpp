@@ -10,6 +10,7 @@
 
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
+#include "acquisition/files/file_error.hpp"
 #include "acquisition/loop/excited_actuators.hpp"
 #include "acquisition/record/utc_time.hpp"
 #include "acquisition/slog/slog_format.hpp"
@@ -43,7 +44,11 @@ class ResidentExperiment {
         enough = options_.enough();
         if (!enough.empty()) break;
       }
-      perform_run(run);
+      try {
+        perform_run(run);
+      } catch (const FileError& error) {
+        result_.take_log_failure(error.what());
+      }
     }
     stage_.stop();
     if (result_.end == ExperimentEnd::complete)

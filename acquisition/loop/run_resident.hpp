@@ -11,7 +11,7 @@ namespace stageid {
 /// The log is the same as that of run_experiment(): rows of u, y and status.
 ///
 /// If the stage ends a run early, the recorded part is logged as incomplete, and the experiment ends. The loss
-/// of the stage ends the experiment too.
+/// of the stage and a failure of the log end the experiment too.
 /// @throws std::invalid_argument if the log was made for another plan or stage, or a run is longer
 /// than the stage can record.
 ExperimentResult run_resident_experiment(const ExperimentPlan& plan, ResidentStage& stage,

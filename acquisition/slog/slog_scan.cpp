@@ -269,6 +269,26 @@ SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth) {
   return scan;
 }
 
+bool is_unwritten_slog(const std::filesystem::path& file) {
+  const SlogSource source(file);
+  SlogBlock first;  // what is not in the file is as if it were right
+  source.read(0, &first.header, std::min<std::uint64_t>(source.bytes(), sizeof first.header));
+  const auto there = std::as_bytes(std::span(first.header.magic))
+                         .first(std::min<std::uint64_t>(source.bytes(), kSlogMagic.size()));
+  const bool zero =
+      std::all_of(there.begin(), there.end(), [](std::byte b) { return b == std::byte{}; });
+  const bool begun = zero || first.header.magic == kSlogMagic;
+  const bool whole = slog_header_intact(first.header) &&
+                     (first.header.version != kSlogVersion || first.end() < source.bytes());
+  if (!begun || whole) return false;
+  try {
+    scan_slog(source, SlogScanDepth::payloads);
+    return false;
+  } catch (const FormatError&) {
+    return true;
+  }
+}
+
 bool payload_intact(const SlogSource& source, const SlogBlock& block) {
   std::uint32_t crc = 0;
   source.read_pieces(block.payload_offset(), block.end(),

@@ -93,6 +93,10 @@ class SlogScanner {
 /// All blocks and all damage. @throws the same as SlogScanner
 SlogScan scan_slog(const SlogSource& source, SlogScanDepth depth);
 
+/// Whether nothing of a log that was begun is in its file: the process was killed, or had no power, before its first
+/// block was on the disk. False for files of other programs. @throws FileError
+bool is_unwritten_slog(const std::filesystem::path& file);
+
 /// The payload of a block, checked. @throws FormatError naming the block.
 std::vector<std::byte> read_payload(const SlogSource& source, const SlogBlock& block);
 std::string read_text(const SlogSource& source, const SlogBlock& block);  ///< the same, of JSON

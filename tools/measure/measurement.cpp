@@ -11,6 +11,7 @@
 #include "acquisition/files/counted.hpp"
 #include "acquisition/files/fail.hpp"
 #include "acquisition/formats/open_log.hpp"
+#include "acquisition/slog/slog_scan.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/modbus/modbus_supervisor.hpp"
 #include "hal/stage/plant_watch.hpp"
@@ -114,11 +115,11 @@ std::shared_ptr<Dashboard> make_dashboard(const ExperimentConfig& config,
 
 /// Rejects a log that must not exist. @returns whether there is a log to continue.
 bool check_log(const MeasurementRequest& request) {
-  // An empty file was killed before the first byte was written, so it can be overwritten.
-  std::error_code no_size;
-  if (request.resume && std::filesystem::file_size(request.log, no_size) == 0 && !no_size)
+  bool exists = std::filesystem::exists(request.log);
+  if (exists && request.resume && is_unwritten_slog(request.log)) {
     std::filesystem::remove(request.log);
-  const bool exists = std::filesystem::exists(request.log);
+    exists = false;
+  }
   if (exists && !request.resume)
     fail_request("{}: already exists; continue it with --resume, or remove it",
                  request.log.string());
@@ -217,13 +218,25 @@ class LiveWatch {
 /// Waits for the watch to reach the end of the log. Its failures are warnings.
 void conclude_watch(const StageWatch& watch, LiveWatch& live, MeasurementResult& result,
                     const Console& console) {
-  const std::string failure = live.finish(result.experiment.end != ExperimentEnd::log_failed);
+  const std::string failure = live.finish(!result.experiment.log_failed);
   if (!failure.empty()) console.warning("--watch: " + failure);
   result.watch_summary = watch.summary();
   result.watch = watch.json();
   if (!watch.stage_changed() || result.exit_code != kDone) return;
   result.exit_code = kNotTrustworthy;
   result.message = "the stage has changed, so the model no longer describes it";
+}
+
+/// Closes the log if it can be written. A failure does not hide why the stage was stopped.
+void close_log(SlogWriter& log, MeasurementResult& result) {
+  if (result.experiment.log_failed) return;
+  try {
+    log.close(result.exit_code, result.message.c_str());
+  } catch (const FileError& error) {
+    result.experiment.take_log_failure(error.what());
+    result.message += fmt::format("; {}", error.what());
+    if (result.exit_code != kStoppedForSafety) result.exit_code = kWorldFailed;
+  }
 }
 
 /// Connects observers of the measurement.
@@ -318,8 +331,7 @@ MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& 
   conclude(*stage, options, result);
   if (until && result.experiment.end == ExperimentEnd::complete)
     tell_reached(*until, result, console);
-  if (result.experiment.end != ExperimentEnd::log_failed)
-    log.close(result.exit_code, result.message.c_str());
+  close_log(log, result);
   if (watch) conclude_watch(*watch, *live_watch, result, console);
   tell_end(*events, *stage, result);
   if (dashboard) {

@@ -12,10 +12,13 @@
 #include <utility>
 
 #include "acquisition/files/file_error.hpp"
+#include "acquisition/loop/run_resident.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_recover.hpp"
+#include "acquisition/slog/slog_scan.hpp"
 #include "acquisition/slog/slog_writer.hpp"
 #include "hal/can/can_node.hpp"
+#include "hal/can/can_resident_stage.hpp"
 #include "hal/can/can_stage.hpp"
 #include "tests/acquisition/days/stage_witness.hpp"
 #include "tests/hal/can/altered_can.hpp"
@@ -33,11 +36,13 @@ constexpr double kActuatorRange_n = 1.25 * kStopForce;
 constexpr double kSensorRange_m = 4.0 * kStopWindow;
 constexpr double kCounts = 1 << 23;  // of a range in a CAN frame
 
+enum class Link : std::uint8_t { direct, streaming, resident };
+
 /// One axis whose limits of all kinds are a few times what a healthy experiment needs.
 SimulatedSpec day_stage(bool predicted) {
   SimulatedSpec spec = stop_stage_spec();
   if (!predicted) spec.limits.motion = {};
-  spec.limits.slew_n_s = Eigen::VectorXd::Constant(1, 4e5);
+  spec.limits.slew_n_s = Eigen::VectorXd::Constant(1, 6e5);
   spec.limits.thermal_rms_n = Eigen::VectorXd::Constant(1, 100.0);
   spec.limits.thermal_time_constant_s = 0.05;
   return spec;
@@ -99,10 +104,10 @@ SimulationSpec::Fault draw_fault(RandomNumbers& random, std::uint64_t samples) {
   return fault;
 }
 
-Misfortune draw_misfortune(RandomNumbers& random, bool over_can, const ExperimentPlan& plan) {
+Misfortune draw_misfortune(RandomNumbers& random, Link link, const ExperimentPlan& plan) {
   std::vector<Trouble> possible = {Trouble::stage_fault, Trouble::stage_fault, Trouble::loud,
                                    Trouble::interrupted, Trouble::tripped,     Trouble::disk};
-  if (over_can)
+  if (link != Link::direct)
     possible.insert(possible.end(),
                     {Trouble::wire, Trouble::cut, Trouble::bus, Trouble::interlock});
   Misfortune out;
@@ -177,13 +182,13 @@ class DiskLog final : public RunWriter {
 /// The host's stage, directly or over CAN. The simulated stage is at the far end, behind the witness.
 class DayLink {
  public:
-  DayLink(SimulatedSpec spec, bool over_can, const Misfortune& misfortune, Testimony& testimony,
+  DayLink(SimulatedSpec spec, Link link, const Misfortune& misfortune, Testimony& testimony,
           RandomNumbers& random)
       : spec_(std::move(spec)), misfortune_(misfortune), random_(random) {
     auto witness = std::make_unique<StageWitness>(
         simulated(spec_), complete_limits(spec_.limits, spec_.info), testimony,
         [this](std::uint64_t exchange) { strike(exchange); });
-    if (!over_can) {
+    if (link == Link::direct) {
       host_ = std::make_unique<LimitedStage>(std::move(witness), spec_.limits);
       return;
     }
@@ -196,15 +201,24 @@ class DayLink {
     node_bus_ = std::make_unique<AlteredCan>(pair_.node(), spoil());
     front_ = std::make_unique<CanNode>(*node_, can_layout(can, spec_.info), *node_bus_);
     pair_.when_host_waits([this] { serve(); });
-    host_ = std::make_unique<LimitedStage>(
-        std::make_unique<CanStage>(spec_.info, can,
-                                   std::make_unique<AlteredCan>(pair_.host(), spoil()),
-                                   CanHostOptions{.reset_fault = true}),
-        spec_.limits);
+    const CanHostOptions options{.reset_fault = true};
+    auto host_bus = std::make_unique<AlteredCan>(pair_.host(), spoil());
+    if (link == Link::resident)
+      resident_ = std::make_unique<CanResidentStage>(spec_.info, can, std::move(host_bus), options);
+    else
+      host_ = std::make_unique<LimitedStage>(
+          std::make_unique<CanStage>(spec_.info, can, std::move(host_bus), options), spec_.limits);
   }
   DayLink(DayLink&&) = delete;
 
-  LimitedStage& host() { return *host_; }
+  ExperimentResult perform(const ExperimentPlan& plan, RunWriter& log,
+                           RunExperimentOptions options) {
+    options.interrupt = &interrupt;
+    options.plant_tripped = &tripped;
+    if (resident_) return run_resident_experiment(plan, *resident_, log, options);
+    MotionController controller(spec_.controller);
+    return run_experiment(plan, *host_, controller, log, options);
+  }
   std::atomic<bool> interrupt = false;
   std::atomic<bool> tripped = false;
 
@@ -286,7 +300,8 @@ class DayLink {
   std::unique_ptr<StageNode> node_;
   std::unique_ptr<CanTransport> node_bus_;
   std::unique_ptr<CanNode> front_;
-  std::unique_ptr<LimitedStage> host_;
+  std::unique_ptr<LimitedStage> host_;  // one of these two
+  std::unique_ptr<CanResidentStage> resident_;
   bool struck_ = false;
   bool cut_ = false;
 };
@@ -296,7 +311,9 @@ class DayExperiment {
  public:
   DayExperiment(RandomNumbers& random, const std::filesystem::path& directory, DayReport& report)
       : random_(random),
-        over_can_(random.uniform() < 0.6),
+        link_(static_cast<Link>(random.integer(0, 2))),
+        between_runs_(link_ != Link::resident && random.uniform() < 0.3 ? BetweenRuns::hold
+                                                                        : BetweenRuns::release),
         stage_(day_stage(random.uniform() < 0.5)),
         plan_(day_plan(random, stage_, 10.0)),
         directory_(directory),
@@ -305,7 +322,7 @@ class DayExperiment {
 
   void perform() {
     for (int attempts = random_.integer(1, 4); attempts > 0 && !complete(); --attempts)
-      attempt(draw_misfortune(random_, over_can_, plan_), RandomNumbers(random_.number()));
+      attempt(draw_misfortune(random_, link_, plan_), RandomNumbers(random_.number()));
     if (!complete()) attempt({}, RandomNumbers(0));
     if (!complete()) blame("the experiment is not complete after an attempt without trouble");
   }
@@ -325,16 +342,12 @@ class DayExperiment {
     spec.controller.axes[2].gain *=
         misfortune.has(Trouble::loud) ? random.uniform(1.0, kLoud) : 1.0;
     testimony_ = {};
-    DayLink link(spec, over_can_, misfortune, testimony_, random);
-    MotionController controller(spec.controller);
-    const LogInfo info = experiment_log_info(plan_, link.host().info());
-    std::optional<SlogWriter> log = open(info);
+    DayLink link(spec, link_, misfortune, testimony_, random);
+    std::optional<SlogWriter> log = open(experiment_log_info(plan_, spec.info));
     DiskLog disk(*log, misfortune.has(Trouble::disk) ? misfortune.log_call : -1);
-    const ExperimentResult result = run_experiment(plan_, link.host(), controller, disk,
-                                                   {.skip = {done_.begin(), done_.end()},
-                                                    .interrupt = &link.interrupt,
-                                                    .plant_tripped = &link.tripped,
-                                                    .ramp_s = 0.01});
+    const ExperimentResult result = link.perform(
+        plan_, disk,
+        {.skip = {done_.begin(), done_.end()}, .ramp_s = 0.01, .between_runs = between_runs_});
     link.pass_rest();
     if (testimony_.running) blame("the stage is not at rest");
     for (const std::string& broken : testimony_.broken) blame(broken);
@@ -342,7 +355,7 @@ class DayExperiment {
     report_.cycles += result.health.cycles;
     judge_end(result, misfortune);
     for (WitnessedRun& run : testimony_.runs) witnessed_.emplace(run.seed, std::move(run));
-    const bool killed = misfortune.has(Trouble::killed) || result.end == ExperimentEnd::log_failed;
+    const bool killed = misfortune.has(Trouble::killed) || result.log_failed;
     if (!killed) log->close(0, result.message.c_str());
     const std::uint64_t bytes = log->bytes();
     log.reset();
@@ -368,6 +381,7 @@ class DayExperiment {
 
   /// As `stageid run --resume` does, or after `stageid log recover`.
   SlogWriter open(const LogInfo& info) {
+    if (std::filesystem::exists(file_) && is_unwritten_slog(file_)) std::filesystem::remove(file_);
     if (!std::filesystem::exists(file_)) return SlogWriter::create(file_, info);
     const auto resume = [&] {
       SlogWriter log = SlogWriter::resume(file_, info);
@@ -441,7 +455,7 @@ class DayExperiment {
     for (const WitnessedRun& witnessed : testimony_.runs) {
       const std::uint64_t end = first + witnessed.u.size();
       if (misfortune.at >= first && misfortune.at < end)
-        return misfortune.at - first + kNoticed < samples &&
+        return link_ != Link::resident && misfortune.at - first + kNoticed < samples &&
                (misfortune.has(interrupted) || misfortune.has(tripped) || misfortune.has(cut) ||
                 misfortune.has(bus) || misfortune.has(interlock));
       first = end;
@@ -467,7 +481,10 @@ class DayExperiment {
         blame("a complete run is too short or too long");
       if (!damaged && reader.excitation(run) != plan_.excitation(id))
         blame("the log has another excitation");
-      const auto [first, last] = witnessed_.equal_range(run_seed(plan_.spec().seed, id));
+      // A held stage is started for the first run only.
+      const auto [first, last] = between_runs_ == BetweenRuns::hold
+                                     ? std::pair(witnessed_.begin(), witnessed_.end())
+                                     : witnessed_.equal_range(run_seed(plan_.spec().seed, id));
       if (logged.samples > 0 && std::none_of(first, last, [&](const auto& witnessed) {
             return is_record_of(samples, witnessed.second, damaged);
           }))
@@ -475,14 +492,14 @@ class DayExperiment {
     }
   }
 
-  /// Whether the good samples are exchanges of the stage. Without a wire, sample n is exchange n, and the force of a bad
-  /// one is also that of the stage, unless it is lost. Over a wire, exchanges between good samples are left out only
-  /// where samples are bad.
+  /// Whether the good samples are exchanges of the stage, and without a wire the bad ones too, but for those that are
+  /// lost. Exchanges are left out before the first sample if the stage was held, and over a wire where samples are bad.
   bool is_record_of(const LogSamples& samples, const WitnessedRun& run, bool damaged) const {
-    const double u_count = over_can_ ? kActuatorRange_n / kCounts : 0.0;
-    const double y_count = over_can_ ? kSensorRange_m / kCounts : 0.0;
+    const bool over_can = link_ != Link::direct;
+    const double u_count = over_can ? kActuatorRange_n / kCounts : 0.0;
+    const double y_count = over_can ? kSensorRange_m / kCounts : 0.0;
     std::size_t exchange = 0;
-    bool may_skip = over_can_;
+    bool may_skip = over_can || between_runs_ == BetweenRuns::hold;
     for (Eigen::Index row = 0; row < samples.actuators.rows(); ++row) {
       const bool good = samples.marked[row] == 0;
       const auto fits = [&](std::size_t n) {
@@ -490,9 +507,9 @@ class DayExperiment {
                (!good || std::abs(run.y[n][0] - samples.sensors(row, 0)) <= y_count);
       };
       while (good && may_skip && exchange < run.u.size() && !fits(exchange)) ++exchange;
-      if ((good || !(over_can_ || damaged)) && !fits(exchange)) return false;
-      if (good || !over_can_) ++exchange;
-      may_skip = over_can_ && !good;
+      if ((good || !(over_can || damaged || may_skip)) && !fits(exchange)) return false;
+      if (good || !(over_can || may_skip)) ++exchange;
+      may_skip = !good && (over_can || may_skip);
     }
     return true;
   }
@@ -516,7 +533,8 @@ class DayExperiment {
   }
 
   RandomNumbers& random_;
-  bool over_can_;
+  Link link_;
+  BetweenRuns between_runs_;
   SimulatedSpec stage_;
   ExperimentPlan plan_;
   std::filesystem::path directory_;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "hal/stage/motion_controller.hpp"
 #include "hal/stage/resident_stage.hpp"
 #include "tests/acquisition/loop/run_experiment_fixture.hpp"
+#include "tests/support/process/file_size_limit.hpp"
 
 namespace stageid::test_run_resident {
 
@@ -223,6 +225,29 @@ TEST_F(RunResident, AStageLostInAnUploadLeavesTheRunsBefore) {
   EXPECT_EQ(result.end, ExperimentEnd::fault);
   EXPECT_EQ(result.runs_done, 2);
   EXPECT_EQ(runs(), (Runs{{kSamples, true}, {kSamples, true}, {0, false}}));
+}
+
+TEST_F(RunResident, AFullDiskStopsTheStageAndKeepsWhatWasWritten) {
+  for (const auto& [failure, fails_at, end] :
+       {std::tuple(Outcome::ok, 0U, ExperimentEnd::log_failed),
+        std::tuple(Outcome::limit, 250U, ExperimentEnd::limit)}) {
+    std::filesystem::remove(file_);
+    playing_.fails_at = fails_at;
+    playing_.failure = failure;
+    playing_.stops = 0;
+    SlogWriter log = create("a.slog");
+    ExperimentResult result;
+    {
+      const test::FileSizeLimit limit(log.bytes() + 9000);  // in the middle of a trace
+      result = run_resident_experiment(plan_, playing_, log, {});
+    }
+    EXPECT_EQ(result.end, end) << "why the stage was stopped is more important";
+    EXPECT_TRUE(result.log_failed);
+    EXPECT_THAT(result.message, HasSubstr("cannot be written"));
+    EXPECT_EQ(result.runs_done, 0);
+    EXPECT_GE(playing_.stops, 1);
+    EXPECT_EQ(SlogReader(file_, false).runs().at(0).samples, log.acknowledged_rows());
+  }
 }
 
 TEST_F(RunResident, ARunLongerThanTheTraceIsRefused) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstring>
 #include <optional>
 
 #include "acquisition/files/file_error.hpp"
@@ -37,6 +39,35 @@ std::optional<std::string> content(const std::filesystem::path& file) {
 }
 
 using SlogDamage = test::SmallLogTest;
+
+TEST_F(SlogDamage, ALogWithoutItsFirstBlockOnTheDiskIsUnwritten) {
+  SlogWriter::create(file_, test::small_info());
+  const std::string first = test::read_bytes(file_);
+  const auto is_unwritten = [&](const std::string& bytes) {
+    test::write_bytes(file_, bytes);
+    return is_unwritten_slog(file_);
+  };
+  EXPECT_FALSE(is_unwritten(first));
+  for (std::size_t size = 0; size < first.size(); ++size)
+    ASSERT_TRUE(is_unwritten(first.substr(0, size))) << size;
+  for (std::size_t zeros = 8; zeros <= first.size(); zeros += 8)
+    ASSERT_TRUE(is_unwritten(std::string(zeros, '\0') + first.substr(zeros))) << zeros;
+
+  EXPECT_FALSE(is_unwritten("a text")) << "shorter than a mark, but no part of one";
+  EXPECT_FALSE(is_unwritten("notes on the stage, longer than a header of a block of a native log"));
+  std::string later = first;
+  later[10] = 2;  // the version; its header has another checksum
+  SlogBlockHeader header;
+  std::memcpy(&header, later.data(), sizeof header);
+  header.header_crc = slog_header_crc(header);
+  std::memcpy(later.data(), &header, sizeof header);
+  EXPECT_FALSE(is_unwritten(later)) << "of a later version";
+  std::filesystem::remove(file_);
+  test::write_small_log(file_, 2, 18);
+  std::string log = test::read_bytes(file_);
+  std::fill_n(log.begin(), 64, '\0');
+  EXPECT_FALSE(is_unwritten(log)) << "what follows the first block is intact";
+}
 
 TEST_F(SlogDamage, EveryFlippedByteIsAnError) {
   test::write_small_log(file_, 2, 18);

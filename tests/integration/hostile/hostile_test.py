@@ -10,6 +10,7 @@ import os
 import pathlib
 import resource
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -29,9 +30,9 @@ def limits():
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
 
 
-def run(*arguments):
+def run(*arguments, before=limits):
     return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, errors="replace",
-                          cwd=WORK, preexec_fn=limits, check=False, timeout=60)
+                          cwd=WORK, preexec_fn=before, check=False, timeout=60)
 
 
 def crc32c(data):
@@ -342,6 +343,23 @@ class Outputs(Case):
         self.assertEqual(done.returncode, 0)
         self.assertEqual(run("log", "verify", "c.slog").returncode, 0)
         self.assertEqual((WORK / "c.slog").read_bytes()[:8], b"\x89SLOG\r\n\x1a")
+
+    def test_a_full_disk_does_not_hide_why_the_stage_was_stopped(self):
+        loud = WORK / "configs/experiment/loud.yaml"
+        loud.write_text((CONFIGS / "experiment/small_stage_pilot.yaml").read_text().replace("rms_n: 0.2", "rms_n: 25"))
+        measure = ["run", loud, "--force", "-o"]
+        self.assertEqual(run(*measure, "whole.slog").returncode, 4)
+        whole = (WORK / "whole.slog").stat().st_size
+        for missing in (60, 900, whole - 1000):  # the end of the log, rows, everything
+            def disk(full=whole - missing):
+                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+                resource.setrlimit(resource.RLIMIT_FSIZE, (full, full))
+
+            (WORK / "part.slog").unlink(missing_ok=True)
+            done = run(*measure, "part.slog", before=disk)
+            self.assertIn("cannot be written", done.stderr)
+            self.assertEqual((done.returncode, "limit 40 N" in done.stderr.splitlines()[-1]),
+                             (4, True) if missing < 1000 else (1, False), done.stderr)
 
     def test_no_name(self):
         for arguments in (["export", "model.json"], ["frf", "run.slog"], ["fit", "frf.h5"],
