@@ -36,9 +36,12 @@ class LimitGuard {
   struct Finding {
     LimitViolation violation;  ///< kind none: no violation
     bool sound = true;         ///< the loop may continue, at least for a ramp
-    /// Keeps the first violation of the most serious kind.
+    /// Keeps the first violation of the most serious kind. Beyond a hard window, not even a brake may act.
     void add(const LimitViolation& found, bool still_sound) noexcept {
-      if (violation.kind == LimitKind::none || (sound && !still_sound)) violation = found;
+      const bool hard = found.kind == LimitKind::hard_position;
+      if (violation.kind == LimitKind::none || (sound && !still_sound) ||
+          (hard && violation.kind != LimitKind::hard_position))
+        violation = found;
       sound &= still_sound;
     }
   };

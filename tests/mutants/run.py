@@ -130,6 +130,8 @@ MUTANTS = [
      'log_.synchronize(); complete_runs_', 'complete_runs_', DAYS),
     ('a sensor beyond its hard window is ignored', 'hal/stage/limit_guard.cpp',
      'std::abs(y) > limits_.hard_window_m[i]', 'false', DAYS),
+    ('a brake beyond a hard window goes on', 'hal/stage/limit_guard.hpp',
+     '(hard && violation.kind != LimitKind::hard_position)', 'false', ['hal', 'acquisition:SimulatedDays.*']),
     ('bad cycles are not counted', 'acquisition/loop/measurement_loop.cpp', 'kBadCycle = 2', 'kBadCycle = 0', DAYS),
     ('the watchdog of a node sleeps', 'hal/node/stage_node.cpp',
      'now_ns - last_sample_ns_ > watchdog_ns_', 'false', DAYS),

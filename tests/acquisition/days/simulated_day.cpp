@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -20,37 +21,49 @@
 #include "hal/can/can_node.hpp"
 #include "hal/can/can_resident_stage.hpp"
 #include "hal/can/can_stage.hpp"
+#include "hal/simulator/fault_script.hpp"
 #include "tests/acquisition/days/stage_witness.hpp"
 #include "tests/hal/can/altered_can.hpp"
 #include "tests/support/process/random_numbers.hpp"
 #include "tests/support/process/temporary_directory.hpp"
 #include "tests/support/stages/can_pair.hpp"
 #include "tests/support/stages/stop_case.hpp"
+#include "tests/support/stages/wafer_stage.hpp"
 
 namespace stageid::test {
 
 namespace {
 
 constexpr int kPeriod = 400;
-constexpr double kActuatorRange_n = 1.25 * kStopForce;
-constexpr double kSensorRange_m = 4.0 * kStopWindow;
 constexpr double kCounts = 1 << 23;  // of a range in a CAN frame
 
 enum class Link : std::uint8_t { direct, streaming, resident };
 
-/// One axis whose limits of all kinds are a few times what a healthy experiment needs.
-SimulatedSpec day_stage(bool predicted) {
-  SimulatedSpec spec = stop_stage_spec();
-  if (!predicted) spec.limits.motion = {};
-  spec.limits.slew_n_s = Eigen::VectorXd::Constant(1, 6e5);
-  spec.limits.thermal_rms_n = Eigen::VectorXd::Constant(1, 100.0);
+/// The wafer stage, or one axis whose limits of all kinds are a few times what a healthy experiment needs.
+SimulatedSpec day_stage(bool wafer, bool predicted) {
+  SimulatedSpec spec = wafer ? wafer_stage_spec() : stop_stage_spec();
+  if (!wafer) {
+    spec.limits.slew_n_s = Eigen::VectorXd::Constant(1, 6e5);
+    spec.limits.thermal_rms_n = Eigen::VectorXd::Constant(1, 100.0);
+  }
   spec.limits.thermal_time_constant_s = 0.05;
+  spec.limits.motion = predicted
+                           ? rigid_motion(spec.controller, spec.info.actuators, spec.info.sensors)
+                           : RigidMotion{};
   return spec;
 }
 
-ExperimentPlan day_plan(RandomNumbers& random, const SimulatedSpec& stage, double level_n) {
+ExperimentPlan day_plan(RandomNumbers& random, const SimulatedSpec& stage) {
+  const auto last = static_cast<int>(stage.info.actuators.size()) - 1;
   ExperimentSpec spec;
-  spec.axes = {{stage.info.actuators[0].name, level_n, {}}};
+  if (last == 0) {
+    spec.axes = {{stage.info.actuators[0].name, 10.0, {}}};
+  } else {
+    const int first = random.integer(0, last - 1);
+    for (const int axis : {first, random.integer(first + 1, last)})
+      spec.axes.push_back({stage.info.actuators[static_cast<std::size_t>(axis)].name, 2.0, {}});
+    spec.scheme = static_cast<ExcitationScheme>(random.integer(0, 2));
+  }
   spec.realizations = random.integer(2, 6);
   spec.periods = random.integer(1, 3);
   spec.transient_periods = random.integer(0, 1);
@@ -58,6 +71,22 @@ ExperimentPlan day_plan(RandomNumbers& random, const SimulatedSpec& stage, doubl
   return {
       FrequencyGrid::band(stage.info.sample_rate_hz, kPeriod, {.low_hz = 50.0, .high_hz = 1000.0}),
       spec};
+}
+
+/// All channels on one virtual bus, which is fast enough for 10 kHz. Ranges beyond the limits.
+CanSpec day_bus(const SimulatedSpec& stage) {
+  CanBusSpec bus{"pair0", 10e6, 80e6, {}, {}};
+  bus.actuators.resize(stage.info.actuators.size());
+  bus.sensors.resize(stage.info.sensors.size());
+  std::iota(bus.actuators.begin(), bus.actuators.end(), 0);
+  std::iota(bus.sensors.begin(), bus.sensors.end(), 0);
+  CanSpec can;
+  can.buses = {bus};
+  for (const double limit_n : stage.limits.actuator_n)
+    can.actuator_range_n.push_back(1.25 * limit_n);
+  for (const double window_m : stage.limits.position_window_m)
+    can.sensor_range_m.push_back(4.0 * window_m);
+  return can;
 }
 
 /// What goes wrong in one attempt, and when: counted in exchanges of the attempt, or calls of the log.
@@ -78,7 +107,8 @@ struct Misfortune {
   }
 };
 
-SimulationSpec::Fault draw_fault(RandomNumbers& random, std::uint64_t samples) {
+SimulationSpec::Fault draw_fault(RandomNumbers& random, const StageInfo& info,
+                                 std::uint64_t samples) {
   using Kind = SimulationSpec::Fault::Kind;
   struct Choice {
     Kind kind;
@@ -96,6 +126,9 @@ SimulationSpec::Fault draw_fault(RandomNumbers& random, std::uint64_t samples) {
       kChoices[static_cast<std::size_t>(random.integer(0, static_cast<int>(kChoices.size()) - 1))];
   SimulationSpec::Fault fault;
   fault.kind = choice.kind;
+  const bool of_sensor = fault_traits(choice.kind).target == FaultTarget::sensor;
+  fault.channel = random.integer(
+      0, static_cast<int>(of_sensor ? info.sensors.size() : info.actuators.size()) - 1);
   fault.from_cycle = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples));
   fault.cycles = static_cast<std::uint64_t>(random.integer(1, 30));
   fault.run = random.integer(0, 2);
@@ -104,7 +137,8 @@ SimulationSpec::Fault draw_fault(RandomNumbers& random, std::uint64_t samples) {
   return fault;
 }
 
-Misfortune draw_misfortune(RandomNumbers& random, Link link, const ExperimentPlan& plan) {
+Misfortune draw_misfortune(RandomNumbers& random, Link link, const StageInfo& info,
+                           const ExperimentPlan& plan) {
   std::vector<Trouble> possible = {Trouble::stage_fault, Trouble::stage_fault, Trouble::loud,
                                    Trouble::interrupted, Trouble::tripped,     Trouble::disk};
   if (link != Link::direct)
@@ -120,7 +154,7 @@ Misfortune draw_misfortune(RandomNumbers& random, Link link, const ExperimentPla
   out.at = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples * runs));
   out.log_call = random.integer(0, 4 * static_cast<int>(runs));
   out.frames_spoiled = std::pow(10.0, random.uniform(-4.0, -0.7));
-  out.fault = draw_fault(random, samples);
+  out.fault = draw_fault(random, info, samples);
   return out;
 }
 
@@ -192,10 +226,7 @@ class DayLink {
       host_ = std::make_unique<LimitedStage>(std::move(witness), spec_.limits);
       return;
     }
-    CanSpec can;
-    can.buses.push_back({"pair0", 10e6, 80e6, {0}, {0}});  // virtual: 10 kHz fit
-    can.actuator_range_n = {kActuatorRange_n};
-    can.sensor_range_m = {kSensorRange_m};
+    const CanSpec can = day_bus(spec_);
     node_ = std::make_unique<StageNode>(std::move(witness), spec_.limits, spec_.controller,
                                         NodePanel{}, NodeOptions{.watchdog_s = can.watchdog_s});
     node_bus_ = std::make_unique<AlteredCan>(pair_.node(), spoil());
@@ -314,15 +345,15 @@ class DayExperiment {
         link_(static_cast<Link>(random.integer(0, 2))),
         between_runs_(link_ != Link::resident && random.uniform() < 0.3 ? BetweenRuns::hold
                                                                         : BetweenRuns::release),
-        stage_(day_stage(random.uniform() < 0.5)),
-        plan_(day_plan(random, stage_, 10.0)),
+        stage_(day_stage(random.uniform() < 0.2, random.uniform() < 0.5)),
+        plan_(day_plan(random, stage_)),
         directory_(directory),
         file_(directory / "0.slog"),
         report_(report) {}
 
   void perform() {
     for (int attempts = random_.integer(1, 4); attempts > 0 && !complete(); --attempts)
-      attempt(draw_misfortune(random_, link_, plan_), RandomNumbers(random_.number()));
+      attempt(draw_misfortune(random_, link_, stage_.info, plan_), RandomNumbers(random_.number()));
     if (!complete()) attempt({}, RandomNumbers(0));
     if (!complete()) blame("the experiment is not complete after an attempt without trouble");
   }
@@ -335,12 +366,13 @@ class DayExperiment {
   /// How much is drawn from `random` may depend on when the loop notices that the log has failed.
   void attempt(const Misfortune& misfortune, RandomNumbers random) {
     ++report_.attempts;
+
     misfortune_ = misfortune.describe();
     for (const Trouble trouble : misfortune.troubles) ++report_.troubles[trouble];
     SimulatedSpec spec = stage_;
     if (misfortune.has(Trouble::stage_fault)) spec.simulation.faults = {misfortune.fault};
-    spec.controller.axes[2].gain *=
-        misfortune.has(Trouble::loud) ? random.uniform(1.0, kLoud) : 1.0;
+    const double gain = misfortune.has(Trouble::loud) ? random.uniform(1.0, kLoud) : 1.0;
+    for (AxisController& axis : spec.controller.axes) axis.gain *= gain;
     testimony_ = {};
     DayLink link(spec, link_, misfortune, testimony_, random);
     std::optional<SlogWriter> log = open(experiment_log_info(plan_, spec.info));
@@ -492,19 +524,28 @@ class DayExperiment {
     }
   }
 
+  /// Over a bus, numbers are counts.
+  bool same(const std::vector<double>& a, const Eigen::RowVectorXd& b,
+            const std::vector<double>& range) const {
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (!(std::abs(a[i] - b[static_cast<Eigen::Index>(i)]) <=
+            (link_ == Link::direct ? 0.0 : range[i] / kCounts)))
+        return false;
+    return true;
+  }
+
   /// Whether the good samples are exchanges of the stage, and without a wire the bad ones too, but for those that are
   /// lost. Exchanges are left out before the first sample if the stage was held, and over a wire where samples are bad.
   bool is_record_of(const LogSamples& samples, const WitnessedRun& run, bool damaged) const {
     const bool over_can = link_ != Link::direct;
-    const double u_count = over_can ? kActuatorRange_n / kCounts : 0.0;
-    const double y_count = over_can ? kSensorRange_m / kCounts : 0.0;
     std::size_t exchange = 0;
     bool may_skip = over_can || between_runs_ == BetweenRuns::hold;
     for (Eigen::Index row = 0; row < samples.actuators.rows(); ++row) {
       const bool good = samples.marked[row] == 0;
       const auto fits = [&](std::size_t n) {
-        return n < run.u.size() && std::abs(run.u[n][0] - samples.actuators(row, 0)) <= u_count &&
-               (!good || std::abs(run.y[n][0] - samples.sensors(row, 0)) <= y_count);
+        return n < run.u.size() &&
+               same(run.u[n], samples.actuators.row(row), bus_.actuator_range_n) &&
+               (!good || same(run.y[n], samples.sensors.row(row), bus_.sensor_range_m));
       };
       while (good && may_skip && exchange < run.u.size() && !fits(exchange)) ++exchange;
       if ((good || !(over_can || damaged || may_skip)) && !fits(exchange)) return false;
@@ -536,6 +577,7 @@ class DayExperiment {
   Link link_;
   BetweenRuns between_runs_;
   SimulatedSpec stage_;
+  CanSpec bus_ = day_bus(stage_);
   ExperimentPlan plan_;
   std::filesystem::path directory_;
   std::filesystem::path file_;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
@@ -172,6 +173,27 @@ TEST(LimitGuard, AWeightThatIsCarriedIsNotAMotion) {
   }
   EXPECT_THROW(LimitGuard(spec.limits, spec.info).carry(Eigen::VectorXd::Ones(actuators + 1), 1),
                std::invalid_argument);
+}
+
+TEST(LimitGuard, BeyondAHardWindowItDoesNotMatterWhatElseIsWrong) {
+  StageInfo info = test::stop_stage_spec().info;
+  info.sensors = {{"first", "m"}, {"second", "m"}};
+  StageLimits limits;
+  limits.position_window_m = Eigen::Vector2d(1e-3, 1e-3);
+  limits.speed_m_s = Eigen::Vector2d(1e-6, 1e-6);
+  LimitGuard guard(limits, info);
+  std::array<double, 2> y = {0.0, 0.0};
+  Inputs inputs;
+  inputs.y = y;
+  inputs.valid = all_bits(2);
+  guard.start(inputs);
+  y = {1e-4, 0.0};
+  EXPECT_EQ(guard.inspect(inputs).violation.kind, LimitKind::speed);
+  y = {2e-4, 2.1e-3};
+  const LimitGuard::Finding finding = guard.inspect(inputs);
+  EXPECT_FALSE(finding.sound);
+  EXPECT_EQ(finding.violation.kind, LimitKind::hard_position);
+  EXPECT_EQ(finding.violation.channel, 1);
 }
 
 TEST(LimitGuard, WithoutAMotionNothingIsPredicted) {
