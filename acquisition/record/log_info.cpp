@@ -58,6 +58,7 @@ RunHealth& RunHealth::operator+=(const RunHealth& other) noexcept {
   missing += other.missing;
   marked += other.marked;
   irregular += other.irregular;
+  lost += other.lost;
   largest_lateness_ns = std::max(largest_lateness_ns, other.largest_lateness_ns);
   seconds += other.seconds;
   return *this;

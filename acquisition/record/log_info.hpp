@@ -49,6 +49,7 @@ struct RunHealth {
   std::uint64_t missing = 0;  ///< incomplete, stale, corrupt or link trouble
   std::uint64_t marked = 0;
   std::uint64_t irregular = 0;  ///< jitter beyond the limit; 0 in older logs
+  std::uint64_t lost = 0;       ///< replaced by marked zeros in recover_log()
   std::int64_t largest_lateness_ns = 0;
   double seconds = 0.0;  ///< wall time of the run
 

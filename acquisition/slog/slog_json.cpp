@@ -137,6 +137,7 @@ std::string run_end_json(const LogRun& run) {
                  {"largest_lateness_ns", health.largest_lateness_ns},
                  {"seconds", health.seconds}}}};
   if (health.irregular > 0) json["health"]["irregular"] = health.irregular;
+  if (health.lost > 0) json["health"]["lost"] = health.lost;
   if (!run.timing.empty()) json["timing"] = json_of(run.timing);
   return text_of(json);
 }
@@ -154,6 +155,7 @@ LogRun parse_run_end(std::string_view text) {
     end.health.missing = health.at("missing").get<std::uint64_t>();
     end.health.marked = health.at("marked").get<std::uint64_t>();
     end.health.irregular = health.value("irregular", std::uint64_t{0});
+    end.health.lost = health.value("lost", std::uint64_t{0});
     end.health.largest_lateness_ns = health.at("largest_lateness_ns").get<std::int64_t>();
     end.health.seconds = health.at("seconds").get<double>();
     if (json.contains("timing")) end.timing = timing_of(json.at("timing"));

@@ -169,6 +169,7 @@ class Recovery {
     run_->begin.complete = complete && run_->usable && excited;
     report_.complete_runs += run_->begin.complete ? 1 : 0;
     run_->begin.health.marked += filled_;
+    run_->begin.health.lost += filled_;
     append_json(SlogBlockType::run_end, run_end_json(run_->begin), time_ns);
     report_.rows_lost += filled_;
     filled_ = 0;

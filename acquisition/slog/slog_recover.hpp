@@ -44,7 +44,8 @@ struct RecoverReport {
 /// Copies all intact blocks of a native log to a new, intact log.
 ///
 /// Missing rows inside a run become marked rows of zeros, so that the periods before and after them remain
-/// usable and whole runs remain complete. Runs without their start, excitation or end are kept as incomplete. A
+/// usable and whole runs remain complete. They are counted in RunHealth::lost, and such runs are repeated when
+/// the log is resumed. Runs without their start, excitation or end are kept as incomplete. A
 /// log without end block gets one (exit code 1). `to` is written completely or not at all.
 /// @throws FileError, FormatError if no block or no description of the log is left.
 /// @throws std::invalid_argument if both names are the same file.

@@ -64,7 +64,7 @@ bool is_complete(const std::filesystem::path& log, const ExperimentConfig& confi
   if (!std::filesystem::exists(log)) return false;
   const std::unique_ptr<LogReader> reader = open_log(log, false);
   return measurement_id_of(reader->info()) == config.measurement_id &&
-         plan.runs_without(complete_runs(*reader)).empty();
+         plan.runs_without(runs_without_loss(*reader)).empty();
 }
 
 constexpr std::array kResults = {"excitation.h5", "run.slog",   "frf.h5",   "frf_validation.h5",

@@ -28,7 +28,7 @@
 namespace stageid {
 namespace {
 
-/// The complete runs of a log, after checking that it belongs to this experiment.
+/// The runs of a log that need not be repeated, after checking that it belongs to this experiment.
 std::vector<RunId> runs_to_skip(const ExperimentConfig& config, const std::filesystem::path& file) {
   const std::unique_ptr<LogReader> log = open_log(file, false);
   const std::string id = measurement_id_of(log->info());
@@ -37,7 +37,7 @@ std::vector<RunId> runs_to_skip(const ExperimentConfig& config, const std::files
         "{}: belongs to another experiment (stage, excitation or seed differ from {}); choose "
         "another name with -o",
         file.string(), config.file.string());
-  return complete_runs(*log);
+  return runs_without_loss(*log);
 }
 
 int exit_code_of(const ExperimentResult& result) {
@@ -256,10 +256,10 @@ void listen(RunExperimentOptions& options, const std::shared_ptr<EventLog>& even
 
 }  // namespace
 
-std::vector<RunId> complete_runs(const LogReader& log) {
+std::vector<RunId> runs_without_loss(const LogReader& log) {
   std::vector<RunId> runs;
   for (const LogRun& run : log.runs())
-    if (run.complete) runs.push_back({run.realization, run.experiment});
+    if (run.complete && run.health.lost == 0) runs.push_back({run.realization, run.experiment});
   return runs;
 }
 

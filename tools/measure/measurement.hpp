@@ -45,14 +45,15 @@ struct MeasurementResult {
   std::function<void()> show_end = [] {};  ///< on the dashboard, until its pages are closed
 };
 
-/// Performs the experiment and logs it. When a log is resumed, its complete runs are skipped.
+/// Performs the experiment and logs it. When a log is resumed, its complete runs are skipped, unless recovery
+/// has lost rows of them.
 /// @throws std::invalid_argument if the log exists and must not be resumed, or belongs to another experiment. @throws
 /// FileError, FormatError, StageError
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console);
 
-/// The runs of a log that were recorded to their end.
-std::vector<RunId> complete_runs(const LogReader& log);
+/// The runs of a log that were recorded to their end, and of which recovery has lost nothing.
+std::vector<RunId> runs_without_loss(const LogReader& log);
 
 /// Remedy for a measurement that ended early, to be appended to its message. Resuming helps after a lost link or an
 /// interrupt, but not if the same run would reach the same limit.

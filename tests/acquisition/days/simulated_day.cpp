@@ -360,6 +360,7 @@ class DayExperiment {
 
  private:
   static constexpr double kLoud = 15.0;
+  static constexpr double kFarthest = 1.05;  // hard windows: the motion of one sample is beyond
 
   bool complete() const { return done_.size() == plan_.runs().size(); }
 
@@ -381,6 +382,11 @@ class DayExperiment {
         plan_, disk,
         {.skip = {done_.begin(), done_.end()}, .ramp_s = 0.01, .between_runs = between_runs_});
     link.pass_rest();
+    // What a sensor does not show, nobody can prevent.
+    const bool blind = misfortune.has(Trouble::stage_fault) &&
+                       fault_traits(misfortune.fault.kind).target == FaultTarget::sensor;
+    if (!blind && testimony_.excursion > kFarthest)
+      blame(fmt::format("the stage is at {:.3g} hard windows", testimony_.excursion));
     if (testimony_.running) blame("the stage is not at rest");
     for (const std::string& broken : testimony_.broken) blame(broken);
     ++report_.ends[result.end];
@@ -436,7 +442,7 @@ class DayExperiment {
     const SlogReader reader(file_, false);
     std::set<RunId> runs;
     for (const LogRun& run : reader.runs())
-      if (run.complete) runs.insert({run.realization, run.experiment});
+      if (run.complete && run.health.lost == 0) runs.insert({run.realization, run.experiment});
     return runs;
   }
 

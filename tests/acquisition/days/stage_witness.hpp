@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/simulator/simulated_stage.hpp"
 #include "hal/stage/limits.hpp"
 #include "hal/stage/stage.hpp"
 
@@ -28,6 +29,7 @@ struct Testimony {
   std::vector<WitnessedRun> runs;
   std::vector<std::string> broken;  ///< limits that were not kept
   bool running = false;
+  double excursion = 0.0;  ///< the largest true one, relative to the hard window
 };
 
 /// Stands between everything that is tested and a simulated stage. It recomputes from the definitions in limits.hpp
@@ -36,7 +38,7 @@ class StageWitness final : public CyclicStage {
  public:
   /// @param limits complete_limits()
   /// @param before called before every exchange with its number, counted over all runs
-  StageWitness(std::unique_ptr<CyclicStage> stage, StageLimits limits, Testimony& testimony,
+  StageWitness(std::unique_ptr<SimulatedStage> stage, StageLimits limits, Testimony& testimony,
                std::function<void(std::uint64_t)> before)
       : stage_(std::move(stage)),
         limits_(std::move(limits)),
@@ -59,6 +61,12 @@ class StageWitness final : public CyclicStage {
     before_(exchanges_++);
     judge(outputs.u);
     const Outcome outcome = stage_->exchange(outputs, inputs, deadline);
+    place_.resize(inputs.y.size());
+    stage_->displacement(place_);
+    for (std::size_t i = 0; i < place_.size(); ++i)
+      testimony_.excursion =
+          std::max(testimony_.excursion,
+                   std::abs(place_[i]) / limits_.hard_window_m[static_cast<Eigen::Index>(i)]);
     WitnessedRun& run = testimony_.runs.back();
     run.u.emplace_back(outputs.u.begin(), outputs.u.end());
     run.y.emplace_back(inputs.y.begin(), inputs.y.end());
@@ -103,11 +111,12 @@ class StageWitness final : public CyclicStage {
         fmt::format("force {} {} in exchange {}", actuator, what, exchanges_));
   }
 
-  std::unique_ptr<CyclicStage> stage_;
+  std::unique_ptr<SimulatedStage> stage_;
   StageLimits limits_;
   Testimony& testimony_;
   std::function<void(std::uint64_t)> before_;
   std::uint64_t exchanges_ = 0;
+  std::vector<double> place_;
   std::vector<double> last_;
   std::vector<double> mean_square_;
   bool beyond_ = false;  // a measurement is beyond the hard window

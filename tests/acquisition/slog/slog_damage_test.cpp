@@ -268,6 +268,8 @@ TEST_F(SlogRecover, RowsLostInTheMiddleBecomeMarkedRows) {
     reader.read(1, 18, 18, samples);
     EXPECT_TRUE(test::holds_rows(samples, 1, 18));
     EXPECT_EQ(reader.runs()[1].health.marked, test::run_of(1).health.marked + 9);
+    for (const std::size_t run : {0U, 1U, 2U})
+      EXPECT_EQ(reader.runs()[run].health.lost, run == 1 ? 9U : 0U);
   }
 }
 
