@@ -20,6 +20,7 @@
 #include "acquisition/formats/open_log.hpp"
 #include "acquisition/record/experiment_plan_file.hpp"
 #include "acquisition/record/log_reader.hpp"
+#include "acquisition/slog/slog_scan.hpp"
 #include "estimation/modal/validation.hpp"
 #include "estimation/request/fit_request.hpp"
 #include "frf/file/frf_file.hpp"
@@ -61,7 +62,7 @@ bool newer_than(const std::filesystem::path& output, const std::filesystem::path
 /// Whether a log has all runs.
 bool is_complete(const std::filesystem::path& log, const ExperimentConfig& config,
                  const ExperimentPlan& plan) {
-  if (!std::filesystem::exists(log)) return false;
+  if (!std::filesystem::exists(log) || is_unwritten_slog(log)) return false;
   const std::unique_ptr<LogReader> reader = open_log(log, false);
   return measurement_id_of(reader->info()) == config.measurement_id &&
          plan.runs_without(runs_without_loss(*reader)).empty();

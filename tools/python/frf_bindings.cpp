@@ -162,12 +162,12 @@ auto view(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> ChannelData::*co
   };
 }
 
-const char* of(const char* name) { return docstring(std::string("Frf.") + name); }
+const char* of_frf(const char* name) { return docstring(std::string("Frf.") + name); }
 
 template <typename Class>
-void define_properties(Class& c) {
+void define_frf_properties(Class& c) {
   const auto array = [&](const char* name, auto get) {
-    c.def_property_readonly(name, get, of(name));
+    c.def_property_readonly(name, get, of_frf(name));
   };
   array("response", view(&FrfEstimate::response));
   array("noise_variance", view(&FrfEstimate::noise_variance));
@@ -175,11 +175,11 @@ void define_properties(Class& c) {
   c.def_property_readonly(
       "frequency_hz",
       [](const FrfHandle& h) -> const Eigen::VectorXd& { return h.frf.frequency_hz; },
-      py::return_value_policy::reference_internal, of("frequency_hz"));
+      py::return_value_policy::reference_internal, of_frf("frequency_hz"));
 
   const auto property = [&](const char* name, auto get) {
     c.def_property_readonly(
-        name, [get](const FrfHandle& h) { return get(h.frf); }, of(name));
+        name, [get](const FrfHandle& h) { return get(h.frf); }, of_frf(name));
   };
   using F = FrfEstimate;
   property("inputs", [](const F& f) { return f.inputs.names; });
@@ -212,14 +212,14 @@ void define_frf(py::module_& module) {
         "noise_variance"_a = py::none(), "total_variance"_a = py::none(),
         "noise_dof"_a = py::none(), "total_dof"_a = py::none(), "inputs"_a = py::none(),
         "outputs"_a = py::none(), "input_units"_a = py::none(), "output_units"_a = py::none(),
-        "sample_rate_hz"_a = py::none(), "hold"_a = "none", of("__init__"));
+        "sample_rate_hz"_a = py::none(), "hold"_a = "none", of_frf("__init__"));
   c.def(py::pickle([](const FrfHandle& frf) { return state_of(frf); }, &frf_of_state));
-  define_properties(c);
+  define_frf_properties(c);
   c.def("select", &select, py::kw_only(), "band_hz"_a = py::none(), "inputs"_a = py::none(),
-        "outputs"_a = py::none(), of("select"));
-  c.def("compensate", &compensated, "what"_a, "delay_s"_a, of("compensate"));
+        "outputs"_a = py::none(), of_frf("select"));
+  c.def("compensate", &compensated, "what"_a, "delay_s"_a, of_frf("compensate"));
   c.def("confidence_radius", &radius, "level"_a = 0.95, "variance"_a = "noise",
-        of("confidence_radius"));
+        of_frf("confidence_radius"));
   module.def("frf", &frf, "logs"_a, py::kw_only(), "inputs"_a = py::none(),
              "outputs"_a = py::none(), "realizations"_a = py::none(),
              "transient_periods"_a = py::none(), "method"_a = "periodic",

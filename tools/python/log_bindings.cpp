@@ -125,20 +125,20 @@ py::object arrays(const LogReader& log) {
 
 std::shared_ptr<LogReader> read_log(const std::filesystem::path& file) { return open_log(file); }
 
-const char* of(const char* name) { return docstring(std::string("Log.") + name); }
+const char* of_log(const char* name) { return docstring(std::string("Log.") + name); }
 
 template <typename Class>
-void define_properties(Class& log) {
+void define_log_properties(Class& log) {
   log.def_property_readonly(
       "realizations",
       [](const LogReader& l) {
         const std::set<int> found = complete_realizations(l);
         return std::vector<int>(found.begin(), found.end());
       },
-      of("realizations"));
+      of_log("realizations"));
   const auto property = [&](const char* name, auto get) {
     log.def_property_readonly(
-        name, [get](const LogReader& l) { return get(l.info()); }, of(name));
+        name, [get](const LogReader& l) { return get(l.info()); }, of_log(name));
   };
   using I = LogInfo;
   property("sample_rate_hz", [](const I& i) { return i.sample_rate_hz; });
@@ -158,19 +158,19 @@ void define_logs(py::module_& module) {
   log.def(py::init(&log_of_arrays), "r"_a, "u"_a, "y"_a, py::kw_only(), "sample_rate_hz"_a,
           "transient_periods"_a = 0, "excitation"_a = py::none(), "actuators"_a = py::none(),
           "sensors"_a = py::none(), "actuator_units"_a = py::none(), "sensor_units"_a = py::none(),
-          "marked"_a = py::none(), of("__init__"));
+          "marked"_a = py::none(), of_log("__init__"));
   log.def(py::pickle([](const LogReader& l) { return state_of(l); }, &log_of_state));
-  define_properties(log);
+  define_log_properties(log);
   log.def(
-      "__len__", [](const LogReader& l) { return l.runs().size(); }, of("__len__"));
+      "__len__", [](const LogReader& l) { return l.runs().size(); }, of_log("__len__"));
   log.def(
       "__iter__",
       [](const py::object& self) {
         return py::reinterpret_steal<py::object>(PySeqIter_New(self.ptr()));
       },
-      of("__iter__"));
-  log.def("__getitem__", &run_at, "run"_a, of("__getitem__"));
-  log.def("arrays", &arrays, of("arrays"));
+      of_log("__iter__"));
+  log.def("__getitem__", &run_at, "run"_a, of_log("__getitem__"));
+  log.def("arrays", &arrays, of_log("arrays"));
   module.def("read_log", &read_log, "file"_a, docstring("read_log"));
   module.def("simulate", &simulate, "config"_a, docstring("simulate"));
 }

@@ -2,31 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
-#include <memory>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
 
-#include "acquisition/files/file_error.hpp"
-#include "acquisition/loop/run_resident.hpp"
 #include "acquisition/slog/slog_reader.hpp"
 #include "acquisition/slog/slog_recover.hpp"
 #include "acquisition/slog/slog_scan.hpp"
-#include "acquisition/slog/slog_writer.hpp"
-#include "hal/can/can_node.hpp"
-#include "hal/can/can_resident_stage.hpp"
-#include "hal/can/can_stage.hpp"
-#include "hal/simulator/fault_script.hpp"
-#include "tests/acquisition/days/stage_witness.hpp"
-#include "tests/hal/can/altered_can.hpp"
-#include "tests/support/process/random_numbers.hpp"
+#include "tests/acquisition/days/day_link.hpp"
+#include "tests/acquisition/days/disk_log.hpp"
 #include "tests/support/process/temporary_directory.hpp"
-#include "tests/support/stages/can_pair.hpp"
 #include "tests/support/stages/stop_case.hpp"
 #include "tests/support/stages/wafer_stage.hpp"
 
@@ -36,8 +24,6 @@ namespace {
 
 constexpr int kPeriod = 400;
 constexpr double kCounts = 1 << 23;  // of a range in a CAN frame
-
-enum class Link : std::uint8_t { direct, streaming, resident };
 
 /// The wafer stage, or one axis whose limits of all kinds are a few times what a healthy experiment needs.
 SimulatedSpec day_stage(bool wafer, bool predicted) {
@@ -73,270 +59,6 @@ ExperimentPlan day_plan(RandomNumbers& random, const SimulatedSpec& stage) {
       spec};
 }
 
-/// All channels on one virtual bus, which is fast enough for 10 kHz. Ranges beyond the limits.
-CanSpec day_bus(const SimulatedSpec& stage) {
-  CanBusSpec bus{"pair0", 10e6, 80e6, {}, {}};
-  bus.actuators.resize(stage.info.actuators.size());
-  bus.sensors.resize(stage.info.sensors.size());
-  std::iota(bus.actuators.begin(), bus.actuators.end(), 0);
-  std::iota(bus.sensors.begin(), bus.sensors.end(), 0);
-  CanSpec can;
-  can.buses = {bus};
-  for (const double limit_n : stage.limits.actuator_n)
-    can.actuator_range_n.push_back(1.25 * limit_n);
-  for (const double window_m : stage.limits.position_window_m)
-    can.sensor_range_m.push_back(4.0 * window_m);
-  return can;
-}
-
-/// What goes wrong in one attempt, and when: counted in exchanges of the attempt, or calls of the log.
-struct Misfortune {
-  std::set<Trouble> troubles;
-  std::uint64_t at = 0;
-  int log_call = -1;
-  double frames_spoiled = 0.0;
-  SimulationSpec::Fault fault;
-
-  bool has(Trouble trouble) const { return troubles.contains(trouble); }
-  std::string describe() const {
-    std::string text;
-    for (const Trouble trouble : troubles) text += fmt::format("{}, ", to_string(trouble));
-    return text + fmt::format("exchange {}, call {} of the log, fault {} {} from {} of run {}", at,
-                              log_call, to_string(fault.kind), fault.value, fault.from_cycle,
-                              fault.run);
-  }
-};
-
-SimulationSpec::Fault draw_fault(RandomNumbers& random, const StageInfo& info,
-                                 std::uint64_t samples) {
-  using Kind = SimulationSpec::Fault::Kind;
-  struct Choice {
-    Kind kind;
-    double low;
-    double high;
-  };
-  static constexpr std::array kChoices = {
-      Choice{Kind::dead_sensor, 0, 0},          Choice{Kind::nan_sensor, 0, 0},
-      Choice{Kind::missed_cycle, 0, 0},         Choice{Kind::interlock, 0, 0},
-      Choice{Kind::stuck_actuator, 0, 0},       Choice{Kind::stuck_sensor, 0, 0},
-      Choice{Kind::sensor_offset, -3e-4, 3e-4}, Choice{Kind::sensor_drift, -1e-2, 1e-2},
-      Choice{Kind::actuator_gain, -3.0, 3.0},   Choice{Kind::extra_delay, 1, 40},
-      Choice{Kind::sensor_gain, -1.0, 3.0},     Choice{Kind::sensor_noise, 1, 1e4}};
-  const Choice& choice =
-      kChoices[static_cast<std::size_t>(random.integer(0, static_cast<int>(kChoices.size()) - 1))];
-  SimulationSpec::Fault fault;
-  fault.kind = choice.kind;
-  const bool of_sensor = fault_traits(choice.kind).target == FaultTarget::sensor;
-  fault.channel = random.integer(
-      0, static_cast<int>(of_sensor ? info.sensors.size() : info.actuators.size()) - 1);
-  fault.from_cycle = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples));
-  fault.cycles = static_cast<std::uint64_t>(random.integer(1, 30));
-  fault.run = random.integer(0, 2);
-  fault.value = random.uniform(choice.low, choice.high);
-  if (fault.kind == Kind::extra_delay) fault.value = std::round(fault.value);
-  return fault;
-}
-
-Misfortune draw_misfortune(RandomNumbers& random, Link link, const StageInfo& info,
-                           const ExperimentPlan& plan) {
-  std::vector<Trouble> possible = {Trouble::stage_fault, Trouble::stage_fault, Trouble::loud,
-                                   Trouble::interrupted, Trouble::tripped,     Trouble::disk};
-  if (link != Link::direct)
-    possible.insert(possible.end(),
-                    {Trouble::wire, Trouble::cut, Trouble::bus, Trouble::interlock});
-  Misfortune out;
-  for (int n = random.integer(0, 2); n >= 0; --n)
-    out.troubles.insert(possible[static_cast<std::size_t>(
-        random.integer(0, static_cast<int>(possible.size()) - 1))]);
-  if (random.uniform() < 0.5) out.troubles.insert(Trouble::killed);
-  const auto samples = static_cast<std::uint64_t>(plan.samples_per_run());
-  const auto runs = plan.runs().size();
-  out.at = static_cast<std::uint64_t>(random.uniform() * static_cast<double>(samples * runs));
-  out.log_call = random.integer(0, 4 * static_cast<int>(runs));
-  out.frames_spoiled = std::pow(10.0, random.uniform(-4.0, -0.7));
-  out.fault = draw_fault(random, info, samples);
-  return out;
-}
-
-/// A log on a disk that may fail. It knows what was synchronized when.
-class DiskLog final : public RunWriter {
- public:
-  struct Synchronized {
-    std::uint64_t bytes = 0;
-    int complete_runs = 0;
-  };
-
-  static constexpr std::size_t kBlockRows = 100;
-
-  DiskLog(SlogWriter& log, int failing_call)
-      : log_(log), calls_left_(failing_call), synchronized_({{log.bytes(), 0}}) {}
-
-  const LogInfo& info() const noexcept override { return log_.info(); }
-  void begin_run(const LogRun& run, const Eigen::Ref<const Eigen::MatrixXd>& excitation) override {
-    use();
-    log_.begin_run(run, excitation);
-  }
-  void write(std::span<const double> rows) override {
-    use();
-    // Smaller blocks than those of real logs, so that few of them can be lost.
-    const std::size_t block = kBlockRows * slog_row_words(info());
-    for (; !rows.empty(); rows = rows.subspan(std::min(block, rows.size())))
-      log_.write(rows.first(std::min(block, rows.size())));
-  }
-  void end_run(const LogRun& run) override {
-    use();
-    log_.end_run(run);
-    complete_runs_ += run.complete ? 1 : 0;
-  }
-  void synchronize() override {
-    log_.synchronize();
-    synchronized_.push_back({log_.bytes(), complete_runs_});
-  }
-
-  /// The last state of the medium that is certain when so many bytes were written.
-  Synchronized before(std::uint64_t bytes) const {
-    Synchronized last = synchronized_.front();
-    for (const Synchronized& state : synchronized_)
-      if (state.bytes <= bytes) last = state;
-    return last;
-  }
-  std::uint64_t bytes_before() const { return synchronized_.front().bytes; }
-
- private:
-  void use() {
-    if (calls_left_-- == 0) throw FileError("the log cannot be written: the disk is full");
-  }
-
-  SlogWriter& log_;
-  int calls_left_;
-  int complete_runs_ = 0;
-  std::vector<Synchronized> synchronized_;
-};
-
-/// The host's stage, directly or over CAN. The simulated stage is at the far end, behind the witness.
-class DayLink {
- public:
-  DayLink(SimulatedSpec spec, Link link, const Misfortune& misfortune, Testimony& testimony,
-          RandomNumbers& random)
-      : spec_(std::move(spec)), misfortune_(misfortune), random_(random) {
-    auto witness = std::make_unique<StageWitness>(
-        simulated(spec_), complete_limits(spec_.limits, spec_.info), testimony,
-        [this](std::uint64_t exchange) { strike(exchange); });
-    if (link == Link::direct) {
-      host_ = std::make_unique<LimitedStage>(std::move(witness), spec_.limits);
-      return;
-    }
-    const CanSpec can = day_bus(spec_);
-    node_ = std::make_unique<StageNode>(std::move(witness), spec_.limits, spec_.controller,
-                                        NodePanel{}, NodeOptions{.watchdog_s = can.watchdog_s});
-    node_bus_ = std::make_unique<AlteredCan>(pair_.node(), spoil());
-    front_ = std::make_unique<CanNode>(*node_, can_layout(can, spec_.info), *node_bus_);
-    pair_.when_host_waits([this] { serve(); });
-    const CanHostOptions options{.reset_fault = true};
-    auto host_bus = std::make_unique<AlteredCan>(pair_.host(), spoil());
-    if (link == Link::resident)
-      resident_ = std::make_unique<CanResidentStage>(spec_.info, can, std::move(host_bus), options);
-    else
-      host_ = std::make_unique<LimitedStage>(
-          std::make_unique<CanStage>(spec_.info, can, std::move(host_bus), options), spec_.limits);
-  }
-  DayLink(DayLink&&) = delete;
-
-  ExperimentResult perform(const ExperimentPlan& plan, RunWriter& log,
-                           RunExperimentOptions options) {
-    options.interrupt = &interrupt;
-    options.plant_tripped = &tripped;
-    if (resident_) return run_resident_experiment(plan, *resident_, log, options);
-    MotionController controller(spec_.controller);
-    return run_experiment(plan, *host_, controller, log, options);
-  }
-  std::atomic<bool> interrupt = false;
-  std::atomic<bool> tripped = false;
-
-  /// The host is gone; a node notices it by itself.
-  void pass_rest() {
-    if (node_ == nullptr) return;
-    for (int ms = 0; ms < kRest_ms; ++ms) {
-      pair_.pass_time(1'000'000);
-      serve();
-    }
-  }
-
- private:
-  static constexpr int kRest_ms = 1000;
-
-  void strike(std::uint64_t exchange) {
-    if (exchange != misfortune_.at) return;
-    struck_ = true;
-    if (misfortune_.has(Trouble::interrupted)) interrupt = true;
-    if (misfortune_.has(Trouble::tripped)) tripped = true;
-  }
-
-  void serve() {
-    if (std::exchange(struck_, false)) {
-      cut_ = misfortune_.has(Trouble::cut);
-      if (misfortune_.has(Trouble::bus)) pair_.set_state(0, CanBusState::off);
-      if (misfortune_.has(Trouble::interlock)) {
-        NodePanel open;
-        open.interlock_closed = false;
-        node_->set_panel(open);
-      }
-    }
-    front_->serve(0);
-  }
-
-  AlteredCan::Alter spoil() {
-    return [this, late = std::optional<CanFrame>{}](std::span<CanFrame> frames,
-                                                    std::size_t count) mutable {
-      if (cut_) return std::size_t{0};
-      if (!misfortune_.has(Trouble::wire)) return count;
-      std::vector<CanFrame> after;
-      if (late && random_.uniform() < 0.5) after.push_back(*std::exchange(late, {}));
-      std::size_t kept = 0;
-      for (std::size_t i = 0; i < count; ++i) {
-        CanFrame& frame = frames[kept++] = frames[i];
-        switch (random_.uniform() < misfortune_.frames_spoiled ? random_.integer(0, 5) : -1) {
-          case 0:
-            frame.data[static_cast<std::size_t>(random_.integer(0, 63))] ^= 4;
-            break;
-          case 1:
-            frame.length /= 2;
-            break;
-          case 2:
-            frame.id ^= 1;
-            break;
-          case 3:
-            after.push_back(frame);  // arrives twice
-            break;
-          case 4:
-            late = frame;
-            [[fallthrough]];
-          case 5:
-            --kept;  // lost
-            break;
-          default:
-            break;
-        }
-      }
-      for (const CanFrame& frame : after)
-        if (kept < frames.size()) frames[kept++] = frame;
-      return kept;
-    };
-  }
-
-  SimulatedSpec spec_;
-  const Misfortune& misfortune_;
-  RandomNumbers& random_;
-  CanPair pair_{{"pair0"}};
-  std::unique_ptr<StageNode> node_;
-  std::unique_ptr<CanTransport> node_bus_;
-  std::unique_ptr<CanNode> front_;
-  std::unique_ptr<LimitedStage> host_;  // one of these two
-  std::unique_ptr<CanResidentStage> resident_;
-  bool struck_ = false;
-  bool cut_ = false;
-};
-
 /// One experiment: a plan, its log and the attempts to complete it.
 class DayExperiment {
  public:
@@ -353,7 +75,8 @@ class DayExperiment {
 
   void perform() {
     for (int attempts = random_.integer(1, 4); attempts > 0 && !complete(); --attempts)
-      attempt(draw_misfortune(random_, link_, stage_.info, plan_), RandomNumbers(random_.number()));
+      attempt(draw_misfortune(random_, link_ != Link::direct, stage_.info, plan_),
+              RandomNumbers(random_.number()));
     if (!complete()) attempt({}, RandomNumbers(0));
     if (!complete()) blame("the experiment is not complete after an attempt without trouble");
   }
@@ -367,7 +90,6 @@ class DayExperiment {
   /// How much is drawn from `random` may depend on when the loop notices that the log has failed.
   void attempt(const Misfortune& misfortune, RandomNumbers random) {
     ++report_.attempts;
-
     misfortune_ = misfortune.describe();
     for (const Trouble trouble : misfortune.troubles) ++report_.troubles[trouble];
     SimulatedSpec spec = stage_;

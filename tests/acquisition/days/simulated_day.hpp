@@ -1,37 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "acquisition/loop/run_experiment.hpp"
-#include "excitation/words/words.hpp"
-
-namespace stageid::test {
-
-enum class Trouble : std::uint8_t {
-  stage_fault,  ///< of SimulationSpec
-  loud,         ///< the excitation exceeds limits
-  wire,         ///< frames are lost, damaged, repeated or come in another order
-  cut,          ///< no frame arrives any more
-  bus,          ///< the bus is off
-  interlock,    ///< of the node's panel
-  interrupted,  ///< by the user
-  tripped,      ///< by a condition of the plant
-  disk,         ///< the log cannot be written
-  killed        ///< or without power: what was not synchronized is lost or damaged
-};
-
-}  // namespace stageid::test
-
-namespace stageid {
-template <>
-inline constexpr std::array kWords<test::Trouble> = {
-    "stage fault", "loud",        "wire",    "cut",  "bus",
-    "interlock",   "interrupted", "tripped", "disk", "killed"};
-}  // namespace stageid
+#include "tests/acquisition/days/misfortune.hpp"
 
 namespace stageid::test {
 

@@ -5,7 +5,7 @@ experiment can be resumed.
 
     power_cut_test.py PROGRAM CONFIGS RECORDER WORK_DIR ORDERS [SEED]
 RECORDER: the library made of sync_recorder.c
-ORDERS: how many states of the disk per format; ten times as many of the log
+ORDERS: how many states of the disk per format, and of identify; ten times as many of the log
 """
 
 import json
@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 
 PROGRAM, CONFIGS, RECORDER, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
@@ -64,6 +65,7 @@ class Trace:
         self.initial = self.listing()
         data = {inode: (OUT / name).read_bytes() for name, inode in self.initial.items()}
         done = stageid(*arguments, LD_PRELOAD=str(RECORDER), STAGEID_SYNC_OF=str(OUT), STAGEID_SYNC_TO=str(to))
+        self.returncode = done.returncode
         if done.returncode not in (0, 3):
             sys.exit(f"{' '.join(arguments)}: {done.stderr}")
         self.final = {name: (OUT / name).read_bytes() for name in self.listing()}
@@ -196,6 +198,39 @@ def check_log(name, trace, truth, orders, failures):
     print(f"{name}: {orders} orders, of {check.refused} nothing to recover")
 
 
+def numbers(folder):
+    with h5py.File(folder / "frf.h5") as frf:
+        return frf["response"][:], json.loads((folder / "model.json").read_text())["submodels"]
+
+
+def check_identify(orders, failures):
+    """The whole of identify is continued after a cut, and ends as without one."""
+    shutil.rmtree(OUT, ignore_errors=True)
+    OUT.mkdir()
+    command = ["identify", EXPERIMENT, "-o"]
+    trace = Trace([*command, "out"])
+    response, submodels = numbers(OUT)
+    cut = WORK / "cut"
+    for order in range(orders):
+        shutil.rmtree(cut, ignore_errors=True)
+        cut.mkdir()
+        for name, content in trace.cut()[0].items():
+            (cut / name).write_bytes(content)
+            os.utime(cut / name, (1e9, 1e9))
+        done = stageid(*command, "cut", "--resume")
+        if done.returncode == 2 and "log recover" in done.stderr:
+            stageid("log", "recover", "cut/run.slog", "-o", "whole.slog")
+            os.replace(WORK / "whole.slog", cut / "run.slog")
+            done = stageid(*command, "cut", "--resume")
+        if done.returncode != trace.returncode:
+            failures.append(f"identify: order {order}: exit code {done.returncode}: {done.stderr[-300:]}")
+            continue
+        resumed = numbers(cut)
+        if not np.array_equal(resumed[0], response) or resumed[1] != submodels:
+            failures.append(f"identify: order {order}: other results")
+    print(f"identify: {orders} orders")
+
+
 def check_output(name, arguments, existing, failures):
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir()
@@ -224,6 +259,7 @@ def main():
     trace = Trace(["run", EXPERIMENT, "-o", "out/run.slog"])
     truth = trace.final["run.slog"]
     check_log("run.slog", trace, truth, 10 * ORDERS, failures)
+    check_identify(ORDERS, failures)
 
     (WORK / "run.slog").write_bytes(truth)
     for arguments in (["frf", "run.slog", "-o", "frf.h5"], ["fit", "frf.h5", "--modes", "4", "-o", "model.json"]):
