@@ -8,6 +8,7 @@ that no test notices, or whose text is no longer in the source, makes the run fa
 ninja and the packages of tools/test; takes a few minutes, so it is not part of ctest.
 """
 import argparse
+import os
 import pathlib
 import re
 import subprocess
@@ -142,7 +143,9 @@ MUTANTS = [
     ('an interrupt is forgotten', 'acquisition/loop/run_experiment.cpp',
      'if (interrupted()) loop_.request_stop', 'if (false) loop_.request_stop', DAYS),
     ('a log that failed is taken for written', 'acquisition/loop/run_experiment.cpp',
-     'if (log_.failed()) take_log_failure();', '', DAYS),
+     'if (log_.failed()) result_.take_log_failure(log_.error());', '', DAYS),
+    ('samples lost in recovery are not counted', 'acquisition/slog/slog_recover.cpp',
+     'run_->begin.health.lost += filled_;', '', ['acquisition:SlogRecover.*']),
     ('the excitation of another run', 'acquisition/loop/run_experiment.cpp',
      'plan_.excitation(id), actuators_', 'plan_.excitation(runs_.front()), actuators_', DAYS),
 ]
@@ -178,6 +181,7 @@ def main():
     parser.add_argument('--work', default=str(ROOT / 'build' / 'mutants'))
     parser.add_argument('--only', default='', help='mutants whose name contains this')
     arguments = parser.parse_args()
+    os.environ.setdefault('STAGEID_DAYS', '10')  # most are found in the first
     work = pathlib.Path(arguments.work)
     source, build = work / 'source', str(work / 'build')
     if not source.exists():
