@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Plants one fault at a time in a copy of the sources and shows which tests notice it.
 
-    tests/mutants/run.py [--work DIR] [--only NAME]
+    tests/mutants/run.py [--work DIR] [--only NAME] [--check]
 
 Every mutant is one textual change; its folder's test program is built and run and must fail. A mutant
 that no test notices, or whose text is no longer in the source, makes the run fail. Needs git, cmake,
-ninja and the packages of tools/test; takes a few minutes, so it is not part of ctest.
+ninja and the packages of tools/test; takes long, so only --check is part of ctest.
 """
 import argparse
 import os
@@ -66,7 +66,7 @@ MUTANTS = [
     ('a deviation at the last coefficient ends with it', 'frf/periods/period_outliers.cpp',
      'i + 1 == positions.size()', 'i > positions.size()', ['frf']),
     ('realizations count alike in the test of linearity', 'frf/response/nonlinearity.cpp',
-     'evidence.scatter.total.size() > 0', 'evidence.scatter.total.size() < 0', ['frf']),
+     'known.total.size() > 0', 'known.total.size() < 0', ['frf']),
     ('records that are not settled are tested all the same', 'frf/response/nonlinearity.cpp',
      'settled_p_value[b] >= kUnsettledBelow', 'settled_p_value[b] >= 0.0', ['frf']),
     ('sinc of the hold forgotten', 'frf/response/hold_compensation.cpp',
@@ -82,7 +82,7 @@ MUTANTS = [
     ('equation error added, not subtracted', 'estimation/equations/arrow_system.cpp',
      'channel.ba.leftCols(n_a) -= sums.FY', 'channel.ba.leftCols(n_a) += sums.FY', ['estimation']),
     ('frozen parameters move in factored steps', 'estimation/equations/factored_equations.cpp',
-     'if (std::find(frozen.begin(), frozen.end(), i) == frozen.end()) free.push_back(i);', 'free.push_back(i);',
+     'if (std::ranges::find(frozen, i) == frozen.end()) free.push_back(i);', 'free.push_back(i);',
      ['estimation']),
     ('reflected poles left unstable', 'estimation/start/pole_relocation.cpp',
      's = {-std::max(std::abs(s.real()), narrowest(size) * size), s.imag()}', 's = {s.real(), s.imag()}',
@@ -99,7 +99,7 @@ MUTANTS = [
     ('MAC without the conjugate', 'estimation/modal/modal_assurance.cpp',
      'a.adjoint() * b', 'a.transpose() * b', ['estimation']),
     ('a larger cost is accepted', 'estimation/iteration/fit_iteration.cpp',
-     'trial->cost < cost_)', 'trial->cost < 1e9 * cost_)', ['estimation']),
+     'trial->solved.cost < cost_)', 'trial->solved.cost < 1e9 * cost_)', ['estimation']),
     ('CMIF not squared', 'estimation/model/cmif.cpp', '.cwiseAbs2();\n', '.cwiseAbs();\n', ['estimation']),
     ('even and odd lines swapped', 'excitation/multisine/frequency_grid.cpp',
      'return line % 2 != 0;', 'return line % 2 == 0;', ['excitation']),
@@ -151,14 +151,12 @@ MUTANTS = [
 ]
 
 
-def replace(path, old, new):
-    text = path.read_text()
+def changed(path, old, new):
     # Formatting may break a line anywhere: white space matches white space.
     pattern = r'\s*'.join(re.escape(part) for part in re.split(r'\s+', old))
-    changed, count = re.subn(pattern, lambda _: new, text, count=1)
+    text, count = re.subn(pattern, lambda _: new, path.read_text(), count=1)
     if count == 0:
         raise SystemExit(f'{path}: the text of the mutant is gone: {old}')
-    path.write_text(changed)
     return text
 
 
@@ -180,7 +178,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--work', default=str(ROOT / 'build' / 'mutants'))
     parser.add_argument('--only', default='', help='mutants whose name contains this')
+    parser.add_argument('--check', action='store_true', help='only whether the texts are in the sources')
     arguments = parser.parse_args()
+    if arguments.check:
+        for _, file, old, new, _ in MUTANTS:
+            changed(ROOT / file, old, new)
+        return 0
     os.environ.setdefault('STAGEID_DAYS', '10')  # most are found in the first
     work = pathlib.Path(arguments.work)
     source, build = work / 'source', str(work / 'build')
@@ -196,7 +199,8 @@ def main():
             raise SystemExit(f'{folder}_tests fail without a mutant: {first}')
     survivors = 0
     for name, file, old, new, folders in chosen:
-        original = replace(source / file, old, new)
+        original = (source / file).read_text()
+        (source / file).write_text(changed(source / file, old, new))
         noticed = []
         for folder in folders:
             compiled, passed, first = test(build, folder)
