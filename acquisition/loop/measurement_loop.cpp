@@ -115,7 +115,7 @@ void MeasurementLoop::next(PreparedExcitation& excitation) noexcept {
 }
 
 void MeasurementLoop::release() noexcept {
-  if (phase_ == Phase::holding) end(StopReason::none);
+  if (phase_ != Phase::idle) end(reason_);  // a stop that was requested while it was held, too
 }
 
 /// The next run. `quiet_samples` pass without excitation.

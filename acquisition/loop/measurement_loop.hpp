@@ -94,7 +94,7 @@ class MeasurementLoop {
   PreparedExcitation prepare(const LoopExcitation& excitation) const;
   /// Begins the next run while the stage is held. Swaps, so that nothing is allocated or freed.
   void next(PreparedExcitation& excitation) noexcept;
-  /// Ends holding: opens the loop.
+  /// Ends holding: opens the loop, also if a stop was requested meanwhile.
   void release() noexcept;
   bool holding() const noexcept { return phase_ == Phase::holding; }
   bool ended() const noexcept { return phase_ == Phase::idle; }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <set>
+#include <utility>
 
 #include "acquisition/files/fail.hpp"
 #include "acquisition/record/log_checks.hpp"
@@ -10,6 +12,20 @@
 #include "acquisition/slog/crc32c.hpp"
 
 namespace stageid {
+
+namespace {
+
+/// Of a run that lost samples in recovery and was repeated, the repetition counts.
+void leave_out_repeated(std::vector<LogRun>& runs) {
+  std::set<std::pair<int, int>> later;
+  for (auto run = runs.rbegin(); run != runs.rend(); ++run) {
+    if (!run->complete) continue;
+    const bool is_last = later.insert({run->realization, run->experiment}).second;
+    if (!is_last && run->health.lost > 0) run->complete = false;
+  }
+}
+
+}  // namespace
 
 namespace {
 
@@ -52,6 +68,7 @@ void SlogReader::scan() {
   if (!runs_.empty()) runs_.pop_back();
   const std::vector<SlogRunIndex>& indexed = indexer_.index().runs;
   for (std::size_t i = runs_.size(); i < indexed.size(); ++i) runs_.push_back(indexed[i].run);
+  leave_out_repeated(runs_);
   check_runs(path(), info(), runs_);
 }
 

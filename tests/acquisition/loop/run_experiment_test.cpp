@@ -342,6 +342,20 @@ TEST_F(RunExperiment, AHeldStageIsControlledWhileTheResultIsEvaluated) {
   EXPECT_TRUE(cycled);
 }
 
+TEST_F(RunExperiment, AnInterruptWhenARunEndsStopsAHeldStage) {
+  // The first run ends after its leading ramp (100), its samples (300) and its landing (100).
+  for (std::uint64_t exchange = 495; exchange < 505; ++exchange) {
+    use(std::make_unique<test::AnalyticStage>(kActuators, kSensors), {});
+    std::atomic<bool> interrupt = false;
+    inner_->raise = {{exchange, &interrupt}};
+    const ExperimentResult result =
+        measure_into(std::to_string(exchange) + ".slog",
+                     {.interrupt = &interrupt, .between_runs = BetweenRuns::hold});
+    EXPECT_EQ(result.end, ExperimentEnd::interrupted) << exchange;
+    EXPECT_EQ(inner_->stops(), 1) << exchange;
+  }
+}
+
 TEST_F(RunExperiment, ALimitBetweenRunsStopsAHeldStageAndKeepsTheRun) {
   StageLimits limits;
   limits.position_window_m = Eigen::VectorXd::Constant(kSensors, 0.5);

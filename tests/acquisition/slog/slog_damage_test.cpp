@@ -273,6 +273,19 @@ TEST_F(SlogRecover, RowsLostInTheMiddleBecomeMarkedRows) {
   }
 }
 
+TEST_F(SlogRecover, ARunThatLostRowsIsReplacedByItsRepetition) {
+  recover(with_damage(block(SlogBlockType::samples, 5), 100));  // in run 1
+  SlogWriter log = SlogWriter::resume(out_, test::small_info());
+  log.begin_run(test::run_of(1), test::excitation_of(1));
+  log.write(test::rows_of(1, 0, 36));
+  log.end_run(test::run_of(1));
+  log.close(0, "");
+  const SlogReader reader(out_);
+  ASSERT_EQ(reader.runs().size(), 4U);
+  EXPECT_TRUE(reader.runs()[0].complete && !reader.runs()[1].complete);
+  EXPECT_TRUE(reader.runs()[2].complete && reader.runs()[3].complete);
+}
+
 TEST_F(SlogRecover, EverySingleDamagedBlockLeavesAllOthers) {
   for (std::size_t damaged = 0; damaged < blocks_.size(); ++damaged) {
     const RecoverReport report = recover(with_damage(damaged, 70));
