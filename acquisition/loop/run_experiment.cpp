@@ -399,6 +399,13 @@ LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
   return info;
 }
 
+std::vector<RunId> runs_without_loss(const LogReader& log) {
+  std::vector<RunId> runs;
+  for (const LogRun& run : log.runs())
+    if (run.complete && run.health.lost == 0) runs.push_back({run.realization, run.experiment});
+  return runs;
+}
+
 bool RunExperimentOptions::interrupted() const noexcept {
   return interrupt != nullptr && interrupt->load(std::memory_order_relaxed);
 }

@@ -8,6 +8,7 @@
 
 #include "acquisition/loop/run_observer.hpp"
 #include "acquisition/record/event_log.hpp"
+#include "acquisition/record/log_reader.hpp"
 #include "acquisition/record/run_writer.hpp"
 #include "excitation/plan/experiment_plan.hpp"
 #include "hal/stage/limited_stage.hpp"
@@ -74,6 +75,9 @@ struct ExperimentResult {
 /// order. @throws std::invalid_argument if the stage lacks an axis or has another rate.
 LogInfo experiment_log_info(const ExperimentPlan& plan, const StageInfo& stage,
                             std::string metadata_json = "{}");
+
+/// The runs of a log for RunExperimentOptions::skip: recorded to their end, and nothing of them lost in recovery.
+std::vector<RunId> runs_without_loss(const LogReader& log);
 
 /// Seed of one run for CyclicStage::start(): with splitmix64's finalizer m and its increment g,
 ///   m(m(m(plan_seed + g) + g (realization + 1)) + g (experiment + 1)).

@@ -25,10 +25,6 @@ void leave_out_repeated(std::vector<LogRun>& runs) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 // Size of the pieces that are read, checked and transposed within the second-level cache.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
 

@@ -85,7 +85,7 @@ SlogWriter SlogWriter::create(const std::filesystem::path& file, const LogInfo& 
   auto state = std::unique_ptr<State>(
       new State{info, std::move(json), SlogAppender::create(file), 0, std::nullopt, 0});
   state->appender.append(state->header(SlogBlockType::log), state->info_json);
-  state->appender.synchronize();  // without it, nothing that follows can be read
+  state->appender.synchronize();  // readers need it for all blocks that follow
   return SlogWriter(std::move(state));
 }
 

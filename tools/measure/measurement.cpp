@@ -256,13 +256,6 @@ void listen(RunExperimentOptions& options, const std::shared_ptr<EventLog>& even
 
 }  // namespace
 
-std::vector<RunId> runs_without_loss(const LogReader& log) {
-  std::vector<RunId> runs;
-  for (const LogRun& run : log.runs())
-    if (run.complete && run.health.lost == 0) runs.push_back({run.realization, run.experiment});
-  return runs;
-}
-
 std::string advice_behind(const MeasurementResult& result) {
   if (result.exit_code == kInterrupted || result.exit_code == kWorldFailed)
     return "; continue with --resume";

@@ -52,9 +52,6 @@ struct MeasurementResult {
 MeasurementResult measure(const ExperimentConfig& config, const ExperimentPlan& plan,
                           const MeasurementRequest& request, const Console& console);
 
-/// The runs of a log that were recorded to their end, and of which recovery has lost nothing.
-std::vector<RunId> runs_without_loss(const LogReader& log);
-
 /// Remedy for a measurement that ended early, to be appended to its message. Resuming helps after a lost link or an
 /// interrupt, but not if the same run would reach the same limit.
 std::string advice_behind(const MeasurementResult& result);

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <set>
 #include <string>
 #include <vector>
@@ -50,6 +52,9 @@ struct Misfortune {
   SimulationSpec::Fault fault;
 
   bool has(Trouble trouble) const { return troubles.contains(trouble); }
+  bool has_any(std::initializer_list<Trouble> causes) const {
+    return std::any_of(causes.begin(), causes.end(), [&](Trouble cause) { return has(cause); });
+  }
   std::string describe() const {
     std::string text;
     for (const Trouble trouble : troubles) text += fmt::format("{}, ", to_string(trouble));

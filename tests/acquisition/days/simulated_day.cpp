@@ -125,18 +125,21 @@ class DayExperiment {
     if (done_.size() != before + static_cast<std::size_t>(result.runs_done))
       blame(fmt::format("{} complete runs were reported, the log has {} more", result.runs_done,
                         static_cast<int>(done_.size()) - static_cast<int>(before)));
-    if (killed) {
-      const bool at_end = random.uniform() < 0.5;  // when it had reported
-      const auto part = at_end ? 0.0 : random.uniform();
-      const auto written = bytes - static_cast<std::uint64_t>(
-                                       part * static_cast<double>(bytes - disk.bytes_before()));
-      const DiskLog::Synchronized medium = disk.before(written);
-      tear(medium.bytes, written, random);
-      done_ = complete_runs();
-      const int certain = at_end ? result.runs_done : medium.complete_runs;
-      if (done_.size() < before + static_cast<std::size_t>(certain))
-        blame("a complete run is lost");
-    }
+    if (killed) die(disk, bytes, before, result.runs_done, random);
+  }
+
+  /// The process ends when part of the `bytes` of the log was written, or after it has reported `runs_done`.
+  void die(const DiskLog& disk, std::uint64_t bytes, std::size_t before, int runs_done,
+           RandomNumbers& random) {
+    const bool at_end = random.uniform() < 0.5;
+    const auto part = at_end ? 0.0 : random.uniform();
+    const auto written =
+        bytes - static_cast<std::uint64_t>(part * static_cast<double>(bytes - disk.bytes_before()));
+    const DiskLog::Synchronized medium = disk.before(written);
+    tear(medium.bytes, written, random);
+    done_ = complete_runs();
+    const int certain = at_end ? runs_done : medium.complete_runs;
+    if (done_.size() < before + static_cast<std::size_t>(certain)) blame("a complete run is lost");
   }
 
   /// As `stageid run --resume` does, or after `stageid log recover`.
@@ -161,18 +164,11 @@ class DayExperiment {
   }
 
   std::set<RunId> complete_runs() const {
-    const SlogReader reader(file_, false);
-    std::set<RunId> runs;
-    for (const LogRun& run : reader.runs())
-      if (run.complete && run.health.lost == 0) runs.insert({run.realization, run.experiment});
-    return runs;
+    const std::vector<RunId> runs = runs_without_loss(SlogReader(file_, false));
+    return {runs.begin(), runs.end()};
   }
 
   void judge_end(const ExperimentResult& result, const Misfortune& misfortune) {
-    const auto has = [&](std::initializer_list<Trouble> causes) {
-      return std::any_of(causes.begin(), causes.end(),
-                         [&](Trouble cause) { return misfortune.has(cause); });
-    };
     using enum Trouble;
     bool plausible = true;
     switch (result.end) {
@@ -182,16 +178,16 @@ class DayExperiment {
             !must_stop(misfortune);
         break;
       case ExperimentEnd::interrupted:
-        plausible = has({interrupted});
+        plausible = misfortune.has_any({interrupted});
         break;
       case ExperimentEnd::log_failed:
-        plausible = has({disk});
+        plausible = misfortune.has_any({disk});
         break;
       case ExperimentEnd::limit:
-        plausible = has({stage_fault, loud, wire, cut, bus});
+        plausible = misfortune.has_any({stage_fault, loud, wire, cut, bus});
         break;
       case ExperimentEnd::fault:
-        plausible = has({stage_fault, loud, wire, cut, bus, interlock, tripped});
+        plausible = misfortune.has_any({stage_fault, loud, wire, cut, bus, interlock, tripped});
         break;
     }
     if (!plausible)
@@ -216,8 +212,7 @@ class DayExperiment {
       const std::uint64_t end = first + witnessed.u.size();
       if (misfortune.at >= first && misfortune.at < end)
         return link_ != Link::resident && misfortune.at - first + kNoticed < samples &&
-               (misfortune.has(interrupted) || misfortune.has(tripped) || misfortune.has(cut) ||
-                misfortune.has(bus) || misfortune.has(interlock));
+               misfortune.has_any({interrupted, tripped, cut, bus, interlock});
       first = end;
     }
     return false;
@@ -283,7 +278,7 @@ class DayExperiment {
     return true;
   }
 
-  /// The process ended when so many bytes were written. Of those that were not synchronized, any part is on the disk.
+  /// Cuts the log. Of what was written and not synchronized, any part is on the disk.
   void tear(std::uint64_t synchronized, std::uint64_t written, RandomNumbers& random) {
     std::filesystem::resize_file(file_, written);
     if (random.uniform() < 0.5) return;  // the system went on

@@ -22,11 +22,7 @@ struct DayReport {
 /// One day of a stage in virtual time: experiments that fail for all kinds of reasons and are resumed until they are
 /// complete. The seed and the number decide everything that happens.
 ///
-/// Invariants: no force exceeds its limits, or acts beyond the hard window, and the stage goes no farther if its sensors
-/// are right; after every end the stage is at rest; what
-/// the log does not mark is what the stage did, sample by sample; a run that was reported as complete stays so,
-/// whatever happens to the end of the log; an attempt ends for one of its troubles and for nothing else, and the last
-/// one, without any, completes the experiment.
+/// docs/decisions/simulated-days.md lists the invariants.
 DayReport simulate_day(std::uint64_t seed, std::uint64_t day);
 
 }  // namespace stageid::test

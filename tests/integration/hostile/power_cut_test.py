@@ -5,7 +5,7 @@ experiment can be resumed.
 
     power_cut_test.py PROGRAM CONFIGS RECORDER WORK_DIR ORDERS [SEED]
 RECORDER: the library made of sync_recorder.c
-ORDERS: how many states of the disk per format, and of identify; ten times as many of the log
+ORDERS: how many states of the disk per command, and of identify; ten times as many of the log
 """
 
 import json
@@ -19,32 +19,15 @@ import sys
 import h5py
 import numpy as np
 
+from commands import COMMANDS, EXPERIMENT, prepare, words
+
 PROGRAM, CONFIGS, RECORDER, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
 ORDERS = int(sys.argv[5])
 DICE = random.Random(int(sys.argv[6]) if len(sys.argv) > 6 else 1)
-EXPERIMENT = "configs/experiment/small_stage_pilot.yaml"
 OUT = WORK / "out"
 SECTOR = 512
 MARKED = 1 << 8
 
-OUTPUTS = {
-    "o.rec.slog": ["log", "recover", "run.slog", "-o", "out/o.rec.slog"],
-    "o.log.h5": ["log", "convert", "run.slog", "-o", "out/o.log.h5"],
-    "o.log.mat": ["log", "convert", "run.slog", "-o", "out/o.log.mat"],
-    "o.log73.mat": ["log", "convert", "run.slog", "-o", "out/o.log73.mat", "--mat-version", "7.3"],
-    "o.log.csv": ["log", "convert", "run.slog", "-o", "out/o.log.csv"],
-    "o.design.h5": ["design", EXPERIMENT, "-o", "out/o.design.h5"],
-    "o.frf.h5": ["frf", "run.slog", "-o", "out/o.frf.h5"],
-    "o.modes.json": ["modes", "frf.h5", "-o", "out/o.modes.json"],
-    "o.fit.json": ["fit", "frf.h5", "--modes", "4", "-o", "out/o.fit.json"],
-    "o.model.h5": ["export", "model.json", "-o", "out/o.model.h5"],
-    "o.model.m": ["export", "model.json", "-o", "out/o.model.m"],
-    "o.frf.mat": ["export", "frf.h5", "-o", "out/o.frf.mat"],
-    "o.frf.npz": ["export", "frf.h5", "-o", "out/o.frf.npz"],
-    "o.frf.csv": ["export", "frf.h5", "-o", "out/o.frf.csv"],
-    "o.frf.uff": ["export", "frf.h5", "-o", "out/o.frf.uff"],
-    "o.report.html": ["report", "model.json", "frf.h5", "-o", "out/o.report.html"],
-}
 BLOCK = np.dtype([("magic", "S8"), ("type", "<u2"), ("version", "<u2"), ("log_id", "<u4"), ("sequence", "<u8"),
                   ("run", "<u4"), ("cols", "<u4"), ("first_row", "<u8"), ("rows", "<u4"), ("bytes", "<u4"),
                   ("time_ns", "<i8"), ("payload_crc", "<u4"), ("header_crc", "<u4")])
@@ -62,23 +45,22 @@ class Trace:
         to = WORK / "trace"
         shutil.rmtree(to, ignore_errors=True)
         to.mkdir()
-        self.initial = self.listing()
-        data = {inode: (OUT / name).read_bytes() for name, inode in self.initial.items()}
+        visible = [self.listing()]  # the durable names, and those since
+        data = {inode: (OUT / name).read_bytes() for name, inode in visible[0].items()}
         done = stageid(*arguments, LD_PRELOAD=str(RECORDER), STAGEID_SYNC_OF=str(OUT), STAGEID_SYNC_TO=str(to))
         self.returncode = done.returncode
         if done.returncode not in (0, 3):
             sys.exit(f"{' '.join(arguments)}: {done.stderr}")
         self.final = {name: (OUT / name).read_bytes() for name in self.listing()}
         events = [line.split("\t") for line in (to / "trace").read_text().splitlines()]
-        names, visible = self.initial, [self.initial]
-        self.states = [(names, visible, dict(data))]
+        self.states = [(visible, dict(data))]
         for kind, *words in events:
             if kind == "data":
                 inode, copy, *words = words
                 data[int(inode)] = (to / copy).read_bytes()
             seen = {name: int(inode) for name, inode in (word.rsplit("=", 1) for word in words)}
             visible = [seen] if kind == "names" else [*visible, seen]
-            self.states.append((visible[0], visible, dict(data)))
+            self.states.append((visible, dict(data)))
 
     @staticmethod
     def listing():
@@ -87,19 +69,17 @@ class Trace:
     def cut(self):
         """Power fails after a random event. Returns the files, and the bytes of each that were durable."""
         at = DICE.randrange(len(self.states))
-        _, visible, data = self.states[at]
-        _, next_visible, next_data = self.states[min(at + 1, len(self.states) - 1)]
-        names = DICE.choice([*visible, next_visible[-1]])
+        visible, data = self.states[at]
+        coming, _ = self.states[min(at + 1, len(self.states) - 1)]
+        names = DICE.choice([*visible, coming[-1]])
         files = {name: torn(data.get(inode, b""), self.coming(at, inode)) for name, inode in names.items()}
         durable = {name: data.get(inode, b"") for name, inode in visible[0].items()}
         return files, durable
 
     def coming(self, at, inode):
         """The bytes of a file at its next synchronization."""
-        for _, _, data in self.states[at:]:
-            if data.get(inode) != self.states[at][2].get(inode):
-                return data[inode]
-        return self.states[at][2].get(inode, b"")
+        now = self.states[at][1].get(inode)
+        return next((data[inode] for _, data in self.states[at:] if data.get(inode) != now), now or b"")
 
 
 def torn(old, new):
@@ -231,13 +211,14 @@ def check_identify(orders, failures):
     print(f"identify: {orders} orders")
 
 
-def check_output(name, arguments, existing, failures):
+def check_output(command, existing, failures):
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir()
+    name = next(pathlib.Path(word).name for word in words(command) if word.startswith("out/"))
     old = b"another file"
     if existing:
         (OUT / name).write_bytes(old)
-    trace = Trace(arguments)
+    trace = Trace(words(command))
     allowed = {trace.final[name], old if existing else None}
     seen = set()
     for order in range(ORDERS):
@@ -245,30 +226,24 @@ def check_output(name, arguments, existing, failures):
         content = files.get(name)
         seen.add(content)
         if content not in allowed:
-            failures.append(f"{name}: order {order}: neither as before nor complete")
+            failures.append(f"{command}: order {order}: neither as before nor complete")
             break
     if seen != allowed:
-        failures.append(f"{name}: only {len(seen)} of 2 contents were seen: is the recorder at work?")
+        failures.append(f"{command}: only {len(seen)} of 2 contents were seen: is the recorder at work?")
 
 
 def main():
-    shutil.rmtree(WORK, ignore_errors=True)
-    OUT.mkdir(parents=True)
-    shutil.copytree(CONFIGS, WORK / "configs")
+    prepare(PROGRAM, CONFIGS, WORK)
+    OUT.mkdir()
     failures = []
-    trace = Trace(["run", EXPERIMENT, "-o", "out/run.slog"])
-    truth = trace.final["run.slog"]
-    check_log("run.slog", trace, truth, 10 * ORDERS, failures)
+    trace = Trace(words("run"))
+    check_log("o.slog", trace, trace.final["o.slog"], 10 * ORDERS, failures)
     check_identify(ORDERS, failures)
-
-    (WORK / "run.slog").write_bytes(truth)
-    for arguments in (["frf", "run.slog", "-o", "frf.h5"], ["fit", "frf.h5", "--modes", "4", "-o", "model.json"]):
-        stageid(*arguments)
-    for name, arguments in OUTPUTS.items():
-        check_output(name, arguments, False, failures)
-        if not name.endswith(".slog"):  # logs are never overwritten
-            check_output(name, arguments, True, failures)
-    print(f"{len(OUTPUTS)} formats: {ORDERS} orders of a new file each, as many of a replaced one")
+    for command in list(COMMANDS)[1:]:  # the first is run
+        check_output(command, False, failures)
+        if command != "recover":  # logs are never overwritten
+            check_output(command, True, failures)
+    print(f"{len(COMMANDS) - 1} commands: {ORDERS} orders of a new file each, as many of a replaced one")
     print("\n".join(failures[:50]), f"\n{len(failures)} failures")
     sys.exit(1 if failures else 0)
 
