@@ -5,7 +5,7 @@ experiment can be resumed.
 
     power_cut_test.py PROGRAM CONFIGS RECORDER WORK_DIR ORDERS [SEED]
 RECORDER: the library made of sync_recorder.c
-ORDERS: how many states of the disk per command, and of identify; ten times as many of the log
+ORDERS: how many states of the disk for identify; ten times as many for the log, at least 100 for each command
 """
 
 import json
@@ -23,6 +23,7 @@ from commands import COMMANDS, EXPERIMENT, prepare, words
 
 PROGRAM, CONFIGS, RECORDER, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
 ORDERS = int(sys.argv[5])
+OUTPUT_ORDERS = max(ORDERS, 100)  # in fewer, one of the two possible contents may not occur
 DICE = random.Random(int(sys.argv[6]) if len(sys.argv) > 6 else 1)
 OUT = WORK / "out"
 SECTOR = 512
@@ -221,7 +222,7 @@ def check_output(command, existing, failures):
     trace = Trace(words(command))
     allowed = {trace.final[name], old if existing else None}
     seen = set()
-    for order in range(ORDERS):
+    for order in range(OUTPUT_ORDERS):
         files, _ = trace.cut()
         content = files.get(name)
         seen.add(content)
@@ -243,7 +244,7 @@ def main():
         check_output(command, False, failures)
         if command != "recover":  # logs are never overwritten
             check_output(command, True, failures)
-    print(f"{len(COMMANDS) - 1} commands: {ORDERS} orders of a new file each, as many of a replaced one")
+    print(f"{len(COMMANDS) - 1} commands: {OUTPUT_ORDERS} orders of a new file each, as many of a replaced one")
     print("\n".join(failures[:50]), f"\n{len(failures)} failures")
     sys.exit(1 if failures else 0)
 
