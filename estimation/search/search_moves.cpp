@@ -125,14 +125,17 @@ bool a_delay_explains_more(SearchState& state) {
   if (state.options.delay != DelayModel::fixed || state.start.submodels.empty() || !state.simple ||
       !(state.cost() < state.simple->model.fit.cost))
     return false;
-  FitOptions options = state.quick;
-  options.delay = DelayModel::estimate;
-  options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
-  options.max_iterations = state.options.max_iterations;
-  AdditiveModel model = state.start;  // a fit with a wrong delay has moved the poles
-  model.input_delay_s.resize(0);
-  model.output_delay_s.resize(0);
-  const FitResult trial = fit_additive_model(state.frf, model, options);
+  if (!state.delayed) {
+    FitOptions options = state.quick;
+    options.delay = DelayModel::estimate;
+    options.delay_s = 0.0;  // 0 starts the search for a delay; a wrong value would not
+    options.max_iterations = state.options.max_iterations;
+    AdditiveModel model = state.start;  // a fit with a wrong delay has moved the poles
+    model.input_delay_s.resize(0);
+    model.output_delay_s.resize(0);
+    state.delayed = fit_additive_model(state.frf, model, options);
+  }
+  const FitResult& trial = *state.delayed;
   if (!state.is_better(trial)) return false;
   state.delay_denied = fmt::format(
       "a delay of {:.4g} s instead of {:.4g} s fits better (squared residual {:.6g}) than more "

@@ -68,10 +68,11 @@ struct SearchState {
   int hidden = 0;  ///< modes of `best` whose poles are held because noise hides them
 
   FitResult best;
-  FitResult before;                 ///< the last one before `best` was adopted
-  AdditiveModel start;              ///< of the first fit; empty if that was of a part of the data
-  std::optional<FitResult> simple;  ///< before modes were added or the structure was changed
-  FitResult proportional;           ///< the last one before general damping
+  FitResult before;                  ///< the last one before `best` was adopted
+  AdditiveModel start;               ///< of the first fit; empty if that was of a part of the data
+  std::optional<FitResult> simple;   ///< before modes were added or the structure was changed
+  std::optional<FitResult> delayed;  ///< of the start, with a delay that is not allowed
+  FitResult proportional;            ///< the last one before general damping
   std::vector<std::string> decisions;
   std::vector<double> history;  ///< costs of all iterations
 
