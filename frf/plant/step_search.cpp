@@ -79,20 +79,6 @@ class CommandHistogram {
     return power;
   }
 
-  /// Power of the residuals explained by a converter with this error per bin, over their mean power per sample; 0 if its
-  /// sign is opposite. The response contains the part of the error that is linear in the `commands`.
-  double explained(Eigen::VectorXd error, const Eigen::VectorXd& commands) const {
-    if (!(power_ > 0.0)) return 0.0;
-    const double samples = count_.sum();
-    const Eigen::VectorXd centred = commands.array() - commands.dot(count_) / samples;
-    error.array() -= error.dot(count_) / samples;
-    const Eigen::VectorXd weighted = centred.cwiseProduct(count_);
-    error -= centred * (weighted.dot(error) / weighted.dot(centred));
-    const double match = error.dot(sum_);
-    const double energy = error.cwiseAbs2().dot(count_);
-    return match > 0.0 && energy > 0.0 ? match * match / energy * samples / power_ : 0.0;
-  }
-
  private:
   void allocate() {
     if (sum_.size() > 0) return;
@@ -100,9 +86,51 @@ class CommandHistogram {
     count_.setZero(kBins);
   }
 
+  friend class OccupiedBins;
+
   Eigen::VectorXd sum_;    // empty before the first sample
   Eigen::VectorXd count_;  // of samples
   double power_ = 0.0;
+};
+
+/// The bins of a histogram that have samples.
+class OccupiedBins {
+ public:
+  OccupiedBins() = default;
+  OccupiedBins(const CommandHistogram& all, double largest) {
+    std::vector<Index> bins;
+    for (Index b = 0; b < all.count_.size(); ++b)
+      if (all.count_[b] > 0.0) bins.push_back(b);
+    if (bins.empty()) return;
+    const double end = largest * (1.0 - 1.0 / static_cast<double>(kBins));
+    commands_ = Eigen::VectorXd::LinSpaced(kBins, -end, end)(bins);  // middles of bins
+    sum_ = all.sum_(bins);
+    count_ = all.count_(bins);
+    samples_ = count_.sum();
+    power_ = all.power_ / samples_;
+    centred_ = commands_.array() - commands_.dot(count_) / samples_;
+    weighted_ = centred_.cwiseProduct(count_);
+    moment_ = weighted_.dot(centred_);
+  }
+
+  /// Power of the residuals explained by this converter, over their mean power per sample; 0 if the sign of its error is
+  /// opposite. The response contains the part of the error that is linear in the commands.
+  double explained(const ActuatorStep& candidate) const {
+    if (!(power_ > 0.0)) return 0.0;
+    Eigen::VectorXd error = commands_.unaryExpr([&](double u) { return candidate.applied(u) - u; });
+    error.array() -= error.dot(count_) / samples_;
+    error -= centred_ * (weighted_.dot(error) / moment_);
+    const double match = error.dot(sum_);
+    const double energy = error.cwiseAbs2().dot(count_);
+    return match > 0.0 && energy > 0.0 ? match * match / energy / power_ : 0.0;
+  }
+
+ private:
+  Eigen::VectorXd commands_, sum_, count_;
+  Eigen::VectorXd centred_, weighted_;  // commands without their mean; times the number of samples
+  double samples_ = 0.0;
+  double power_ = 0.0;   // of a sample
+  double moment_ = 0.0;  // sum of the squares of the centred commands
 };
 
 /// An actuator without a known step.
@@ -111,17 +139,14 @@ struct Tested {
   Index actuator = 0;    ///< of the log
   double largest = 0.0;  ///< command of all actuators with its unit
   CommandHistogram histogram;
+  OccupiedBins bins;  ///< of the complete histogram
 };
 using Members = std::vector<const Tested*>;
 
 /// How well a converter explains the residuals of these actuators.
 double explained(const ActuatorStep& candidate, const Members& members) {
-  const double end = members.front()->largest * (1.0 - 1.0 / static_cast<double>(kBins));
-  const Eigen::VectorXd commands = Eigen::VectorXd::LinSpaced(kBins, -end, end);  // middles of bins
-  const Eigen::VectorXd error =
-      commands.unaryExpr([&](double u) { return candidate.applied(u) - u; });
   double sum = 0.0;
-  for (const Tested* t : members) sum += t->histogram.explained(error, commands);
+  for (const Tested* t : members) sum += t->bins.explained(candidate);
   return sum;
 }
 
@@ -266,7 +291,7 @@ StepSearch::StepSearch(const std::vector<RealizationRuns>& realizations, const F
   if (runs_.front()->earlier != nullptr) known_ = runs_.front()->earlier->steps;
   for (std::size_t j = 0; j < inputs_.size(); ++j)
     if (std::ranges::find(known_, inputs_[j], &ActuatorStep::actuator) == known_.end())
-      tested_.push_back({static_cast<Index>(j), inputs_[j], 0.0, {}});
+      tested_.push_back({static_cast<Index>(j), inputs_[j], 0.0, {}, {}});
   std::vector<int> excited;
   for (const double f : frf.frequency_hz)
     excited.push_back(
@@ -368,6 +393,7 @@ void StepSearch::collect() {
     for (const auto& of_run : own)
       for (std::size_t a = 0; a < tested_.size(); ++a) tested_[a].histogram.add(of_run[a]);
   }
+  for (Tested& t : tested_) t.bins = OccupiedBins(t.histogram, t.largest);
 }
 
 /// Finds steps of `members`, all of one unit. First those of known actuators, then common ones.
