@@ -127,7 +127,7 @@ class SameResults(unittest.TestCase):
 
 class Memory(unittest.TestCase):
     def test_a_process_of_many_has_only_its_part_of_the_data(self):
-        lines, outputs = 400, 8 * 256
+        lines, outputs = 1200, 8 * 256
         write_wide_frf(WORK / "large.h5", 1e-3, outputs, lines)
         fit = [MPI_PROGRAM, "fit", "large.h5", "--modes", "20,41,73", "--threads", "1", "-o", "large.json"]
         peak = {}
