@@ -81,10 +81,10 @@ class Soak(unittest.TestCase):
         shutil.copytree(CONFIGS, WORK / "configs")
         cls.program("identify", "configs/experiment/small_stage.yaml", "-o", "model")
         file = WORK / "configs/experiment/small_stage_watch.yaml"
-        cls.run_periods = round(HOURS * 3600 * PACE / RUNS)
+        periods = round(HOURS * 3600 * PACE / RUNS)
         stage = WORK / "configs/stage/small_stage.yaml"
         stage.write_text(stage.read_text() + "\nrealtime: {policy: try, misses_allowed: 1000000}\n")
-        text = re.sub(r"^(  periods:) \d+", rf"\1 {cls.run_periods - 2}", file.read_text(), flags=re.M)
+        text = re.sub(r"^(  periods:) \d+", rf"\1 {periods - 2}", file.read_text(), flags=re.M)
         file.write_text(re.sub(r"^(  realizations:) \d+", rf"\1 {RUNS}", text, flags=re.M))
 
     @staticmethod
