@@ -123,7 +123,8 @@ class Soak(unittest.TestCase):
 
         settled = [row for row in held if took / RUNS < row[0] < 2 * took / 3]
         late = [row for row in held if row[0] >= 2 * took / 3]
-        for column, name, margin in ((1, "KiB of memory", 2 * KIB), (2, "files", 0), (3, "threads", 0)):
+        # One visitor at a time, and the one before may not be closed yet.
+        for column, name, margin in ((1, "KiB of memory", 2 * KIB), (2, "files", 2), (3, "threads", 0)):
             before, after = (max(row[column] for row in rows) for rows in (settled, late))
             print(f"{name}: at most {before}, in the last third {after}")
             self.assertLessEqual(after, before + margin, name)
