@@ -26,7 +26,7 @@ from frf_file import write_frf  # noqa: E402
 PROGRAM, MPI_PROGRAM, CONFIGS, WORK = (argument and pathlib.Path(argument).resolve() for argument in sys.argv[1:5])
 # Processes that wait let others run, even where Open MPI does not know that all cores are busy.
 MPIRUN = ["mpirun", "--quiet", "--allow-run-as-root", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
-TEAMS = (8, 4, 3, 2, 1)
+TEAMS = (8, 4, 3, 2, 1)  # the slowest first
 # In order: each uses the output of the previous ones.
 COMMANDS = {
     "frf.h5": ["frf", "../run.slog", "--realizations", "1,2"],

@@ -8,7 +8,7 @@ trap 'rm -rf "$outputs"' EXIT
 machines=() words=()
 start() {
   local machine=${#machines[@]}
-  "$folder/vmrun.sh" -n -c $((machine % cpus)) -t 600 -m 1024 -- "${words[@]}" > "$outputs/$machine" 2>&1 &
+  "$folder/vmrun.sh" -n -c $((machine % cpus)) -t 1800 -m 1024 -- "${words[@]}" > "$outputs/$machine" 2>&1 &
   machines+=($!) words=()
 }
 for word in "$@"; do

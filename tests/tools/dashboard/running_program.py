@@ -48,14 +48,14 @@ class RunningProgram:
         self.process.wait()
 
 
-def with_experiment(configs, work, late=False, **numbers):
-    """The small experiment with other numbers, in `work`; with `late`, of a stage that may miss any number of cycles."""
+def with_experiment(configs, work, late=False, experiment="small_stage", **numbers):
+    """An experiment of the small stage with other numbers, in `work`; with `late`, the stage may miss any number of cycles."""
     stage = configs / "stage/small_stage.yaml"
     if late:
         patient = work / "stage.yaml"
         patient.write_text(stage.read_text() + "\nrealtime: {policy: try, misses_allowed: 1000000}\n")
         stage = patient
-    text = (configs / "experiment/small_stage.yaml").read_text().replace("../stage/small_stage.yaml", str(stage))
+    text = (configs / f"experiment/{experiment}.yaml").read_text().replace("../stage/small_stage.yaml", str(stage))
     for key, value in numbers.items():
         text, found = re.subn(rf"^(  {key}:) \S+", rf"\1 {value}", text, flags=re.M)
         assert found == 1, key

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """A day of a watched stage on the real clock, eight times as fast: the measurement must keep its pace, tell no change,
-lose no sample, and take no more memory, files or threads in its last hour than after its first, while pages of the
+lose no sample, and take no more memory, files or threads in its last third than before, while pages of the
 dashboard stay open, come and go, and break off.
 
     soak_test.py PROGRAM CONFIGS WORK_DIR [HOURS]    default: 3 hours, of the day's 24
@@ -22,14 +22,13 @@ import urllib.parse
 import urllib.request
 
 from load_dashboard import connection
-from running_program import RunningProgram
+from running_program import RunningProgram, with_experiment
 
 PROGRAM, CONFIGS, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 HOURS = float(sys.argv[4]) if len(sys.argv) > 4 else 3
 PACE = 8
 RUNS = 24
 SAMPLE_EVERY_S = 5
-KIB = 1024
 
 
 class Reader(threading.Thread):
@@ -78,14 +77,11 @@ class Soak(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
-        shutil.copytree(CONFIGS, WORK / "configs")
-        cls.program("identify", "configs/experiment/small_stage.yaml", "-o", "model")
-        file = WORK / "configs/experiment/small_stage_watch.yaml"
-        periods = round(HOURS * 3600 * PACE / RUNS)
-        stage = WORK / "configs/stage/small_stage.yaml"
-        stage.write_text(stage.read_text() + "\nrealtime: {policy: try, misses_allowed: 1000000}\n")
-        text = re.sub(r"^(  periods:) \d+", rf"\1 {periods - 2}", file.read_text(), flags=re.M)
-        file.write_text(re.sub(r"^(  realizations:) \d+", rf"\1 {RUNS}", text, flags=re.M))
+        WORK.mkdir(parents=True)
+        cls.program("identify", CONFIGS / "experiment/small_stage.yaml", "-o", "model")
+        periods = round(HOURS * 3600 * PACE / RUNS) - 2  # measured: two more are transient
+        cls.experiment = with_experiment(CONFIGS, WORK, late=True, experiment="small_stage_watch", periods=periods,
+                                         realizations=RUNS)
 
     @staticmethod
     def program(*words):
@@ -93,8 +89,8 @@ class Soak(unittest.TestCase):
 
     def measure(self):
         """Runs the measurement to its end. @returns what the program held every few seconds, and what it told"""
-        running = RunningProgram(PROGRAM, WORK / "configs/experiment/small_stage_watch.yaml", "-o", WORK / "day.slog",
-                                 "--watch", WORK / "model/model.json", "--pace", PACE)
+        running = RunningProgram(PROGRAM, self.experiment, "-o", WORK / "day.slog", "--watch", WORK / "model/model.json",
+                                 "--pace", PACE)
         self.addCleanup(running.close)
         page, visitors, held = Reader(running.url), Visitors(running, 1), []
         began = time.monotonic()
@@ -112,7 +108,7 @@ class Soak(unittest.TestCase):
         took = held[-1][0]
         print(f"{took:.0f} s for {HOURS * PACE * 3600:.0f} s of the stage, {visitors.visits} visits, "
               f"{page.received} bytes of events, exit code {code}\n{out}", *running.lines[-3:])
-        self.assertGreater(page.received, 1000 * took / 10)
+        self.assertGreater(page.received, 100 * took)
         return code, out, took, held
 
     def test_a_day(self):
@@ -124,7 +120,7 @@ class Soak(unittest.TestCase):
         settled = [row for row in held if took / RUNS < row[0] < 2 * took / 3]
         late = [row for row in held if row[0] >= 2 * took / 3]
         # One visitor at a time, and the one before may not be closed yet.
-        for column, name, margin in ((1, "KiB of memory", 2 * KIB), (2, "files", 2), (3, "threads", 0)):
+        for column, name, margin in ((1, "KiB of memory", 2048), (2, "files", 2), (3, "threads", 0)):
             before, after = (max(row[column] for row in rows) for rows in (settled, late))
             print(f"{name}: at most {before}, in the last third {after}")
             self.assertLessEqual(after, before + margin, name)
